@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import difflib
 import math
 
-from realitygap.errors import LogError, did_you_mean
+from realitygap.errors import LogError
 
 TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0}
 LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254}
@@ -29,7 +30,7 @@ def unit_factor(place: str, unit: str, *tables: dict[str, float]) -> float:
     """
     known = {name: value for table in tables for name, value in table.items()}
     if unit not in known:
-        raise LogError(
-            f"{place} is {unit!r}, expected {', '.join(known)}. {did_you_mean(unit, known)}".strip()
-        )
+        near = difflib.get_close_matches(unit, known, n=1, cutoff=0.5)
+        hint = f" Did you mean {near[0]!r}?" if near else ""
+        raise LogError(f"{place} is {unit!r}, expected {', '.join(known)}.{hint}")
     return known[unit]

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
-from realitygap.calibration import fit_sensor, placements_of, sensor_plans
+from realitygap.calibration import distance_of, fit_sensor, placements_of, sensor_plans
 from realitygap.platforms import SimPlatform, SimTarget
 from realitygap.world import load_robot, paper_arena, robot_names
 
@@ -60,10 +62,43 @@ def test_placements_keep_the_body_clear_of_the_wall() -> None:
     """Once the nearest placements pushed an e-puck back from the wall, and its readings changed."""
     arena = paper_arena()
     right = max(x for wall in arena.walls for x in wall[::2])
-    for name in ("e-puck", "khepera", "scribbler-s2-fluke2"):
+    for name in ("e-puck", "khepera", "thymio", "scribbler-s2-fluke2"):
         robot = load_robot(name)
-        rim = max(x for part in robot.body for x, _ in part.outline())
-        starts = [plan.start for plan in sensor_plans(arena, robot)]
-        assert all(start is not None and start.x + rim < right for start in starts), name
-        nearest = max(start.x for start in starts if start is not None)
-        assert right - nearest - max(sensor.x for sensor in robot.range) < 0.2 * robot.range[0].reach, name
+        plans = sensor_plans(arena, robot)
+        headings = {round(plan.start.heading, 6) for plan in plans if plan.start is not None}
+        assert headings == ({0.0} if name == "scribbler-s2-fluke2" else {0.0, round(math.pi, 6)}), name
+        for heading in headings:
+            turned = [
+                plan for plan in plans if plan.start is not None and round(plan.start.heading, 6) == heading
+            ]
+            way = math.cos(heading)
+            rim = max(way * x for part in robot.body for x, _ in part.outline())
+            front = max(way * sensor.x for sensor in robot.range)
+            for plan in turned:
+                assert plan.start is not None
+                assert plan.start.x + rim < right, name
+                assert distance_of(plan, arena, robot) == pytest.approx(right - plan.start.x - front), name
+            assert min(distance_of(plan, arena, robot) for plan in turned) < 0.2 * robot.range[0].reach, name
+
+
+def test_each_sensor_that_looks_ahead_or_back_has_a_wall_in_view() -> None:
+    """Sensors at the back of a Thymio once got the middle of their prior, and no advice said so."""
+    arena = paper_arena()
+    for name in ("e-puck", "khepera", "thymio"):
+        robot = load_robot(name)
+        with SimTarget(SimPlatform(robot=robot, noise=False), arena, key=0) as target:
+            trials = target.carry_out(sensor_plans(arena, robot, 4), "cells")
+        for sensor, placements in zip(robot.range, placements_of(trials, robot, arena), strict=True):
+            if abs(math.cos(sensor.direction)) > 0.5:
+                assert any(placement.distances.min() < sensor.reach for placement in placements), name
+
+
+@pytest.mark.slow
+def test_sensor_without_a_wall_in_view_keeps_its_numbers_and_gets_advice() -> None:
+    robot = load_robot("e-puck")
+    with SimTarget(SimPlatform(robot=robot), paper_arena(), key=1) as target:
+        trials = target.carry_out(sensor_plans(paper_arena(), robot, 2), "cells")
+    fit = fit_sensor(robot, 2, placements_of(trials, robot, paper_arena())[2], np.random.default_rng(1))
+    assert not fit.numbers
+    assert not fit.draws
+    assert "range.2 never had a wall in view" in fit.fitted[0].advice

@@ -20,8 +20,10 @@ def placing_words(plan: TrialPlan, arena: Arena, robot: RobotModel) -> str:
     """Return the instructions for placing the robot for a trial of a calibration, and its next motion."""
     if plan.purpose == "sensors":
         inches = distance_of(plan, arena, robot) / INCH
+        start = plan.start or arena.start
+        side = "" if math.cos(start.heading) > 0 else ", its back to it"
         return (
-            f"put it square to a wall, its sensors {inches:g} in from it and nothing else near. It reads "
+            f"put it square to a wall{side}, its sensors {inches:g} in from it and nothing else near. It reads "
             f"{len(plan.commands)} times and does not move."
         )
     n = int(np.any(plan.commands != 0, axis=1).sum())

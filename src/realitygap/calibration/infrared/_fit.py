@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -26,6 +27,9 @@ ENDS = (0.05, 0.95)
 
 IDENTIFIED = 1 / 3
 """A parameter is identified where its interval is narrower than this part of what was thought possible."""
+
+NO_WALL = "{} never had a wall in view. Place the robot so that this sensor faces one."
+"""The advice for a sensor that looked away from the wall in all placements."""
 
 CURVE = 60
 """Distances of the fitted curve in a figure."""
@@ -97,10 +101,18 @@ def fit_sensor(
     chosen = rng.choice(len(values), n_draws, replace=n_draws > len(values))
     name = f"range.{number}"
     centers = {scale.name: scale.center(values[:, k]) for k, scale in enumerate(model.scales)}
-    is_own = {scale.name: scale.name != BATTERY.name for scale in model.scales}
+    advice = "" if np.any(model.places.near < sensor.reach) else NO_WALL.format(name)
+    fitted = tuple(
+        _fitted(name, scale, ends[:, k], values[:, k], advice) for k, scale in enumerate(model.scales)
+    )
+    # what a sensor that saw no wall does not tell stays as the robot's file has it, and not in the middle of its prior
+    is_own = {
+        scale.name: scale.name != BATTERY.name and (one.identified or not advice)
+        for scale, one in zip(model.scales, fitted, strict=True)
+    }
     return SensorFit(
         name,
-        tuple(_fitted(name, scale, ends[:, k], values[:, k]) for k, scale in enumerate(model.scales))
+        fitted
         + (() if model.places.battery_varied or sensor.response == "lorentz" else (_unknown_battery(name),)),
         {f"{name}.{key}": value for key, value in centers.items() if is_own[key]},
         {
@@ -134,7 +146,7 @@ def _ends(places: Array, level: Array) -> Array:
     return np.stack([np.minimum(low, level[0]), np.maximum(high, level[1])])
 
 
-def _fitted(name: str, scale: Scale, ends: Array, values: Array) -> Fitted:
+def _fitted(name: str, scale: Scale, ends: Array, values: Array, advice: str = "") -> Fitted:
     low, high = scale.of(ends)
     identified = bool(np.ptp(ends) < IDENTIFIED * (ENDS[1] - ENDS[0]))
     return Fitted(
@@ -146,7 +158,7 @@ def _fitted(name: str, scale: Scale, ends: Array, values: Array) -> Fitted:
         prior_high=scale.high,
         identified=identified,
         unit=scale.unit,
-        advice="" if identified else scale.advice,
+        advice="" if identified else advice or scale.advice,
     )
 
 
@@ -166,7 +178,9 @@ def _unknown_battery(name: str) -> Fitted:
 
 
 def _curve(model: SensorModel, cone: float, rays: int, direction: float, values: Array) -> dict[str, Array]:
-    """Return the reading of the fit in front of a wall that the robot faces."""
+    """Return the reading of the fit before a wall: one that the robot faces, or turns its back to for a rear sensor."""
+    if math.cos(direction) < 0:
+        direction += math.pi
     ahead = np.linspace(0.0, 1.1 * max(model.places.near.max(), 0.1), CURVE)
     angles = direction + (np.linspace(-cone, cone, rays) if rays > 1 else np.zeros(1))
     cosines = np.maximum(np.cos(angles), 1e-3)

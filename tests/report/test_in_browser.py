@@ -184,7 +184,7 @@ def test_first_screen_has_findings_a_moving_path_and_a_figure(show):
     page.wait_for_function(
         "() => document.querySelector('#replay-stage').getBoundingClientRect().top < innerHeight"
     )
-    assert step_of(page) == 0
+    assert step_of(page) < 10  # it plays from step 0 on
 
 
 @pytest.mark.slow

@@ -58,7 +58,7 @@ def test_audit_is_for_the_papers_study_alone(words, tiny_study, tiny_html, paper
 
 def test_chance_and_the_fourth_input_are_told(words):
     assert "“50 % noise is best” comes out of three runs a level" in words
-    assert "Networks have a fourth, constant input with novelty" in words
+    assert "With novelty, networks have a fourth, constant input" in words
     assert "33 % each" in words
 
 

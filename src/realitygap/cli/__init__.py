@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import atexit
 import contextlib
+import gc
 import io
 import os
 import shutil
@@ -56,6 +58,8 @@ def main() -> None:
     A terminal without some letter shows a question mark in its place.
     """
     warnings.showwarning = _show_warning
+    # Python ends with a search for garbage among all objects, which takes a second after a report
+    atexit.register(gc.freeze)
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):  # closed ones are None
             stream.reconfigure(errors="replace")

@@ -39,7 +39,7 @@ from realitygap.report._drawing import (
 )
 from realitygap.report._driven import refuse_replay
 from realitygap.report._formats import captioned, check_ending, save_drawing
-from realitygap.report._path_figure import arena_extent, draw_arena
+from realitygap.report._path_figure import arena_extent, draw_arena, draw_cells
 from realitygap.report._tally import Tally, read_tally, settings_of
 from realitygap.report._trial_figure import ChosenTrial, choose_trial
 from realitygap.runs import Condition, genome_of
@@ -288,14 +288,8 @@ def _draw(
 
 
 def _draw_side(axes: Axes, side: Side, color: str, *, is_narrow: bool) -> None:
-    from matplotlib.patches import Rectangle
-
     first = side.trials[0]
-    grid = first.arena.grid
-    for cell in first.cells:
-        row, column = divmod(cell, grid.columns)
-        corner = (grid.x + column * grid.cell, grid.y + row * grid.cell)
-        axes.add_artist(Rectangle(corner, grid.cell, grid.cell, facecolor=Ink.VISITED, linewidth=0, zorder=0))
+    draw_cells(axes, first.cells, first.arena, facecolor=Ink.VISITED)
     for trial in side.trials[1:_MOST_TRAILS]:
         draw_points(axes, trial.poses, color=color, linewidth=0.5, alpha=0.22, zorder=4)
     draw_points(axes, first.poses, color=color, linewidth=1.7, zorder=6, solid_joinstyle="round")

@@ -145,10 +145,14 @@ def _drawn(drawing: Drawing, draw: Callable[[float], Figure], width: float, numb
 def house_style() -> Iterator[None]:
     """Draw with our settings, whatever the user's are; they are back as they were afterwards.
 
-    matplotlib keeps its settings for the whole process, so draw from one thread at a time.
+    matplotlib keeps its settings for the whole process, so draw from one thread at a time. Within another one it does
+    nothing: setting all of them takes some milliseconds.
     """
     import matplotlib as mpl
 
+    if mpl.rcParams["svg.hashsalt"] == _STYLE["svg.hashsalt"]:
+        yield
+        return
     with mpl.rc_context(), warnings.catch_warnings():
         # letters that our measuring font lacks are there in the reader's
         warnings.filterwarnings("ignore", message="Glyph .* missing from")

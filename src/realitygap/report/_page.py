@@ -33,6 +33,7 @@ from realitygap.report._champions import Champions, retry_champions
 from realitygap.report._choices_figure import compare_choices, draw_choices
 from realitygap.report._comparisons import Comparison, compare_conditions
 from realitygap.report._coverage_figure import draw_coverage
+from realitygap.report._drawing import house_style
 from realitygap.report._driven import describe_driven
 from realitygap.report._export import export_page
 from realitygap.report._findings import find, leading_conditions
@@ -95,7 +96,8 @@ def write_report(
         # another version's results are announced on the page itself
         warnings.simplefilter("ignore", RecordWarning)
         tally = read_tally(folder)
-        content = _content(tally)
+        with house_style():
+            content = _content(tally)
         page = _render(content)
         if figures is not None:
             content["exported"] = export_page(Path(figures), tally, content, page)

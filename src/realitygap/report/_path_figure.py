@@ -259,24 +259,32 @@ def draw_arena(axes: Axes, arena: Arena, x_range: tuple[float, float], y_range: 
         linewidth=0.9,
         zorder=2,
     )
-    for x1, y1, x2, y2 in arena.walls:
-        draw_line(
-            axes, [x1, x2], [y1, y2], color=Ink.TEXT, linewidth=1.8, solid_capstyle="projecting", zorder=3
-        )
+    walls = np.array([[x1, y1, x2, y2, math.nan, math.nan] for x1, y1, x2, y2 in arena.walls]).reshape(-1, 2)
+    draw_points(axes, walls, color=Ink.TEXT, linewidth=1.8, solid_capstyle="projecting", zorder=3)
     for obstacle in arena.obstacles:
         xs, ys = zip(*obstacle.outline(), strict=True)
         axes.fill(xs, ys, facecolor=Ink.RULE, edgecolor=Ink.TEXT, linewidth=1.2, zorder=3)
 
 
-def draw_visited(axes: Axes, cells: Iterable[int], arena: Arena, body: Body) -> None:
-    """What lies under paths: visited cells, the robot's outline at the start, and the start."""
-    from matplotlib.patches import Rectangle
+def draw_cells(axes: Axes, cells: Iterable[int], arena: Arena, **style: Any) -> None:
+    """Cells as one area, which takes a tenth of the time that a rectangle for each would."""
+    from matplotlib.patches import PathPatch
+    from matplotlib.path import Path
 
     grid = arena.grid
-    for cell in cells:
-        row, column = divmod(cell, grid.columns)
-        corner = (grid.x + column * grid.cell, grid.y + row * grid.cell)
-        axes.add_artist(Rectangle(corner, grid.cell, grid.cell, facecolor=Ink.VISITED, linewidth=0, zorder=0))
+    rows, columns = np.divmod(np.array(list(cells), dtype=int), grid.columns)
+    if not len(rows):
+        return
+    corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]])
+    places = np.column_stack([columns, rows])[:, None] + corners
+    vertices = np.array([grid.x, grid.y]) + grid.cell * places.reshape(-1, 2)
+    codes = np.tile([Path.MOVETO, *[Path.LINETO] * 3, Path.CLOSEPOLY], len(rows))
+    axes.add_artist(PathPatch(Path(vertices, codes), linewidth=0, zorder=0, **style))
+
+
+def draw_visited(axes: Axes, cells: Iterable[int], arena: Arena, body: Body) -> None:
+    """What lies under paths: visited cells, the robot's outline at the start, and the start."""
+    draw_cells(axes, cells, arena, facecolor=Ink.VISITED)
     for start in arena.starts:
         outline = placed([*body.corners, body.corners[0]], start)
         draw_line(axes, outline[:, 0], outline[:, 1], color=Ink.BODY, linewidth=0.8, zorder=4)

@@ -448,10 +448,8 @@ outputs = ["left", "right"]
 [neat]
 population = 6
 generations = 2
-[platform.sim]
-steps = 12
-[platform.scribbler]
-steps = 4
+[platform.{platform}]
+steps = {steps}
 [[condition]]
 name = "c"
 platform = "{platform}"
@@ -460,7 +458,7 @@ platform = "{platform}"
 
 @pytest.mark.slow
 def test_gap_and_transfer_drive_champions_as_they_declare(files, tmp_path):
-    study = parse_study(GAP_STUDY.format(platform="sim"), "wheels.toml")
+    study = parse_study(GAP_STUDY.format(platform="sim", steps=12), "wheels.toml")
     run_study(study, tmp_path / "results", threads=1)
     twin = f"twin:{files / 'close.toml'}"
     gap_between("sim", twin, controllers=tmp_path / "results", n_controllers=3, trials=2)
@@ -483,7 +481,7 @@ def test_gap_and_transfer_drive_champions_as_they_declare(files, tmp_path):
 
 
 def test_physical_study_drives_networks_as_they_declare(tmp_path):
-    study = parse_study(GAP_STUDY.format(platform="scribbler"), "wheels.toml")
+    study = parse_study(GAP_STUDY.format(platform="scribbler", steps=4), "wheels.toml")
     study = study.model_copy(update={"about": study.about.model_copy(update={"replicates": 1})})
     result = drive_study(study, "emulator://s2?fluke=2&speed=off", tmp_path / "results")
     assert result.physical.n_complete == 1

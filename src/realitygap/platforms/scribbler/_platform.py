@@ -7,10 +7,7 @@ from typing import TYPE_CHECKING, ClassVar, Literal, Self
 
 from pydantic import Field
 
-from realitygap.robots import Robot, is_in_this_program
-from realitygap.world import Arena
-
-from .._platform import Platform
+from .._port import PortPlatform
 
 if TYPE_CHECKING:
     from realitygap.robots.scribbler import Scribbler
@@ -21,7 +18,7 @@ WATCHDOG_S = 1.0
 """After so long a silence of the controlling loop the driver stops the motors [s]."""
 
 
-class ScribblerPlatform(Platform):
+class ScribblerPlatform(PortPlatform):
     """The Scribbler as the paper drove it; the port comes from the command line.
 
     The robot moves on while a command's time runs, and until the next command. A reading is the raw value of an
@@ -32,10 +29,6 @@ class ScribblerPlatform(Platform):
 
     name: ClassVar[str] = "scribbler"
     summary: ClassVar[str] = "the paper’s robot: driven over its own protocol"
-    rest: ClassVar[str] = "PORT"
-    rest_setting: ClassVar[str] = "port"
-    needs_rest: ClassVar[bool] = True
-    is_physical: ClassVar[bool] = True
     channels: ClassVar[tuple[str, ...]] = (
         *("light.0", "light.1", "light.2", "line.0", "line.1"),
         *("encoder.0", "encoder.1"),  # of an S2 or S3
@@ -43,13 +36,6 @@ class ScribblerPlatform(Platform):
     full_scale: ClassVar[float] = FULL_SCALE
     emulated: ClassVar[str] = "scribbler:emulator://s2?fluke=2"
 
-    port: str = Field(
-        "",
-        exclude=True,
-        description="Port of the robot, which the command line names.",
-        json_schema_extra={"hidden": True},
-        repr=False,
-    )
     steps: int = Field(100, ge=1, le=100_000, description="Steps of a trial (section 2.2: 100).")
     wait_s: float = Field(0.5, gt=0, le=60, description="Duration of a command [s] (section 2.2: 0.5).")
     reading_max: float = Field(
@@ -73,16 +59,6 @@ class ScribblerPlatform(Platform):
         return cls(port=rest, reading_max=FULL_SCALE)
 
     @property
-    def label(self) -> str:
-        """The label of its figures while nothing was driven; then REAL or EMULATED, as the driver finds."""
-        return "not driven"
-
-    @property
-    def title(self) -> str:
-        """Title of its picture."""
-        return self.name
-
-    @property
     def command_s(self) -> float:
         """Duration of a command [s]."""
         return self.wait_s
@@ -91,23 +67,6 @@ class ScribblerPlatform(Platform):
     def outline_words(self) -> str:
         """The origin of the outline in figures, for their captions."""
         return "the box that holds the robot’s; the paper does not state the start and where the sensors are mounted"
-
-    def at_port(self, port: str) -> Self:
-        """Return the platform with the port of its robot."""
-        return self.model_copy(update={"port": port})
-
-    @property
-    def needs_person(self) -> bool:
-        """Whether a person has to place the robot: not if it is emulated in this program."""
-        return not is_in_this_program(self.port)
-
-    def open_robot(self, arena: Arena, *, noise: float = 0.0) -> Robot:
-        """Connect to the robot; an emulated one in this program is placed at the start."""
-        robot = self.connect()
-        witness = getattr(robot.port, "witness", None)
-        if witness is not None:
-            witness.place(arena.start, 0)
-        return robot
 
     def connect(self) -> Scribbler:
         """Connect to the robot at the port, with these settings.

@@ -8,17 +8,17 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 from pydantic import Field, PrivateAttr
 
-from realitygap.robots import Robot, is_in_this_program
 from realitygap.world import Arena, Body, RangeSensors, RobotModel, load_robot
 
-from .._platform import Opening, Platform
+from .._platform import Opening
+from .._port import PortPlatform
 
 if TYPE_CHECKING:
     from realitygap.robots.thymio import Thymio
     from realitygap.trials import Target
 
 
-class ThymioPlatform(Platform):
+class ThymioPlatform(PortPlatform):
     """A Thymio II on a cable, on a dongle, or in Aseba's playground; the port comes from the command line.
 
     The robot moves on while a command's time runs, and until the next command, or for 0.2 s. A reading is the raw value
@@ -30,10 +30,6 @@ class ThymioPlatform(Platform):
 
     name: ClassVar[str] = "thymio"
     summary: ClassVar[str] = "a Thymio II: driven over its own protocol"
-    rest: ClassVar[str] = "PORT"
-    rest_setting: ClassVar[str] = "port"
-    needs_rest: ClassVar[bool] = True
-    is_physical: ClassVar[bool] = True
     channels: ClassVar[tuple[str, ...]] = (
         *("line.0", "line.1"),
         *("encoder.0", "encoder.1"),  # of a robot, not in a playground
@@ -42,13 +38,6 @@ class ThymioPlatform(Platform):
     base_robot: ClassVar[str] = "thymio"
     emulated: ClassVar[str] = "thymio:emulator://playground"
 
-    port: str = Field(
-        "",
-        exclude=True,
-        description="Port of the robot, which the command line names.",
-        json_schema_extra={"hidden": True},
-        repr=False,
-    )
     step_s: float = Field(
         0.1,
         gt=0,
@@ -71,16 +60,6 @@ class ThymioPlatform(Platform):
         76.0, ge=0, le=1023, description="Reading of a ground sensor on a black floor."
     )
     _arena: Arena | None = PrivateAttr(None)
-
-    @property
-    def label(self) -> str:
-        """The label of its figures while nothing was driven; then REAL or EMULATED, as the driver finds."""
-        return "not driven"
-
-    @property
-    def title(self) -> str:
-        """Title of its picture."""
-        return self.name
 
     @property
     def command_s(self) -> float:
@@ -107,28 +86,11 @@ class ThymioPlatform(Platform):
         """The origin of the outline in figures, for their captions."""
         return "Enki’s"
 
-    def at_port(self, port: str) -> Self:
-        """Return the platform with the port of its robot."""
-        return self.model_copy(update={"port": port})
-
     def in_arena(self, arena: Arena) -> Self:
         """Return the platform with the arena with which a playground in this program begins."""
         found = self.model_copy()
         found._arena = arena
         return found
-
-    @property
-    def needs_person(self) -> bool:
-        """Whether a person has to place the robot: not if it is emulated in this program."""
-        return not is_in_this_program(self.port)
-
-    def open_robot(self, arena: Arena, *, noise: float = 0.0) -> Robot:
-        """Connect to the robot; an emulated one in this program is placed at the start."""
-        robot = self.in_arena(arena).connect()
-        witness = getattr(robot.port, "witness", None)
-        if witness is not None:
-            witness.place(arena.start, 0)
-        return robot
 
     def open(self, arena: Arena, how: Opening) -> Target:
         """Open the robot for trials one by one, with its observer or its witness."""

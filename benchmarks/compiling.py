@@ -1,6 +1,7 @@
 """Processor seconds of first commands, from an empty cache of kernels; `--json` prints data.
 
-Each command runs in a process of its own, twice: with what it has to compile, and with everything compiled.
+Each command runs in a process of its own, twice: with what it has to compile, and with everything compiled. The data
+name the commit of the package's sources.
 """
 
 from __future__ import annotations
@@ -93,6 +94,12 @@ def measure(names: list[str], source: Path | None) -> dict[str, dict[str, float]
     return results
 
 
+def commit_of(source: Path) -> str:
+    """Return the commit of a folder in a Git checkout, with "-dirty" if its files differ from the commit."""
+    command = ["git", "-C", str(source), "describe", "--always", "--dirty", "--exclude=*"]
+    return subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
+
+
 def main() -> None:
     """Measure, and print."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -101,9 +108,11 @@ def main() -> None:
     parser.add_argument("--json", action="store_true", help="Print data.")
     arguments = parser.parse_args()
     results = measure(arguments.only, arguments.source)
+    commit = commit_of(arguments.source or Path(__file__).parent)
     if arguments.json:
-        print(json.dumps(results, indent=2))
+        print(json.dumps({"commit": commit, **results}, indent=2))
         return
+    print(f"commit {commit}")
     print(f"{'command':16}{'first [s]':>12}{'[loops]':>10}{'again [s]':>12}{'[loops]':>10}")
     for name, row in results.items():
         print(

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import json
 import re
+from pathlib import Path
 
 import polars as pl
 import pytest
 
-from realitygap.report import write_report
+from realitygap.report import compare_choices, write_closing_page, write_report
 from realitygap.report._tally import read_tally
+from tests.report.results import describe, random_runs, write_results
 from tests.report.test_in_browser import DESKTOP, PHONE, browser, page_file, pytestmark, show  # noqa: F401
 
 pytestmark = [pytestmark, pytest.mark.slow]
@@ -127,3 +130,45 @@ def test_print_has_the_first_screen_on_one_page_and_the_last_frame(show):  # noq
     page.emulate_media(media="screen")
     page.wait_for_timeout(100)
     assert page.locator("#replay-scrub").evaluate("scrub => scrub.value") == "0"
+
+
+EVERY = """(narrow) => {
+  const marks = JSON.parse(document.getElementById('marks').textContent);
+  return Object.entries(marks).flatMap(([anchor, entry]) => {
+  const plot = document.querySelectorAll(`#${anchor} .plot`)[narrow ? 1 : 0], svg = plot.querySelector('svg');
+  return (narrow && entry.narrow || entry.panels).flatMap((panel, k) => panel.series.map(([, name, ys, xs]) => {
+    svg.scrollIntoView({ block: 'center' });
+    const box = svg.getBoundingClientRect(), scale = box.width / svg.viewBox.baseVal.width;
+    const [a, b, c, d] = entry.frames[narrow ? 1 : 0][k], x = box.left + (a + b * (xs ? xs[0] : 0)) * scale;
+    const y = box.top + (c + d * ys[0]) * scale, at = { clientX: x, clientY: y, pointerType: 'mouse', bubbles: true };
+    svg.dispatchEvent(new PointerEvent('pointermove', at));
+    return [name, plot.querySelector('.tip')?.textContent, plot.querySelector('.hover')?.getAttribute('d')];
+  }));
+}); }"""
+"""The first mark of each series, with what the pointer shows there."""
+
+
+@pytest.mark.parametrize("size", [DESKTOP, PHONE])
+def test_choices_show_the_median_of_their_row_in_either_form(show, out, size):  # noqa: F811
+    words = {"base": "base", "one": "one", "long": "a choice that takes several lines of words " * 3}
+    conditions = [
+        describe(name, **({} if name == "base" else {"baseline": "base"}), change=words[name])
+        for name in words
+    ]
+    folder = write_results(out, conditions, {name: random_runs(6, seed=k) for k, name in enumerate(words)})
+    write_report(folder, out / "page.html")
+    found = show(size=size, file=out / "page.html").evaluate(EVERY, size == PHONE)
+    medians = {each.change: each.median for (group,) in [compare_choices(folder)] for each in group}
+    shown = {name: text for name, text, _ in found if name in medians and text and ": median " in text}
+    assert set(shown) == set(medians)
+    for name, text in shown.items():
+        assert text.startswith(f"{name}: median {medians[name]:.3f} [")
+
+
+def test_each_series_of_closing_the_gap_has_values_in_either_form(show, tmp_path):  # noqa: F811
+    summary = Path(__file__).parents[2] / "docs" / "data" / "closing-thymio" / "summary.json"
+    page = write_closing_page(json.loads(summary.read_text("utf-8")), tmp_path / "page.html")
+    for size in (DESKTOP, PHONE):
+        found = show(size=size, file=page).evaluate(EVERY, size == PHONE)
+        assert len(found) > 30
+        assert all(text and path for _, text, path in found)

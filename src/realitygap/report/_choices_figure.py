@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -21,6 +21,7 @@ from realitygap.report._drawing import (
     wrap,
     write,
 )
+from realitygap.report._marks import Panel, Series
 from realitygap.report._tally import Results, Tally, label_of, read_tally, settings_of
 
 if TYPE_CHECKING:
@@ -125,7 +126,9 @@ def draw_choices(folder: Results) -> Drawing:
     if not groups:
         raise ValueError("No condition of this study names a baseline, so there are no choices to compare.")
     caption, alt = _caption(tally, groups), _alt(groups)
-    return draw_wide(lambda width: _draw(groups, width), "choices", caption, alt)
+    return draw_wide(
+        lambda width: _draw(groups, width), "choices", caption, alt, marks=lambda width: _marks(groups, width)
+    )
 
 
 # drawing
@@ -156,21 +159,53 @@ class _Layout:
     def row_height(self, n_lines: int) -> float:
         return 0.1 + 0.145 * n_lines + (0.0 if self.is_wide else 0.19)
 
+    def texts(self, group: list[Choice]) -> list[str]:
+        return [wrap(choice.change, self.letters, 2 if self.is_wide else 3) for choice in group]
+
+    def heights(self, texts: list[str]) -> list[float]:
+        return [self.row_height(text.count("\n") + 1) for text in texts]
+
+    def y_of_marks(self, start: float, end: float) -> float:
+        return (start + end) / 2 if self.is_wide else end - 0.14
+
+
+def _marks(groups: list[list[Choice]], width: float) -> tuple[Panel, ...]:
+    """Return the values of each row, whose place depends on the lines of its words."""
+    layout = _Layout(width)
+    return tuple(
+        Panel(f"choices-{k}", tuple(_marks_of_group(group, layout)), (3, 3)) for k, group in enumerate(groups)
+    )
+
+
+def _marks_of_group(group: list[Choice], layout: _Layout) -> Iterator[Series]:
+    ends = np.concatenate([[0.0], np.cumsum(layout.heights(layout.texts(group)))])
+    for choice, start, end in zip(group, ends[:-1], ends[1:], strict=True):
+        if math.isnan(choice.median):
+            continue
+        y = layout.y_of_marks(start, end)
+        interval = choice.interval
+        within = "" if interval is None else f" [{interval.low:.3f}, {interval.high:.3f}]"
+        effect = "" if choice is group[0] else f", {choice.effect:+.3f} to the baseline".replace("-", "−")
+        shown = [(choice.median, f"median {choice.median:.3f}{within}{effect}, n = {choice.n:,}")]
+        if choice.other_median is not None:
+            shown.append((choice.other_median, f"median as its selection counts {choice.other_median:.3f}"))
+        shown += [(value, f"a run of the paper {value:.3f}") for value in choice.published]
+        points = np.array([(value, y) for value, _ in shown])
+        yield Series("{name}: {label}", points, choice.change, tuple(label for _, label in shown))
+
 
 def _draw(groups: list[list[Choice]], width: float) -> Figure:
     layout = _Layout(width)
-    texts = [
-        [wrap(choice.change, layout.letters, 2 if layout.is_wide else 3) for choice in group]
-        for group in groups
-    ]
-    heights = [[layout.row_height(text.count("\n") + 1) for text in group] for group in texts]
+    texts = [layout.texts(group) for group in groups]
+    heights = [layout.heights(words) for words in texts]
     head, foot, legend = 0.42, 0.5, 0.3 if layout.is_wide else 0.52
     total = sum(head + sum(rows) + foot for rows in heights) + legend
     figure = new_figure(width, total)
     low, high = _range_of(groups)
     top = head
-    for group, words, rows in zip(groups, texts, heights, strict=True):
+    for k, (group, words, rows) in enumerate(zip(groups, texts, heights, strict=True)):
         axes = place_axes(figure, layout.plot_left, top, layout.plot_right - layout.plot_left, sum(rows))
+        axes.set_gid(f"choices-{k}")
         axes.set_xlim(low, high)
         _draw_group(axes, group, words, rows, layout)
         top += sum(rows) + foot + head
@@ -207,7 +242,7 @@ def _draw_group(
     _head(axes, group, x_words, layout)
     for index, (choice, text) in enumerate(zip(group, words, strict=True)):
         start, end = below[index], below[index + 1]
-        y = (start + end) / 2 if layout.is_wide else end - 0.14
+        y = layout.y_of_marks(start, end)
         _draw_reference(
             axes, reference, start if layout.is_wide else end - 0.23, end - (0.0 if layout.is_wide else 0.04)
         )

@@ -9,7 +9,7 @@ from typing import Any
 from realitygap._version import __version__
 from realitygap.records import write_whole
 from realitygap.report._closing_figures import draw_closing, words_of
-from realitygap.report._drawing import NARROW, WIDE, inline
+from realitygap.report._placed import FigureOnPage, hover_content, number_figures
 from realitygap.report._template import render_page
 
 GOAL_HEAD = ("goal", "wanted", "figure", "95 % interval", "twins", "verdict")
@@ -41,7 +41,8 @@ def write_closing_page(summary: Mapping[str, Any], out: str | Path) -> Path:
     Raises:
         RecordError: It cannot be written.
     """
-    wide, narrow = draw_closing(summary, width=WIDE), draw_closing(summary, width=NARROW, name="narrow")
+    figures = [FigureOnPage(f"figure-{name}", drawing) for name, drawing in draw_closing(summary).items()]
+    number_figures(figures)
     content = {
         "version": __version__,
         "n_done": summary["n_done"],
@@ -57,17 +58,9 @@ def write_closing_page(summary: Mapping[str, Any], out: str | Path) -> Path:
         "why": why_table(summary),
         "family_head": FAMILY_HEAD,
         "families": family_table(summary),
-        "figures": [
-            {
-                "anchor": key,
-                "wide": inline(drawing.svg),
-                "narrow": inline(narrow[key].svg),
-                "caption": drawing.caption,
-            }
-            for key, drawing in wide.items()
-        ],
+        "figures": figures,
     }
-    page = render_page("closing.html.jinja", content)
+    page = render_page("closing.html.jinja", content | hover_content(content))
     path = Path(out)
     write_whole(path, page.encode())
     return path

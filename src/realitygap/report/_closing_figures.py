@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from realitygap.drawing import Ink
 from realitygap.report._drawing import (
     NARROW,
-    WIDE,
     Drawing,
     draw_line,
-    house_style,
+    draw_wide,
     new_figure,
     place_axes,
-    to_svg,
 )
+from realitygap.report._marks import MOST_MARKS, Panel, Series
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -62,13 +62,11 @@ def words_of(summary: Summary) -> Words:
     )
 
 
-def draw_closing(summary: Summary, *, width: float = WIDE, name: str = "closing") -> dict[str, Drawing]:
+def draw_closing(summary: Summary) -> dict[str, Drawing]:
     """All figures that the summary of `closing-the-gap` has enough for, by name.
 
     Args:
         summary: As `summarize_closing` gives it.
-        width: Of each [in].
-        name: What ids in them begin with.
     """
     drawers = {
         "budget": draw_budget,
@@ -78,19 +76,22 @@ def draw_closing(summary: Summary, *, width: float = WIDE, name: str = "closing"
     }
     found = {}
     for key, draw in drawers.items():
-        drawing = draw(summary, width=width, name=f"{name}-{key}")
+        drawing = draw(summary)
         if drawing is not None:
             found[key] = drawing
     return found
 
 
-def draw_budget(summary: Summary, *, width: float = WIDE, name: str = "budget") -> Drawing | None:
+def draw_budget(summary: Summary) -> Drawing | None:
     """RMS gap against budget, a panel a family: each twin thin, medians thick."""
     words = words_of(summary)
     families = [family for family in summary["plan"]["families"] if _of(summary, family)]
     if not families:
         return None
-    top = 1.08 * max(twin["rms"]["estimate"] or 0 for twin in summary["twins"]) or 1.0
+    gaps = [
+        each["rms"]["estimate"] or 0.0 for twin in summary["twins"] for each in (twin, *twin["calibrated"])
+    ]
+    top = 1.08 * max(gaps) or 1.0
     budgets = sorted(summary["plan"]["budgets"])
     caption = (
         "Root mean square over the held-out controllers of the difference between mean coverage on the "
@@ -99,7 +100,8 @@ def draw_budget(summary: Summary, *, width: float = WIDE, name: str = "budget") 
     )
     alt = "RMS gap against budget of trials, a panel for each family."
 
-    def draw(axes: Axes, family: str) -> None:
+    def draw_family(axes: Axes, family: str) -> None:
+        axes.set_gid(f"budget-{family}")
         axes.set_xlim(-0.04 * budgets[-1], 1.04 * budgets[-1] or 1)
         axes.set_ylim(0, top)
         axes.set_xticks(budgets)
@@ -108,17 +110,33 @@ def draw_budget(summary: Summary, *, width: float = WIDE, name: str = "budget") 
         axes.set_xlabel("trials for calibrating", labelpad=2)
         _title(axes, family, words.number(len(_of(summary, family))))
 
-    with house_style():
+    def draw(width: float) -> Figure:
         figure, panels = _panels(width, len(families), 1.9)
         for axes, family in zip(panels, families, strict=True):
-            draw(axes, family)
+            draw_family(axes, family)
         panels[0].set_ylabel(f"RMS gap, {words.label} less SIM", labelpad=3)
         _key(figure, [(observe, observe) for observe in summary["plan"]["observations"]])
-        return Drawing(to_svg(figure, name, alt), caption, alt, figure)
+        return figure
+
+    marks = tuple(
+        Panel(f"budget-{family}", tuple(_marks_of_budgets(summary, family)), (0, 3)) for family in families
+    )
+    return draw_wide(draw, "closing-budget", caption, alt, marks=marks)
 
 
-def _budget_lines(axes: Axes, summary: Summary, family: str, observe: str) -> None:
-    color = COLORS.get(observe, Ink.PEN3)
+def _marks_of_budgets(summary: Summary, family: str) -> Iterator[Series]:
+    for observe in summary["plan"]["observations"]:
+        for name, points in (
+            ("median", _budget_medians(summary, family, observe)),
+            *_budgets_of_twins(summary, family, observe).items(),
+        ):
+            if points:
+                yield Series(f"{{name}}, {observe}, {{x}} trials: RMS gap {{y}}", np.array(points), name)
+
+
+def _budgets_of_twins(summary: Summary, family: str, observe: str) -> dict[str, list[tuple[int, float]]]:
+    """Return budget and RMS gap of each twin of a family, in order."""
+    found = {}
     for twin in _of(summary, family):
         points = [(0, twin["rms"]["estimate"])]
         points += [
@@ -126,23 +144,32 @@ def _budget_lines(axes: Axes, summary: Summary, family: str, observe: str) -> No
             for each in twin["calibrated"]
             if each["observe"] == observe
         ]
-        points = sorted((x, y) for x, y in points if y is not None)
-        if points:
-            draw_line(axes, *zip(*points, strict=True), color=color, linewidth=0.6, alpha=0.45)
-    rows = [
-        row
+        found[str(twin["twin"])] = sorted((x, y) for x, y in points if y is not None)
+    return found
+
+
+def _budget_medians(summary: Summary, family: str, observe: str) -> list[tuple[int, float]]:
+    return sorted(
+        (row["budget"], row["rms"]["estimate"])
         for row in summary["families"]
         if row["family"] == family
         and row["observe"] in ("none", observe)
         and row["rms"]["estimate"] is not None
-    ]
-    points = sorted((row["budget"], row["rms"]["estimate"]) for row in rows)
+    )
+
+
+def _budget_lines(axes: Axes, summary: Summary, family: str, observe: str) -> None:
+    color = COLORS.get(observe, Ink.PEN3)
+    for points in _budgets_of_twins(summary, family, observe).values():
+        if points:
+            draw_line(axes, *zip(*points, strict=True), color=color, linewidth=0.6, alpha=0.45)
+    points = _budget_medians(summary, family, observe)
     if points:
         marker = MARKERS.get(observe, "o")
         draw_line(axes, *zip(*points, strict=True), color=color, linewidth=2.0, marker=marker, markersize=4.5)
 
 
-def draw_scatter(summary: Summary, *, width: float = WIDE, name: str = "scatter") -> Drawing | None:
+def draw_scatter(summary: Summary) -> Drawing | None:
     """Each held-out controller: mean coverage in simulation against that on the twin, before and after."""
     budget = summary["budget"]
     kinds = [
@@ -158,14 +185,18 @@ def draw_scatter(summary: Summary, *, width: float = WIDE, name: str = "scatter"
         "On the diagonal the simulation is right."
     )
     alt = f"Coverage in simulation against that on the {words.robot}, before and after calibrating."
-    with house_style():
+    by_kind = {
+        kind: {str(twin["twin"]): twin["means"] for twin in summary["twins"]}
+        if kind == "none"
+        else {str(twin["twin"]): each["means"] for twin, each in _after(summary, kind, budget)}
+        for kind in kinds
+    }
+
+    def draw(width: float) -> Figure:
         figure, panels = _panels(width, len(kinds), 2.2)
         for axes, kind in zip(panels, kinds, strict=True):
-            means = (
-                [twin["means"] for twin in summary["twins"]]
-                if kind == "none"
-                else [each["means"] for _, each in _after(summary, kind, budget)]
-            )
+            axes.set_gid(f"scatter-{kind}")
+            means = list(by_kind[kind].values())
             xs = np.concatenate([each["source"] for each in means])
             ys = np.concatenate([each["target"] for each in means])
             axes.set_xlim(0, 1)
@@ -179,23 +210,50 @@ def draw_scatter(summary: Summary, *, width: float = WIDE, name: str = "scatter"
             title = "as it is" if kind == "none" else f"calibrated, {kind}"
             _title(axes, title, f"{len(xs)} points, {words.number(len(means))}")
         panels[0].set_ylabel(f"coverage, {words.label}", labelpad=3)
-        return Drawing(to_svg(figure, name, alt), caption, alt, figure)
+        return figure
+
+    text = f"{{name}}, controller {{label}}: {{x}} in simulation, {{y}} on the {words.robot}"
+    marks = tuple(
+        Panel(
+            f"scatter-{kind}",
+            tuple(
+                Series(
+                    text, np.column_stack([each["source"], each["target"]]), name, _numbered(each["source"])
+                )
+                for name, each in list(by_kind[kind].items())[: _most_series(by_kind, len(kinds))]
+            ),
+            (3, 3),
+        )
+        for kind in kinds
+    )
+    return draw_wide(draw, "closing-scatter", caption, alt, marks=marks)
 
 
-def draw_strategies(summary: Summary, *, width: float = WIDE, name: str = "strategies") -> Drawing | None:
+def _numbered(values: Sequence[float]) -> tuple[str, ...]:
+    return tuple(str(k + 1) for k in range(len(values)))
+
+
+def _most_series(by_kind: Mapping[str, Mapping[str, Any]], n_kinds: int) -> int:
+    """Return the number of twins, from the first, whose controllers have marks."""
+    longest = max(len(each["source"]) for twins in by_kind.values() for each in twins.values())
+    return max(1, MOST_MARKS // (longest * n_kinds))
+
+
+def draw_strategies(summary: Summary) -> Drawing | None:
     """Quality on the twins by strategy: each twin, and the mean with its interval."""
     rows = summary["strategies"]
     if not rows:
         return None
-    values = {
+    by_twin = {
         row["strategy"]: [
-            each["quality"]["estimate"]
+            (str(twin["twin"]), each["quality"]["estimate"])
             for twin in summary["twins"]
             for each in twin.get("transfer", [])
             if each["strategy"] == row["strategy"]
         ]
         for row in rows
     }
+    values = {strategy: [value for _, value in found] for strategy, found in by_twin.items()}
     highest = 1.05 * max(max(each) for each in values.values())
     caption = (
         f"Mean coverage on the twin (TWIN) in fresh trials of what each strategy chose with "
@@ -203,20 +261,22 @@ def draw_strategies(summary: Summary, *, width: float = WIDE, name: str = "strat
         "twins and its 95 % interval."
     )
     alt = "Coverage on the twins by strategy of transfer."
-    with house_style():
+
+    def draw(width: float) -> Figure:
         left = 1.35
         height = 0.27 * len(rows)
         figure = new_figure(width, _HEAD + height + _FOOT)
         axes = place_axes(figure, left, _HEAD, width - left - _RIGHT, height)
+        axes.set_gid("strategies")
         axes.set_xlim(0, highest or 1)
         axes.set_ylim(len(rows) - 0.5, -0.5)
         axes.set_yticks(range(len(rows)), [row["strategy"] for row in rows])
         axes.tick_params(axis="y", length=0)
         for place, row in enumerate(rows):
             color = Ink.OURS if row["strategy"].startswith("posterior") else Ink.RUN
-            spread = np.random.default_rng(place).uniform(-0.28, 0.28, len(values[row["strategy"]]))
+            spread = _spread(place, len(values[row["strategy"]]))
             draw_line(
-                axes, values[row["strategy"]], place + spread, linestyle="none", marker="o", markersize=3.0,
+                axes, values[row["strategy"]], spread, linestyle="none", marker="o", markersize=3.0,
                 markeredgewidth=0, color=color, alpha=0.45,
             )  # fmt: skip
             if row["low"] is not None:
@@ -224,17 +284,34 @@ def draw_strategies(summary: Summary, *, width: float = WIDE, name: str = "strat
             draw_line(axes, [row["estimate"]], [place], color=color, marker="o", markersize=6)
         axes.set_xlabel("coverage on the twin, TWIN", labelpad=2)
         _title(axes, "Transfer by strategy", words_of(summary).number(max(row["n"] for row in rows)))
-        return Drawing(to_svg(figure, name, alt), caption, alt, figure)
+        return figure
+
+    series = []
+    for place, row in enumerate(rows):
+        within = "" if row["low"] is None else f" [{row['low']:.3f}, {row['high']:.3f}]"
+        mean = np.array([(row["estimate"], float(place))])
+        series.append(Series(f"{{name}}: mean coverage {{x}}{within}, n = {row['n']}", mean, row["strategy"]))
+        twins = by_twin[row["strategy"]]
+        points = np.column_stack([values[row["strategy"]], _spread(place, len(twins))])
+        labels = tuple(twin for twin, _ in twins)
+        series.append(Series("{name}, {label}: coverage {x}", points, row["strategy"], labels))
+    marks = (Panel("strategies", tuple(series), (3, 2)),)
+    return draw_wide(draw, "closing-strategies", caption, alt, marks=marks)
 
 
-def draw_order(summary: Summary, *, width: float = WIDE, name: str = "order") -> Drawing | None:
+def _spread(place: int, n: int) -> npt.NDArray[np.float64]:
+    """Return (n,) places around that of a row, so that equal values can be told apart."""
+    return place + np.random.default_rng(place).uniform(-0.28, 0.28, n)
+
+
+def draw_order(summary: Summary) -> Drawing | None:
     """SRCC and MMRV of each twin, before and after, beside their goals."""
     if not summary["twins"]:
         return None
     words, budget = words_of(summary), summary["budget"]
-    groups = {"as it is": ("none", [twin["gap"] for twin in summary["twins"]])}
+    groups = {"as it is": ("none", [(str(twin["twin"]), twin["gap"]) for twin in summary["twins"]])}
     for observe in summary["plan"]["observations"]:
-        found = [each["gap"] for _, each in _after(summary, observe, budget)]
+        found = [(str(twin["twin"]), each["gap"]) for twin, each in _after(summary, observe, budget)]
         if found:
             groups[f"calibrated, {observe}"] = (observe, found)
     caption = (
@@ -246,12 +323,21 @@ def draw_order(summary: Summary, *, width: float = WIDE, name: str = "order") ->
     alt = "Disattenuated SRCC, and MMRV over its floor, before and after calibrating."
     goals = {"srcc_disattenuated": 0.95, "mmrv_ratio": 2.0}
     titles = {"srcc_disattenuated": "Disattenuated SRCC", "mmrv_ratio": "MMRV over its floor"}
-    with house_style():
+    by_measure = {
+        measure: {
+            label: (kind, [(twin, each[measure]) for twin, each in found if each[measure] is not None])
+            for label, (kind, found) in groups.items()
+        }
+        for measure in goals
+    }
+
+    def draw(width: float) -> Figure:
         figure, panels = _panels(width, 2, 0.32 * len(groups), left=1.35)
         for axes, (measure, goal) in zip(panels, goals.items(), strict=True):
+            axes.set_gid(f"order-{measure}")
             known = {
-                label: (kind, [each[measure] for each in found if each[measure] is not None])
-                for label, (kind, found) in groups.items()
+                label: (kind, [value for _, value in found])
+                for label, (kind, found) in by_measure[measure].items()
             }
             largest = max((value for _, each in known.values() for value in each), default=goal)
             lowest = min((value for _, each in known.values() for value in each), default=0.0)
@@ -261,9 +347,8 @@ def draw_order(summary: Summary, *, width: float = WIDE, name: str = "order") ->
             for place, (kind, values) in enumerate(known.values()):
                 if values:
                     color = COLORS.get(kind, Ink.PEN3)
-                    spread = np.random.default_rng(place).uniform(-0.28, 0.28, len(values))
                     draw_line(
-                        axes, values, place + spread, linestyle="none", marker="o", markersize=3.0,
+                        axes, values, _spread(place, len(values)), linestyle="none", marker="o", markersize=3.0,
                         markeredgewidth=0, color=color, alpha=0.5,
                     )  # fmt: skip
                     middle = float(np.median(values))
@@ -272,7 +357,25 @@ def draw_order(summary: Summary, *, width: float = WIDE, name: str = "order") ->
             axes.tick_params(axis="y", length=0)
             at_least = "at least" if measure.startswith("srcc") else "at most"
             _title(axes, titles[measure], f"goal: {at_least} {goal:g}")
-        return Drawing(to_svg(figure, name, alt), caption, alt, figure)
+        return figure
+
+    marks = tuple(
+        Panel(f"order-{measure}", tuple(_marks_of_order(titles[measure], by_measure[measure])), (3, 2))
+        for measure in goals
+    )
+    return draw_wide(draw, "closing-order", caption, alt, marks=marks)
+
+
+def _marks_of_order(title: str, known: Mapping[str, tuple[str, list[tuple[str, float]]]]) -> Iterator[Series]:
+    for place, (label, (_, found)) in enumerate(known.items()):
+        if found:
+            values = [value for _, value in found]
+            middle = np.array([(float(np.median(values)), float(place))])
+            yield Series(f"{{name}}: median {title} {{x}}, n = {len(values)}", middle, label)
+            points = np.column_stack([values, _spread(place, len(values))])
+            yield Series(
+                f"{{name}}, {{label}}: {title} {{x}}", points, label, tuple(twin for twin, _ in found)
+            )
 
 
 # parts

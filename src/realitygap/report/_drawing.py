@@ -87,7 +87,8 @@ class Drawing:
         figure: what it was drawn as, for other formats.
         draw: what makes the figure of a width [in]; None if it has one width only.
         name: what the ids in `svg` begin with.
-        marks: values that a page shows on hover.
+        mark: what makes the values that a page shows on hover, of a width [in]; None if there are none.
+        marks: these values.
         frames: where these are in `svg`, one for each panel of `marks`.
     """
 
@@ -97,6 +98,7 @@ class Drawing:
     figure: Figure | None = field(default=None, repr=False, compare=False)
     draw: Callable[[float], Figure] | None = field(default=None, repr=False, compare=False)
     name: str = field(default="", repr=False, compare=False)
+    mark: Callable[[float], tuple[Panel, ...]] | None = field(default=None, repr=False, compare=False)
     marks: tuple[Panel, ...] = field(default=(), repr=False, compare=False)
     frames: tuple[tuple[float, ...], ...] = field(default=(), repr=False, compare=False)
 
@@ -120,7 +122,7 @@ def draw_wide(
     caption: str,
     alt: str,
     *,
-    marks: tuple[Panel, ...] = (),
+    marks: tuple[Panel, ...] | Callable[[float], tuple[Panel, ...]] = (),
     width: float = WIDE,
 ) -> Drawing:
     """A figure in the width of a desktop's page, which `Drawing.in_width` draws in another one.
@@ -128,17 +130,20 @@ def draw_wide(
     Args:
         draw: makes the figure of a width [in].
         name: what the ids in the drawing begin with.
-        caption, alt, marks: as in `Drawing`.
+        caption, alt: as in `Drawing`.
+        marks: values that a page shows on hover, or what makes them of a width [in] if places depend on it.
         width: on a desktop's page [in].
     """
-    return _drawn(Drawing("", caption, alt, draw=draw, name=name, marks=marks), draw, width, 0)
+    mark = marks if callable(marks) else lambda _: marks
+    return _drawn(Drawing("", caption, alt, draw=draw, name=name, mark=mark), draw, width, 0)
 
 
 def _drawn(drawing: Drawing, draw: Callable[[float], Figure], width: float, number: int) -> Drawing:
     with house_style():
         figure = draw(width)
         svg = to_svg(figure, f"{drawing.name}-{number}", drawing.alt)
-    return replace(drawing, svg=svg, figure=figure, frames=frames_of(figure, drawing.marks))
+    marks = () if drawing.mark is None else drawing.mark(width)
+    return replace(drawing, svg=svg, figure=figure, marks=marks, frames=frames_of(figure, marks))
 
 
 @contextmanager

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from realitygap.drawing import Ink
 from realitygap.report._drawing import Drawing, draw_wide, new_figure, place_axes, shorten
+from realitygap.report._marks import Panel, Series
 from realitygap.report._path_figure import arena_extent, draw_arena
 from realitygap.study import GapStudy
 
@@ -53,12 +56,28 @@ def draw_gap_maps(gap: GapStudy) -> Drawing | None:
         for k, (title, values, full) in enumerate(panels):
             row, column = divmod(k, columns)
             axes = place_axes(figure, 0.03 + column * (across + 0.25), 0.25 + row * (up + 0.3), across, up)
+            axes.set_gid(f"maps-{k}")
             draw_arena(axes, gap.arena, x_range, y_range)
             _draw_shares(axes, gap, values / full)
             axes.set_title(title, loc="left", fontsize=8.5, pad=3)
         return figure
 
-    return draw_wide(draw, "gap-maps", caption, alt)
+    marks = tuple(
+        Panel(f"maps-{k}", (_marks_of_cells(gap, title, values),), (3, 3))
+        for k, (title, values, _) in enumerate(panels)
+    )
+    return draw_wide(draw, "gap-maps", caption, alt, marks=marks)
+
+
+def _marks_of_cells(gap: GapStudy, title: str, values: Any) -> Series:
+    grid = gap.arena.grid
+    rows, columns = np.divmod(np.arange(len(values)), grid.columns)
+    points = np.column_stack([grid.x + (columns + 0.5) * grid.cell, grid.y + (rows + 0.5) * grid.cell])
+    labels = tuple(
+        f"column {column + 1}, row {row + 1}: {value:.3f}"
+        for row, column, value in zip(rows, columns, values, strict=True)
+    )
+    return Series("{name}, {label}", points, title, labels)
 
 
 def _draw_shares(axes: Axes, gap: GapStudy, shares: Any) -> None:

@@ -20,6 +20,7 @@ from realitygap.report._drawing import (
     place_axes,
     shorten,
 )
+from realitygap.report._marks import Panel, Series, decimals_for
 from realitygap.study import GapStudy
 
 if TYPE_CHECKING:
@@ -45,6 +46,7 @@ def draw_gap_pairs(gap: GapStudy) -> Drawing:
         size = min(width - 0.75, _MOST_ACROSS)
         figure = new_figure(width, size + 0.6)
         axes = place_axes(figure, 0.55, 0.1, size, size)
+        axes.set_gid("pairs")
         ends = _ends(source, target, *gap.task.score_range)
         axes.set_xlim(*ends)
         axes.set_ylim(*ends)
@@ -62,7 +64,19 @@ def draw_gap_pairs(gap: GapStudy) -> Drawing:
         _legend(axes, kinds)
         return figure
 
-    return draw_wide(draw, "gap-pairs", caption, alt)
+    return draw_wide(draw, "gap-pairs", caption, alt, marks=_marks_of_pairs(gap))
+
+
+def _marks_of_pairs(gap: GapStudy) -> tuple[Panel, ...]:
+    points = np.column_stack([gap.source.means, gap.target.means])
+    decimals = decimals_for(points)
+    series = []
+    for kind in ("random", "champion"):
+        rows = [k for k, each in enumerate(gap.controllers) if each.kind == kind]
+        if rows:
+            text = f"{{label}}: {{x}} on {gap.source.name}, {{y}} on {gap.target.name}"
+            series.append(Series(text, points[rows], labels=tuple(gap.controllers[k].name for k in rows)))
+    return (Panel("pairs", tuple(series), (decimals, decimals)),)
 
 
 def _draw_pairs(axes: Axes, x: Any, y: Any, across: Any, up: Any, color: str, marker: str) -> None:
@@ -119,6 +133,7 @@ def draw_gap_differences(gap: GapStudy) -> Drawing:
     def draw(width: float) -> Figure:
         figure = new_figure(width, 2.6)
         axes = place_axes(figure, 0.6, 0.12, width - 0.68, 2.1)
+        axes.set_gid("differences")
         n = source.n
         most = 1.08 * float(np.abs(differences).max() + reach.max())
         axes.set_xlim(-0.7, n - 0.3)
@@ -138,7 +153,16 @@ def draw_gap_differences(gap: GapStudy) -> Drawing:
         axes.set_ylabel(f"difference in {score}", labelpad=3)
         return figure
 
-    return draw_wide(draw, "gap-differences", caption, alt)
+    ordered = differences[order]
+    decimals = decimals_for(differences)
+    labels = tuple(
+        f"{gap.controllers[k].name}: {differences[k]:.{decimals}f} [{differences[k] - reach[k]:.{decimals}f}, "
+        f"{differences[k] + reach[k]:.{decimals}f}]"
+        for k in order
+    )
+    series = Series("{label}", np.column_stack([np.arange(source.n), ordered]), labels=labels)
+    panel = Panel("differences", (series,), (0, decimals))
+    return draw_wide(draw, "gap-differences", caption, alt, marks=(panel,))
 
 
 def _reaches(side: GapSide) -> Any:

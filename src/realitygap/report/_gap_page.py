@@ -14,7 +14,7 @@ from realitygap.report._gap_order_figure import draw_gap_differences, draw_gap_p
 from realitygap.report._gap_replay_figure import draw_gap_replay
 from realitygap.report._gap_why_figure import draw_gap_why
 from realitygap.report._page import LABELS
-from realitygap.report._placed import FigureOnPage, number_figures
+from realitygap.report._placed import FigureOnPage, hover_content, number_figures
 from realitygap.report._template import render_page
 from realitygap.study import GapBetween
 
@@ -85,7 +85,7 @@ def _content(gap: GapBetween) -> dict[str, Any]:
     ]
     figure_of_why = None if why is None else FigureOnPage("why", draw_gap_why(why, study))
     number_figures([*figures, figure_of_why])
-    return {
+    content = {
         "version": __version__,
         "title": f"The gap from {result.source} to {result.target}",
         "labels": [(label, LABELS[label]) for label in labels],
@@ -103,6 +103,7 @@ def _content(gap: GapBetween) -> dict[str, Any]:
         ],
         "names": [f"{side.label} {side.name}" for side in (study.source, study.target)],
     }
+    return content | hover_content(content)
 
 
 def _facts(gap: GapBetween) -> list[tuple[str, str]]:

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import numpy.typing as npt
 
 from realitygap.drawing import Ink
 from realitygap.report._drawing import Drawing, draw_wide, new_figure, place_axes
+from realitygap.report._marks import Panel, Series
 from realitygap.study import GapStudy
 
 if TYPE_CHECKING:
@@ -57,6 +60,7 @@ def draw_gap_replay(gap: GapStudy) -> Drawing | None:
                 linestyle=(0, (5, 1.5)),
                 label="noise alone",
             )
+            axes.set_gid(f"replay-{k}")
             axes.set_xlim(0, steps[-1])
             axes.set_ylim(0, most or max(1.08 * float(top.max()), 0.02))
             axes.set_xlabel("step", labelpad=2)
@@ -65,4 +69,16 @@ def draw_gap_replay(gap: GapStudy) -> Drawing | None:
                 axes.legend(loc="upper left", frameon=False, fontsize=7.5)
         return figure
 
-    return draw_wide(draw, "gap-replay", caption, alt)
+    marks = tuple(
+        Panel(f"replay-{k}", tuple(_marks_of_curves(title, between, noise)), (0, 4))
+        for k, (title, between, noise, _) in enumerate(panels)
+    )
+    return draw_wide(draw, "gap-replay", caption, alt, marks=marks)
+
+
+def _marks_of_curves(title: str, between: npt.NDArray[Any], noise: npt.NDArray[Any]) -> Iterator[Series]:
+    name, _, unit = title.partition(" [")
+    steps = np.unique(np.linspace(0, between.shape[1] - 1, 200).astype(int))
+    for which, values in (("target and replay", between), ("noise alone", noise)):
+        points = np.column_stack([steps, values.mean(axis=0)[steps]])
+        yield Series(f"{{name}}, step {{x}}: {name} {{y}} {unit.rstrip(']')}", points, which)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from realitygap.drawing import Ink
 from realitygap.gap import Why
 from realitygap.report._drawing import (
@@ -13,6 +15,7 @@ from realitygap.report._drawing import (
     new_figure,
     place_axes,
 )
+from realitygap.report._marks import Panel, Series
 from realitygap.study import GapStudy
 
 if TYPE_CHECKING:
@@ -35,6 +38,7 @@ def draw_gap_why(why: Why, gap: GapStudy) -> Drawing:
         high = 0.3 * len(order)
         figure = new_figure(width, high + 0.5)
         axes = place_axes(figure, 1.05, 0.08, width - 1.2, high)
+        axes.set_gid("why")
         ends = [end for each in why.falls for end in (each.low, each.high, each.estimate) if end is not None]
         low, top = min(0.0, *ends), max(0.005, *ends)
         axes.set_xlim(low - 0.04 * (top - low), top + 0.04 * (top - low))
@@ -51,4 +55,6 @@ def draw_gap_why(why: Why, gap: GapStudy) -> Drawing:
         axes.set_xlabel("fall of the RMS gap", labelpad=3)
         return figure
 
-    return draw_wide(draw, "gap-why", caption, alt)
+    labels = tuple(f"{why.parts[k]}: {why.falls[k]}" for k in order)
+    series = Series("{label}", np.column_stack([values, np.arange(len(order))]), labels=labels)
+    return draw_wide(draw, "gap-why", caption, alt, marks=(Panel("why", (series,), (4, 0)),))

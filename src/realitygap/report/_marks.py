@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -53,6 +53,16 @@ class Panel:
     decimals: tuple[int, int]
 
 
+class Marked(Protocol):
+    """A drawing with its marks, and the frames of their panels."""
+
+    @property
+    def marks(self) -> tuple[Panel, ...]: ...
+
+    @property
+    def frames(self) -> tuple[tuple[float, ...], ...]: ...
+
+
 def frames_of(figure: Figure, panels: Sequence[Panel]) -> tuple[tuple[float, ...], ...]:
     """Return where the panels are in a figure that was drawn with linear axes.
 
@@ -72,14 +82,19 @@ def frames_of(figure: Figure, panels: Sequence[Panel]) -> tuple[tuple[float, ...
     return tuple(tuple(_short(value) for value in frame) for frame in frames)
 
 
-def marks_content(panels: Sequence[Panel], frames: Sequence[Sequence[Sequence[float]]]) -> dict[str, Any]:
+def marks_content(wide: Marked, narrow: Marked) -> dict[str, Any]:
     """Return what the page's script reads: frames in each width, and panels with values as whole numbers.
 
     Args:
-        panels: The marks.
-        frames: Those of `frames_of`, of each form of the figure.
+        wide, narrow: The forms of the figure. The panels of the narrow one are left out if they are the same objects.
     """
-    return {"frames": frames, "panels": [_panel_content(panel) for panel in panels]}
+    content: dict[str, Any] = {
+        "frames": [wide.frames, narrow.frames],
+        "panels": [_panel_content(panel) for panel in wide.marks],
+    }
+    if narrow.marks is not wide.marks:
+        content["narrow"] = [_panel_content(panel) for panel in narrow.marks]
+    return content
 
 
 def _panel_content(panel: Panel) -> dict[str, Any]:

@@ -40,8 +40,7 @@ from realitygap.report._findings import find, leading_conditions
 from realitygap.report._paper_audit import paper_audit_content
 from realitygap.report._parameters import neat_parameters, settings_tables
 from realitygap.report._path_figure import draw_paths
-from realitygap.report._placed import FigureOnPage, figures_in, number_figures
-from realitygap.report._replay import as_json, hash_of
+from realitygap.report._placed import FigureOnPage, hover_content, number_figures
 from realitygap.report._replay import content as replay_content
 from realitygap.report._score_figure import draw_scores
 from realitygap.report._statistics_section import statistics_content
@@ -49,7 +48,7 @@ from realitygap.report._structures import selection_of
 from realitygap.report._summary import summarize
 from realitygap.report._tally import Tally, label_of, read_tally, settings_of
 from realitygap.report._task_summary import summarize_tasks
-from realitygap.report._template import render_page, template_text
+from realitygap.report._template import render_page
 from realitygap.study import load_study, named_studies
 
 REPORT_NAME = "report.html"
@@ -148,7 +147,7 @@ def _content(tally: Tally) -> dict[str, Any]:
     sections = _sections(content)
     number_figures(figure for _, _, figures in sections for figure in figures)
     content["sections"] = [(anchor, title) for anchor, title, _ in sections if title]
-    content["marks"] = as_json({each.anchor: each.marks for each in figures_in(content) if each.marks})
+    content |= hover_content(content)
     content["tables"] = {name: number for number, name in enumerate(_tables(content), 1)}
     return content
 
@@ -195,12 +194,9 @@ def _tables(content: Mapping[str, Any]) -> list[str]:
 
 
 def _words_and_figures(tally: Tally) -> dict[str, Any]:
-    from markupsafe import Markup
-
     summary = summarize(tally)
     description = tally.description
     gallery = _gallery.content(tally)
-    hover = template_text("hover.js")
     replay = replay_content(tally, leading_conditions(tally)[0])
     return {
         "counts": _counts(tally),
@@ -232,8 +228,6 @@ def _words_and_figures(tally: Tally) -> dict[str, Any]:
         "replay": replay,
         "command": _command(tally),
         "has_novelty": any(selection_of(each) == "novelty" for each in tally.conditions),
-        "hover": Markup(hover),
-        "script_hashes": [*([replay["script_hash"]] if replay["there"] else []), hash_of(hover)],
         "columns": column_table(),
         "exported": None,
     }

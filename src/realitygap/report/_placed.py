@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import base64
+import hashlib
+import json
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from realitygap.report._drawing import NARROW, Drawing, inline
 from realitygap.report._marks import marks_content
+from realitygap.report._template import template_text
 
 if TYPE_CHECKING:
     from markupsafe import Markup
@@ -37,8 +41,7 @@ class FigureOnPage:
 
         narrow = self.drawing.in_width(NARROW)
         self.wide, self.narrow = Markup(inline(self.drawing.svg)), Markup(inline(narrow.svg))
-        frames = (self.drawing.frames, narrow.frames)
-        self.marks = marks_content(self.drawing.marks, frames) if self.drawing.marks else None
+        self.marks = marks_content(self.drawing, narrow) if self.drawing.marks else None
 
     @property
     def title(self) -> str:
@@ -50,6 +53,30 @@ class FigureOnPage:
         """The caption of the drawing, and the paper's figure that shows the same."""
         more = f" Counterpart of the paper’s {self.counterpart}." if self.counterpart else ""
         return self.drawing.caption + more
+
+
+def hover_content(content: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what a page needs to show the values of its figures: `marks`, `hover`, and `hover_hash`."""
+    from markupsafe import Markup
+
+    script = template_text("hover.js") + template_text("tables.js")
+    marks = {each.anchor: each.marks for each in figures_in(content) if each.marks}
+    return {"marks": as_json(marks), "hover": Markup(script), "hover_hash": hash_of(script)}
+
+
+def hash_of(script: str) -> str:
+    """The hash of a script, as a page's policy names it."""
+    return base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+
+
+def as_json(values: Mapping[str, Any]) -> Markup:
+    """JSON for a script element: nothing in it ends the element, whatever the names are."""
+    from markupsafe import Markup
+
+    text = json.dumps(values, separators=(",", ":"), allow_nan=False)
+    for letter in "<>&":
+        text = text.replace(letter, f"\\u{ord(letter):04x}")
+    return Markup(text)
 
 
 def number_figures(figures: Iterable[Any]) -> None:

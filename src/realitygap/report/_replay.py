@@ -8,8 +8,6 @@ difference as a zigzag number of 7 bits a byte, so that a column that stands sti
 from __future__ import annotations
 
 import base64
-import hashlib
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -22,6 +20,7 @@ import polars as pl
 from realitygap.errors import RealityGapError
 from realitygap.playback import first_visits
 from realitygap.report._path_figure import arena_extent, typical_replicate
+from realitygap.report._placed import as_json, hash_of
 from realitygap.report._tally import Tally, label_of, settings_of, task_of
 from realitygap.report._template import template_text
 from realitygap.runs import Condition, replay
@@ -122,21 +121,6 @@ def _notes(runs: Sequence[_Run]) -> list[str]:
     """What is missing, each with the names of the conditions of which it is true."""
     notes = dict.fromkeys(run.note for run in runs if run.note)
     return [f"{', '.join(run.name for run in runs if run.note == note)}: {note}" for note in notes]
-
-
-def hash_of(script: str) -> str:
-    """The hash of a script, as a page's policy names it."""
-    return base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
-
-
-def as_json(values: Mapping[str, Any]) -> Markup:
-    """JSON that can stand in a script element: nothing in it ends the element, whatever the names are."""
-    from markupsafe import Markup
-
-    text = json.dumps(values, separators=(",", ":"), allow_nan=False)
-    for letter in "<>&":
-        text = text.replace(letter, f"\\u{ord(letter):04x}")
-    return Markup(text)
 
 
 # the first screen

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -20,6 +20,7 @@ from realitygap.report._drawing import (
     place_axes,
     shorten,
 )
+from realitygap.report._marks import MOST_MARKS, Panel, Series
 from realitygap.report._structures import selection_of
 from realitygap.report._tally import Results, Tally, label_of, read_tally
 
@@ -144,12 +145,18 @@ def draw_species(
         "generation: " + ", ".join(f"{each} {values[-1]:.2f}" for each, values in means.items()) + "."
     )
 
+    marks = (
+        Panel("shares", _marks_of_shares(shares), (0, 3)),
+        Panel("means", tuple(_marks_of_means(means)), (0, 2)),
+    )
+
     def draw(width: float) -> Figure:
         is_wide = width >= 6
         height = 2.25
         figure = new_figure(width, height + 0.75 if is_wide else 2 * (height + 0.75) + 0.1)
         across = 0.42 * width if is_wide else width - 0.55
         left = place_axes(figure, 0.5, 0.3, across, height)
+        left.set_gid("shares")
         _draw_shares(left, shares, f"{shorten(condition, 28)}, run {replicate}", label_of(described))
         right = place_axes(
             figure,
@@ -158,10 +165,32 @@ def draw_species(
             (0.33 * width if is_wide else across - 0.75),
             height,
         )
+        right.set_gid("means")
         _draw_means(right, means, f"{labels}, n = {n_runs:,} runs")
         return figure
 
-    return draw_wide(draw, name, caption, alt)
+    return draw_wide(draw, name, caption, alt, marks=marks)
+
+
+def _marks_of_shares(shares: Mapping[int, npt.NDArray[np.float64]]) -> tuple[Series, ...]:
+    """Return a mark in the middle of each share; of very many, those of the largest species."""
+    floors = np.cumsum([np.zeros(len(next(iter(shares.values())))), *shares.values()], axis=0)[:-1]
+    series = []
+    for (number, share), floor in zip(shares.items(), floors, strict=True):
+        alive = np.flatnonzero(share)
+        points = np.column_stack([alive, floor[alive] + share[alive] / 2])
+        labels = tuple(f"{value:.3f}".rstrip("0").rstrip(".") for value in share[alive])
+        series.append(Series("species {name}, generation {x}: share {label}", points, str(number), labels))
+    sizes = [len(each.points) for each in sorted(series, key=lambda each: -len(each.points))]
+    n_kept = int(np.searchsorted(np.cumsum(sizes), MOST_MARKS, side="right"))
+    longest = sorted(range(len(series)), key=lambda k: -len(series[k].points))[: max(1, n_kept)]
+    return tuple(series[k] for k in sorted(longest))
+
+
+def _marks_of_means(means: Mapping[str, npt.NDArray[np.float64]]) -> Iterator[Series]:
+    for selection, values in means.items():
+        points = np.column_stack([np.arange(len(values)), values])
+        yield Series("{name}, generation {x}: {y} species on average", points, selection)
 
 
 def _shares(rows: pl.DataFrame) -> dict[int, npt.NDArray[np.float64]]:

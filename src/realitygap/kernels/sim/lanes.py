@@ -105,7 +105,8 @@ class Near(NamedTuple):
     effort: Rows  # (4,) asked for, as lengths: straight on and by turning; carried out: length and turn
     gaps: Rows  # (n_walls,) how far the body is from each wall [m]
     walls: Rows  # (8,) of the nearest two: normal x, y, offset and gap
-    seen: Rows  # (5 * most corners of an obstacle,) its corners and normals from the body
+    seen: Rows  # (5 * most corners of an obstacle + 1,) its corners and normals from the body, and its radius
+    met: Rows  # likewise, of the obstacle that each body is about to meet
 
 
 class SimTrace(NamedTuple):
@@ -165,7 +166,8 @@ def make_near(shape, dtype):
         effort=rows(4),
         gaps=rows(shape.n_walls),
         walls=rows(8),
-        seen=rows(5 * int(shape.shape_corners.max(initial=1))),
+        seen=rows(5 * int(shape.shape_corners.max(initial=1)) + 1),
+        met=rows(5 * int(shape.shape_corners.max(initial=1)) + 1),
     )
 
 

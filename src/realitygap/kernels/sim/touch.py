@@ -41,18 +41,19 @@ OVERHANG = 1e-3
 
 
 @inlined
-def _consider_face(before, face, q_x, q_y, overhang, outward):
-    """The better one of two faces: the one that has the other outline farther in front of it.
+def _see_face(face, q_x, q_y, overhang, outward):
+    """Measure how far in front of a face the other outline is.
 
     Args:
-        before: Of the one before: score, separation, how far the end is passed, normal towards the body, point on the
-            body, and the way to it from the end.
         face: x, y, normal and length.
         q_x, q_y: The other's corner that is lowest over it.
         overhang: `OVERHANG`.
         outward: Whether it is a face of the obstacle.
+
+    Returns:
+        Score, separation, how far the end is passed, normal towards the body, point on the body, and the way to it
+        from the end.
     """
-    score, apart, at_end, n_x, n_y, on_x, on_y, way_x, way_y = before
     from_x, from_y, a, b, size = face
     zero = size - size
     off_x, off_y = q_x - from_x, q_y - from_y
@@ -63,23 +64,30 @@ def _consider_face(before, face, q_x, q_y, overhang, outward):
     over = pick(over > zero, over, zero)
     beyond = past > zero
     v_x, v_y = pick(beyond, from_x - b * size, from_x), pick(beyond, from_y + a * size, from_y)
-    worth = gap - overhang * over
-    better = worth > score
     d_x, d_y = q_x - v_x, q_y - v_y
-    b_x, b_y = q_x, q_y
+    on_x, on_y = q_x, q_y
     if not outward:
         past_end = over > zero
-        b_x, b_y = pick(past_end, v_x, q_x - gap * a), pick(past_end, v_y, q_y - gap * b)
+        on_x, on_y = pick(past_end, v_x, q_x - gap * a), pick(past_end, v_y, q_y - gap * b)
         a, b, d_x, d_y = -a, -b, -d_x, -d_y
+    return gap - overhang * over, gap, over, a, b, on_x, on_y, d_x, d_y
+
+
+@inlined
+def _better_face(one, two):
+    """Pick the one of two results of `_see_face` with the higher score."""
+    score, apart, at_end, n_x, n_y, on_x, on_y, way_x, way_y = one
+    worth, gap, over, a, b, x, y, d_x, d_y = two
+    better = worth > score
     return (
         pick(better, worth, score), pick(better, gap, apart), pick(better, over, at_end),
-        pick(better, a, n_x), pick(better, b, n_y), pick(better, b_x, on_x), pick(better, b_y, on_y),
+        pick(better, a, n_x), pick(better, b, n_y), pick(better, x, on_x), pick(better, y, on_y),
         pick(better, d_x, way_x), pick(better, d_y, way_y),
     )  # fmt: skip
 
 
 @inlined
-def _deeper_in_shape(found, r, radius, within, first, second, lane):
+def _deeper_in_shape(found, r, radius, within, counts, first, second, lane):
     """Merge a contact that is not too far into the deepest two.
 
     Of two as deep, the one more to the left comes first, so that no order decides.
@@ -105,7 +113,7 @@ def _deeper_in_shape(found, r, radius, within, first, second, lane):
         load_row(second.corner_y, lane),
         load_row(second.radius, lane),
     )
-    counts = now <= within
+    counts = counts & (now <= within)
     deeper = counts & ((now < f) | ((now == f) & (left > f_y + (one - f_r) * f_b)))
     next_one = counts & ((now < s) | ((now == s) & (left > s_y + (one - s_r) * s_b)))
     store_row(pick(deeper, now, f), first.gap, lane)
@@ -124,7 +132,7 @@ def _deeper_in_shape(found, r, radius, within, first, second, lane):
 
 @inlined
 def _see_shape(shape, p, near, q, lane):
-    """Write the corners of an obstacle, as bodies see them, into `near.seen`; return whether any body may be near it.
+    """Write the corners of an obstacle, as bodies see them, into `near.seen`; return which bodies it may be near.
 
     That is where the boxes around both are not apart along the axes of the body or the normals of the obstacle.
     """
@@ -160,7 +168,8 @@ def _see_shape(shape, p, near, q, lane):
     for gap in (low_x - most_x, least_x - high_x, low_y - most_y, least_y - high_y):
         apart = pick(gap > apart, gap, apart)
     radius, within = load(p, first + PER_CORNER * m, lane), _within(shape, p, lane)
-    return any_of(apart - (radius + within + spread(real(SURELY))) <= zero)
+    store(radius, seen, PER_CORNER * m, lane)
+    return apart - (radius + within + spread(real(SURELY))) <= zero
 
 
 @inlined
@@ -189,30 +198,60 @@ def _farthest_face(p, corners, n, others, other, m, lane):
 
 
 @inlined
-def _touch_shape(shape, p, near, q, lane):
-    """Deepen the touch by one obstacle or open wall."""
-    if not _see_shape(shape, p, near, q, lane):
-        return
+def _touch_seen(shape, p, near, m, counts, lane):
+    """Deepen the touch in some lanes by the obstacle or open wall of m corners that `near.met` has for each."""
     real = p.dtype.type
-    seen, m, one, tilt = near.seen, shape.shape_corners[q], spread(real(1.0)), spread(real(TILT))
-    overhang = spread(real(OVERHANG))
-    radius, within = load(p, shape.row_shape[q] + PER_CORNER * m, lane), _within(shape, p, lane)
+    met, one, tilt, overhang = (
+        near.met,
+        spread(real(1.0)),
+        spread(real(TILT)),
+        spread(real(OVERHANG)),
+    )
+    radius, within = load(met, PER_CORNER * m, lane), _within(shape, p, lane)
     for part in range(shape.part_corners.size):
         n, outline = shape.part_corners[part], shape.row_outline[part]
         # Of two corners, which is all that two discs have.
         x, y = load(p, outline, lane), load(p, outline + 1, lane)
-        way_x, way_y = x - load(seen, 0, lane), y - load(seen, 1, lane)
+        way_x, way_y = x - load(met, 0, lane), y - load(met, 1, lane)
         found = (spread(-real(FAR)), one, one, one, one - one, x, y, way_x, way_y)
         if m > 1:
-            face = _farthest_face(seen, 0, m, p, outline, n, lane)
+            face = _farthest_face(met, 0, m, p, outline, n, lane)
             x, y = lowest(p, outline, n, face[2] - tilt * face[3], face[3] + tilt * face[2], lane)
-            found = _consider_face(found, face, x, y, overhang, True)
+            found = _see_face(face, x, y, overhang, True)
         if n > 1:
-            face = _farthest_face(p, outline, n, seen, 0, m, lane)
-            x, y = lowest(seen, 0, m, face[2] + tilt * face[3], face[3] - tilt * face[2], lane)
-            found = _consider_face(found, face, x, y, overhang, False)
+            face = _farthest_face(p, outline, n, met, 0, m, lane)
+            x, y = lowest(met, 0, m, face[2] + tilt * face[3], face[3] - tilt * face[2], lane)
+            found = _better_face(found, _see_face(face, x, y, overhang, False))
         r = load(p, shape.row_part[part] + 2 * n, lane)
-        _deeper_in_shape(found, r, radius, within, near.first, near.second, lane)
+        _deeper_in_shape(found, r, radius, within, counts, near.first, near.second, lane)
+
+
+@inlined
+def _touch_shapes(shape, p, near, first, stop, lane):
+    """Deepen the touch by obstacles or open walls `first` to `stop`, which have the same number of corners.
+
+    Most bodies are near at most one of them. So all lanes meet their first at the same time, then their second.
+    """
+    real = p.dtype.type
+    m, seen, met = shape.shape_corners[first], near.seen, near.met
+    before = spread(real(-1.0))
+    while True:
+        now, is_last = before, True
+        for q in range(first, stop):
+            number = spread(real(q))
+            waits = _see_shape(shape, p, near, q, lane) & (number > before)
+            takes = waits & (now == before)
+            is_last = is_last and not any_of(waits & (now > before))
+            if any_of(takes):
+                now = pick(takes, number, now)
+                for row in range(PER_CORNER * m + 1):
+                    store(pick(takes, load(seen, row, lane), load(met, row, lane)), met, row, lane)
+        counts = now > before
+        if any_of(counts):
+            _touch_seen(shape, p, near, m, counts, lane)
+        if is_last:
+            return
+        before = now
 
 
 @kernel
@@ -234,12 +273,18 @@ def touch(shape, p, near):
     for lane in range(0, LANES, WIDTH):
         if not any_of(load_row(near.active, lane) > spread(real(0.0))):
             continue
-        store_row(far, near.first.gap, lane)
-        store_row(far, near.second.gap, lane)
         if shape.enclosed:
             touch_walls(shape, p, near, lane)
-        for q in range(shape.row_shape.size):
-            _touch_shape(shape, p, near, q, lane)
+        else:
+            store_row(far, near.first.gap, lane)
+            store_row(far, near.second.gap, lane)
+        first = 0
+        while first < shape.row_shape.size:
+            stop = first + 1
+            while stop < shape.row_shape.size and shape.shape_corners[stop] == shape.shape_corners[first]:
+                stop += 1
+            _touch_shapes(shape, p, near, first, stop, lane)
+            first = stop
     return count_touching(near.first.gap)
 
 

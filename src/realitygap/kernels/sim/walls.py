@@ -138,17 +138,27 @@ def _deeper_in_wall(one, u, v, two, next_u, next_v, r, a, b, first, second, lane
 
 
 @inlined
+def _write(contact, gap, a, b, u, v, r, lane):
+    store_row(gap, contact.gap, lane)
+    store_row(a, contact.facing, lane)
+    store_row(b, contact.beside, lane)
+    store_row(u, contact.corner_x, lane)
+    store_row(v, contact.corner_y, lane)
+    store_row(r, contact.radius, lane)
+
+
+@inlined
 def touch_walls(shape, p, near, lane):
-    """Deepen the touch by the walls in `near.walls`: by two corners of each part of the body at each."""
+    """The touch by the walls in `near.walls`: by two corners of each part of the body at each."""
     for k in range(N_NEAREST):
-        center, along, across = _see_plane(near.walls, PER_WALL * k, near.pose, lane)
+        center, a, b = _see_plane(near.walls, PER_WALL * k, near.pose, lane)
         for part in range(shape.part_corners.size):
             n = shape.part_corners[part]
-            radius = load(p, shape.row_part[part] + 2 * n, lane)
-            low, x, y, next_low, next_x, next_y = lowest_two(
-                p, shape.row_outline[part], n, along, across, lane
-            )
-            _deeper_in_wall(
-                low + center - radius, x, y, next_low + center - radius, next_x, next_y, radius, along, across,
-                near.first, near.second, lane,
-            )  # fmt: skip
+            r = load(p, shape.row_part[part] + 2 * n, lane)
+            low, u, v, next_low, next_u, next_v = lowest_two(p, shape.row_outline[part], n, a, b, lane)
+            one, two = low + center - r, next_low + center - r
+            if k + part == 0:
+                _write(near.first, one, a, b, u, v, r, lane)
+                _write(near.second, two, a, b, next_u, next_v, r, lane)
+            else:
+                _deeper_in_wall(one, u, v, two, next_u, next_v, r, a, b, near.first, near.second, lane)

@@ -8,14 +8,15 @@ from ._evidence import LEAST_STEPS, Evidence, Vectors, evidence_of
 from ._excitation import excitation, random_controllers
 from ._handles import MOTION
 from ._held_out import HeldOut
+from ._log_model import MotionLog
 from ._motion import MotionFit, fit_motion
-from ._motion_log import MotionLogFit, fit_motion_log
+from ._motion_log import MotionLogFit, fit_motion_log, fit_motion_logs, motion_log
 from ._motion_plans import motion_plans
 from ._next_trial import information_of, next_trials
 from ._path import PathFit, fit_path, path_plans
 from ._path_baselines import drive_on, look_up_motion
 from ._predict_table import look_up_readings, place_ranks, predict_range_table
-from ._predictive import Misfit, misfits
+from ._predictive import PREDICTED, Misfit, misfits, prediction_errors
 from ._prior import Effect, Floats, Parameter, numbers_of, ranges_of, scribbler_prior, standard_of, values_of
 from ._range_table import RangeTableFit, fit_range_table
 from ._ruler import Moved, end_pose_of, moved_in, ruled
@@ -30,6 +31,7 @@ __all__ = [
     "LEAST_PLACEMENTS",
     "LEAST_STEPS",
     "MOTION",
+    "PREDICTED",
     "Effect",
     "Effort",
     "Evidence",
@@ -38,6 +40,7 @@ __all__ = [
     "Independence",
     "Misfit",
     "MotionFit",
+    "MotionLog",
     "MotionLogFit",
     "Moved",
     "Parameter",
@@ -59,6 +62,7 @@ __all__ = [
     "fit_from_poses",
     "fit_motion",
     "fit_motion_log",
+    "fit_motion_logs",
     "fit_path",
     "fit_range_table",
     "fit_sensor",
@@ -68,6 +72,7 @@ __all__ = [
     "look_up_readings",
     "misfits",
     "mixed",
+    "motion_log",
     "motion_plans",
     "moved_in",
     "next_trials",
@@ -77,6 +82,7 @@ __all__ = [
     "place_ranks",
     "placements_of",
     "predict_range_table",
+    "prediction_errors",
     "random_controllers",
     "ranges_of",
     "ruled",

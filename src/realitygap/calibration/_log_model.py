@@ -29,7 +29,7 @@ FIRST_PATH = 0.3
 
 
 @dataclass(frozen=True)
-class Log:
+class MotionLog:
     """A recording of n times.
 
     Attributes:
@@ -44,7 +44,7 @@ class Log:
     poses: Floats
     encoders: Floats
 
-    def until(self, row: int) -> Log:
+    def until(self, row: int) -> MotionLog:
         """Return the same log with nothing seen from a row on."""
         poses, encoders = self.poses.copy(), self.encoders.copy()
         poses[row:], encoders[row:] = np.nan, np.nan
@@ -79,7 +79,7 @@ class Tracked:
     log_likelihood: Floats
 
 
-def wheel_steps(log: Log, numbers: Mapping[str, Floats]) -> Floats:
+def wheel_steps(log: MotionLog, numbers: Mapping[str, Floats]) -> Floats:
     """Return the distance of each wheel between two times, shape (m, n - 1, 2) [m].
 
     A command is late by the delay, and a speed nears it within the lag, as in kernels/sim/drive.py. A command that
@@ -130,7 +130,9 @@ def _rolled(target: Floats, time: Floats, lag: Floats) -> Floats:
     return steps
 
 
-def track(log: Log, steps: Floats, numbers: Mapping[str, Floats], noise: Mapping[str, Floats]) -> Tracked:
+def track(
+    log: MotionLog, steps: Floats, numbers: Mapping[str, Floats], noise: Mapping[str, Floats]
+) -> Tracked:
     """Filter the poses of a log.
 
     Args:
@@ -176,7 +178,7 @@ def track(log: Log, steps: Floats, numbers: Mapping[str, Floats], noise: Mapping
     return Tracked(predicted, logs)
 
 
-def _first_heading(log: Log, length: Floats, turn: Floats, first: int) -> Floats:
+def _first_heading(log: MotionLog, length: Floats, turn: Floats, first: int) -> Floats:
     """Return (m,) the heading that lays the first part of the simulated path on the seen one [rad]."""
     heading = np.concatenate([np.zeros((len(turn), 1)), np.cumsum(turn[:, first:], axis=1)], axis=1)
     middle = heading[:, :-1] + turn[:, first:] / 2
@@ -233,7 +235,7 @@ def _updated(
     return state, spread, logs
 
 
-def encoder_likelihood(log: Log, steps: Floats, noise: Mapping[str, Floats]) -> Floats:
+def encoder_likelihood(log: MotionLog, steps: Floats, noise: Mapping[str, Floats]) -> Floats:
     """Return the log likelihood of the distances between encoder readings, shape (m,).
 
     Args:
@@ -249,6 +251,6 @@ def encoder_likelihood(log: Log, steps: Floats, noise: Mapping[str, Floats]) -> 
     return np.asarray(-0.5 * (off**2 / variance + np.log(2 * np.pi * variance)).sum(axis=(1, 2)))
 
 
-def seen_rows(log: Log) -> Bools:
+def seen_rows(log: MotionLog) -> Bools:
     """Return whether anything was seen at each time, shape (n,)."""
     return np.asarray(np.isfinite(log.poses[:, 0]) | np.isfinite(log.encoders).all(axis=1))

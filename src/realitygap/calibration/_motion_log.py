@@ -1,4 +1,4 @@
-"""The fit of a drive to a log of wheel commands, with what a camera or encoders saw."""
+"""The fit of a drive to logs of wheel commands, with the observations of a camera or encoders."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from realitygap.world import Fitted, RobotModel
 
 from ._held_out import Choice, HeldOut
-from ._log_model import Log, encoder_likelihood, seen_rows, track, wheel_steps
+from ._log_model import MotionLog, encoder_likelihood, seen_rows, track, wheel_steps
 from ._simulate import Floats, plain_numbers
 
 N_DRAWS = 200
@@ -106,17 +106,18 @@ LEAST_NOISE = 0.002
 
 @dataclass(frozen=True)
 class MotionLogFit:
-    """A drive fitted to a log.
+    """A drive fitted to logs.
 
     Attributes:
         fitted: Parameters with 90 % intervals.
         numbers: The estimate by the robot's dotted names.
         draws: (d,) draws of each number, jointly.
-        held_out: Errors on the part that the fit did not see; None if it saw everything.
+        held_out: Errors on the parts that the fit did not see; None if it saw everything.
         recommended: The numbers to use.
+        by_log: The same errors for each log; None for a log that the fit saw wholly.
         method: The method, with its source.
         notes: Further results in words.
-        evidence: Data for figures: times, and the predicted and seen path of the unseen part.
+        evidence: Data for figures: the predicted and seen path of the unseen part of the first log with one.
     """
 
     fitted: tuple[Fitted, ...]
@@ -124,6 +125,7 @@ class MotionLogFit:
     draws: dict[str, tuple[float, ...]]
     held_out: HeldOut | None
     recommended: Choice
+    by_log: tuple[HeldOut | None, ...] = ()
     method: str = METHOD
     notes: tuple[str, ...] = ()
     evidence: dict[str, Any] = field(default_factory=dict)
@@ -169,14 +171,45 @@ def fit_motion_log(
     Source: Särkkä (2013), Bayesian Filtering and Smoothing, sections 5.2 and 12.2; Gelman, Jakulin, Pittau & Su (2008),
         a weakly informative default prior distribution.
     """
-    log = _checked(time_s, commands, poses, encoders, hold_out)
-    split = _split(log, hold_out)
-    problem = _Problem.of(log.until(split), robot)
+    return fit_motion_logs(
+        [motion_log(time_s, commands, poses=poses, encoders=encoders)], robot, hold_out=hold_out, seed=seed
+    )
+
+
+def fit_motion_logs(
+    logs: Sequence[MotionLog], robot: RobotModel, *, hold_out: float = 0.5, seed: int = 0
+) -> MotionLogFit:
+    """Fit the drive of a robot to several logs together, and predict the parts that the fit does not see.
+
+    Args:
+        logs: Logs of `motion_log`, of the same robot.
+        robot: The robot with its nominal numbers.
+        hold_out: Share of each log's time, at its end, that the fit does not see; 0 to fit to everything. A log that is
+            too short to be split is seen wholly, if another one is long enough.
+        seed: Seed of the draws.
+
+    Returns:
+        The fit, as in `fit_motion_log`. Errors of several logs are averaged, weighted by their observations.
+
+    Raises:
+        ValueError: There is no log, or none is long enough for its unseen part.
+    """
+    if not logs:
+        raise ValueError("There is no log, expected at least one.")
+    if not 0.0 <= hold_out <= 0.9:
+        raise ValueError(f"hold_out is {hold_out:g}, expected a share of the log from 0 to 0.9.")
+    splits = _splits(logs, hold_out)
+    problem = _Problem.of([log.until(split) for log, split in zip(logs, splits, strict=True)], robot)
     best, spread = problem.solve()
     rng = np.random.default_rng(seed)
     draws = best + rng.standard_normal((N_DRAWS, len(best))) @ np.linalg.cholesky(spread).T
     values, drawn = problem.values(best[None]), problem.values(draws)
-    held_out, evidence = (None, {}) if split == len(log.time_s) else _predict(problem, log, split, best)
+    predicted = [
+        None if split == len(log.time_s) else _predict(problem, log, split, best)
+        for log, split in zip(logs, splits, strict=True)
+    ]
+    by_log = tuple(None if each is None else each[0] for each in predicted)
+    held_out = _joined([each for each in by_log if each is not None])
     numbers = _robot_numbers(values)
     return MotionLogFit(
         tuple(problem.fitted(best, spread, drawn)),
@@ -184,17 +217,45 @@ def fit_motion_log(
         {name: tuple(value.tolist()) for name, value in _robot_numbers(drawn).items()},
         held_out,
         held_out.recommended if held_out else "fitted",
-        evidence=evidence,
+        by_log,
+        evidence=next((each[1] for each in predicted if each is not None), {}),
     )
 
 
-def _checked(
+def _joined(errors: Sequence[HeldOut]) -> HeldOut | None:
+    """Return the mean errors of several logs, weighted by their observations."""
+    if len(errors) < 2:
+        return errors[0] if errors else None
+    weights = [each.n for each in errors]
+
+    def mean(values: Sequence[float]) -> float:
+        return float(np.average(values, weights=weights))
+
+    first = errors[0]
+    return HeldOut(
+        f"{first.measure}, mean of {len(errors)} logs",
+        first.unit,
+        mean([each.nominal for each in errors]),
+        mean([each.fitted for each in errors]),
+        n=sum(weights),
+        more={
+            name: (
+                mean([each.more[name][0] for each in errors]),
+                mean([each.more[name][1] for each in errors]),
+            )
+            for name in first.more
+        },
+    )
+
+
+def motion_log(
     time_s: ArrayLike,
     commands: ArrayLike,
-    poses: ArrayLike | None,
-    encoders: ArrayLike | None,
-    hold_out: float,
-) -> Log:
+    *,
+    poses: ArrayLike | None = None,
+    encoders: ArrayLike | None = None,
+) -> MotionLog:
+    """Return a log to fit a drive to; arguments and errors as in `fit_motion_log`."""
     time = np.asarray(time_s, np.float64)
     n = len(time) if time.ndim == 1 else 0
     if n < LEAST_ROWS:
@@ -213,15 +274,13 @@ def _checked(
         )
     if not np.any(asked):
         raise ValueError("All commands are 0, expected a robot that drives.")
-    if not 0.0 <= hold_out <= 0.9:
-        raise ValueError(f"hold_out is {hold_out:g}, expected a share of the log from 0 to 0.9.")
     seen = np.full((n, 3), np.nan)
     if poses is not None:
         given = _rows("poses", poses, n, (2, 3))
         seen[:, : given.shape[1]] = given
         seen[~np.isfinite(seen[:, :2]).all(axis=1)] = np.nan
     wheels = np.full((n, 2), np.nan) if encoders is None else _rows("encoders", encoders, n, (2,))
-    log = Log(time, asked, seen, wheels)
+    log = MotionLog(time, asked, seen, wheels)
     if seen_rows(log).sum() < LEAST_ROWS:
         raise ValueError(
             f"Poses or encoders were recorded at {seen_rows(log).sum()} times, expected at least {LEAST_ROWS}."
@@ -237,7 +296,21 @@ def _rows(name: str, values: ArrayLike, n: int, widths: Sequence[int]) -> Floats
     return rows
 
 
-def _split(log: Log, hold_out: float) -> int:
+def _splits(logs: Sequence[MotionLog], hold_out: float) -> list[int]:
+    """Return the first row of each log that the fit does not see; the number of its rows if it is too short."""
+    splits, error = [], None
+    for log in logs:
+        try:
+            splits.append(_split(log, hold_out))
+        except ValueError as problem:
+            splits.append(len(log.time_s))
+            error = error or problem
+    if error is not None and all(split == len(log.time_s) for log, split in zip(logs, splits, strict=True)):
+        raise error
+    return splits
+
+
+def _split(log: MotionLog, hold_out: float) -> int:
     """Return the first row that the fit does not see."""
     n = len(log.time_s)
     if hold_out == 0.0:
@@ -256,29 +329,30 @@ def _split(log: Log, hold_out: float) -> int:
 
 @dataclass(frozen=True)
 class _Problem:
-    """A log, the free numbers, and their prior."""
+    """Logs, the free numbers, and their prior."""
 
-    log: Log
+    logs: tuple[MotionLog, ...]
     own: Mapping[str, float]
     free: tuple[Spread, ...]
 
     @classmethod
-    def of(cls, log: Log, robot: RobotModel) -> _Problem:
+    def of(cls, logs: Sequence[MotionLog], robot: RobotModel) -> _Problem:
         now = plain_numbers(robot)
         left, right = now["drive.gain_left"], now["drive.gain_right"]
         own = {name: value for name, value in now.items() if name.startswith("drive.")}
         own |= {"drive.gain": (left + right) / 2, "drive.asymmetry": left - right}
         own |= {s.name: max(own[s.name], LEAST_NOISE) for s in OWN_NOISE} | SEEN_NOISE
         by_poses = ("drive.track", "drive.axle", "drive.drift_per_m")
-        free = tuple(s for s in DRIVE if log.sees_poses or s.name not in by_poses)
+        sees_poses = any(log.sees_poses for log in logs)
+        free = tuple(s for s in DRIVE if sees_poses or s.name not in by_poses)
         names: tuple[str, ...] = ()
-        if log.sees_poses:
+        if sees_poses:
             free += OWN_NOISE
-            names += ("place", "angle") if log.sees_heading else ("place",)
-        if log.sees_wheels:
+            names += ("place", "angle") if any(log.sees_heading for log in logs) else ("place",)
+        if any(log.sees_wheels for log in logs):
             names += ("wheel", "wheel_per_m")
         free += tuple(Spread(name, "ratio", 1.0, "m", "", is_normal=True) for name in names)
-        return cls(log, own, free)
+        return cls(tuple(logs), own, free)
 
     def values(self, standard: Floats) -> dict[str, Floats]:
         """Return (m,) of everything at (m, p) points on the standard scales of the parameters."""
@@ -295,11 +369,12 @@ class _Problem:
         values = self.values(standard)
         priors = [one.log_prior(standard[:, k]) for k, one in enumerate(self.free)]
         logs = weight * np.sum(priors, axis=0)
-        steps = wheel_steps(self.log, values)
-        if self.log.sees_poses:
-            logs = logs + track(self.log, steps, values, _noise(values)).log_likelihood
-        if self.log.sees_wheels:
-            logs = logs + encoder_likelihood(self.log, steps, _noise(values))
+        for log in self.logs:
+            steps = wheel_steps(log, values)
+            if log.sees_poses:
+                logs = logs + track(log, steps, values, _noise(values)).log_likelihood
+            if log.sees_wheels:
+                logs = logs + encoder_likelihood(log, steps, _noise(values))
         return np.asarray(logs)
 
     def down(self, point: Floats, weight: float = 1.0) -> tuple[float, Floats]:
@@ -380,8 +455,8 @@ def _robot_numbers(values: Mapping[str, Floats]) -> dict[str, Floats]:
     return {name: values[name] for name in ("drive.gain_left", "drive.gain_right", *names)}
 
 
-def _predict(problem: _Problem, log: Log, split: int, best: Floats) -> tuple[HeldOut, dict[str, Any]]:
-    """Predict the unseen part with the robot's own and with the fitted numbers."""
+def _predict(problem: _Problem, log: MotionLog, split: int, best: Floats) -> tuple[HeldOut, dict[str, Any]]:
+    """Predict the unseen part of a log with the robot's own and with the fitted numbers."""
     values = problem.values(np.stack([best, best]))
     for one in DRIVE:
         values[one.name][0] = problem.own[one.name]
@@ -389,7 +464,7 @@ def _predict(problem: _Problem, log: Log, split: int, best: Floats) -> tuple[Hel
         values[f"drive.gain_{side}"][0] = problem.own[f"drive.gain_{side}"]
     steps = wheel_steps(log, values)
     if log.sees_poses:
-        predicted = track(problem.log, steps, values, _noise(values)).poses
+        predicted = track(log.until(split), steps, values, _noise(values)).poses
         rows = split + np.flatnonzero(np.isfinite(log.poses[split:, 0]))
         off = np.hypot(*np.moveaxis(predicted[:, rows, :2] - log.poses[rows, :2], -1, 0))
         lasts = log.time_s[rows[-1]] - log.time_s[split - 1]

@@ -1,7 +1,7 @@
-"""Whether a simulator can make what was observed: the posterior predictive check, with the size of what it cannot make.
+"""Whether a simulator can make what was observed, by the posterior predictive check, and how well it predicts trials.
 
-With enough trials any robot differs from any simulator significantly, so what counts is a size: of what varies in the
-observations, the share that the fitted simulator neither predicts nor makes by chance.
+With enough trials any robot differs from any simulator significantly, so what counts is a size: the share of the
+observations' variance that the fitted simulator neither predicts nor makes by chance.
 
 Source: posterior predictive checks, Gelman, Meng & Stern, Statistica Sinica 6 (1996). The limits in `TOLERATED` are
 chosen on twins, see docs/explanations/inference.md.
@@ -30,6 +30,9 @@ TOLERATED = {
     "coverage": 1.0,
 }
 """Share of the variance of each kind of observation up to which a fit counts as well specified."""
+
+PREDICTED = ("ahead", "turn", "wheels", "reading", "readings", "command", "cell")
+"""Kinds of observation that count when trials are predicted."""
 
 
 @dataclass(frozen=True)
@@ -100,3 +103,40 @@ def misfits(
             p = float(np.mean(np.array(own_sums) >= off_sum))
             found.append(Misfit(kind, float(share), TOLERATED[kind], p))
     return found
+
+
+def prediction_errors(
+    held_out: Sequence[Evidence],
+    every: Sequence[Evidence],
+    simulate: Callable[[Evidence, Mapping[str, Floats], int], Vectors],
+    numbers: Mapping[str, Floats],
+    *,
+    kinds: Sequence[str] = PREDICTED,
+    key: int,
+) -> dict[str, float]:
+    """Return the share of the variance of each kind of observation that simulated robots do not predict.
+
+    The prediction of each entry is its mean over the robots. A share of 0 is a perfect prediction. The mean of all
+    trials, as a prediction, has a share of about 1. Chance keeps the share of the best prediction above 0.
+
+    Args:
+        held_out: The trials to predict.
+        every: All trials, held out or not: variances are theirs, because few trials vary little by chance.
+        simulate: Runs the trials in simulation.
+        numbers: (m,) of the robot's numbers, by dotted name, for m robots.
+        kinds: Kinds of observation that count.
+        key: Key of the random numbers.
+    """
+    sums: dict[str, NDArray[np.float64]] = {}
+    for k, one in enumerate(held_out):
+        off = (one.seen - simulate(one, numbers, key + k).mean(axis=0, dtype=np.float64)) ** 2
+        for kind in kinds:
+            at = one.kinds == kind
+            sums[kind] = sums.get(kind, np.zeros(2)) + np.array([off[at].sum(), at.sum()])
+    errors = {}
+    for kind, (off_sum, n) in sums.items():
+        seen = np.concatenate([one.seen[one.kinds == kind] for one in every])
+        variance = float(seen.var(dtype=np.float64)) if n else 0.0
+        if variance:  # what never varied has none to predict
+            errors[kind] = float(off_sum / n / variance)
+    return errors

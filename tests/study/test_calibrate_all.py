@@ -12,6 +12,8 @@ from realitygap.calibration import (
 from realitygap.evolution import Genome
 from realitygap.platforms import SimEnsemble, SimPlatform, SimTarget
 from realitygap.study import calibrate_all
+from realitygap.study._calibrate.held_out_trials import compare_on_trials, is_held_out
+from realitygap.study._calibrate.parts import Parts
 from realitygap.study._calibrate.whole import all_plans
 from realitygap.world import paper_arena
 
@@ -102,3 +104,36 @@ def test_intervals_of_robots_from_the_prior_cover_as_often_as_they_say(observe):
         inside.append((low <= standard[0]) & (standard[0] <= high))
     # 300 intervals of 90 %, those of one robot alike: 0.84 to 0.96 is three standard errors were they independent 1.7.
     assert 0.83 <= np.mean(inside) <= 0.97
+
+
+def test_held_out_trials_are_spread_and_recommend_what_predicts_them():
+    """A fit that is wrong by half of the gain loses against the numbers that it started from, and a true one wins."""
+    truth = {"drive.gain_left": 0.8, "drive.gain_right": 0.8}
+    with SimTarget(SimPlatform(set=truth), ARENA, key=4) as target:
+        trials = target.carry_out(all_plans(ARENA, SimPlatform().robot, 5), "track")
+    asked = []
+
+    def judged(gain: float) -> Parts:
+        numbers = dict.fromkeys(truth, gain)
+
+        def fit(some):
+            asked.append(len(some))
+            return numbers, {name: [value] for name, value in numbers.items()}
+
+        parts = Parts((), numbers, {}, "given")
+        return compare_on_trials(parts, trials, fit, SimEnsemble(SimPlatform(), ARENA, threads=1))
+
+    right, wrong = judged(0.8), judged(0.4)
+    assert asked == [4, 4]
+    assert right.evidence["held_out"]["recommended"] == "fitted"
+    assert (
+        right.evidence["held_out"]["errors"]["fitted"]
+        < right.evidence["held_out"]["errors"]["nominal numbers"]
+    )
+    assert right.notes[0].startswith("1 of 5 trials were held out.")
+    assert wrong.evidence["held_out"]["recommended"] == "nominal numbers"
+    assert "use them instead" in wrong.notes[0]
+    assert wrong.numbers == dict.fromkeys(truth, 0.4)  # a recommendation changes no number
+    few = compare_on_trials(right, trials[:4], lambda _: 1 / 0, SimEnsemble(SimPlatform(), ARENA, threads=1))
+    assert few is right
+    assert np.flatnonzero(is_held_out(20, 0.2)).tolist() == [4, 9, 14, 19]  # of both kinds of trials

@@ -26,14 +26,14 @@ from ._evidence import Evidence, Vectors
 from ._prior import Floats, Parameter, numbers_of, values_of
 from ._score import Compression, learn_compression
 
-Effort = Literal["small", "full"]
+Effort = Literal["least", "small", "full"]
 Simulate = Callable[[Evidence, Mapping[str, Floats], int], Vectors]
 """(m, d) vectors of trials carried out with m sets of numbers, and a key of random numbers."""
 
-N_LEARN = {"small": 800, "full": 1500}
-N_REGRESS = {"small": 800, "full": 1500}
-N_LAST = {"small": 2000, "full": 5000}
-ROUNDS = {"small": 4, "full": 7}
+N_LEARN = {"least": 600, "small": 800, "full": 1500}
+N_REGRESS = {"least": 600, "small": 800, "full": 1500}
+N_LAST = {"least": 1000, "small": 2000, "full": 5000}
+ROUNDS = {"least": 3, "small": 4, "full": 7}
 N_DRAWS = 500
 MOST_OWN = 0.9  # of a prediction, that is taken for a row's own
 END = 4.0  # standard deviations of the prior beyond which nothing is

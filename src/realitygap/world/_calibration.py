@@ -140,6 +140,14 @@ class Calibration(Settings):
         return card_of(self).to_html()
 
     @property
+    def recommended(self) -> str:
+        """The numbers that predict held-out data best: fitted, draws of the posterior, or nominal numbers.
+
+        Empty if nothing was held out.
+        """
+        return str(self.evidence.get("held_out", {}).get("recommended", ""))
+
+    @property
     def step(self) -> dict[str, float]:
         """How long commands last, where it was measured, as a setting of the robot [s]."""
         return {"step_s": self.step_s} if self.step_s else {}

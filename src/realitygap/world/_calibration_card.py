@@ -17,6 +17,10 @@ def calibration_card(calibration: Calibration) -> Card:
             f"Rejected: the simulator cannot reproduce this robot (p = {calibration.misspecification_p:.2g}). Don't "
             "use this calibration for conclusions."
         )
+    elif calibration.recommended == "nominal numbers":
+        warning = (
+            "The numbers that this calibration started from predict held-out trials better. See the notes."
+        )
     rows: list[list[str | Bar]] = [
         [
             f"{each.name} [{each.unit}]" if each.unit else each.name,

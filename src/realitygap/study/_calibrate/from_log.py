@@ -16,7 +16,7 @@ from realitygap.platforms import JyroPlatform
 from realitygap.records import Observe
 from realitygap.world import Calibration, RobotModel
 
-from .hold_out import FITTED, NOISE, NOMINAL, TABLE, Compared, HoldOut
+from .hold_out import FITTED, NOISE, NOMINAL, TABLE, Compared, HoldOut, chosen_parts
 from .one import calibration_of, measured_at
 from .parts import Parts
 
@@ -70,17 +70,8 @@ def calibrate_from_log(
     if n_logs > 1:
         notes.append(f"The fit uses the longest of {n_logs} trials{f', {log.name}' if log.name else ''}.")
     given = {"drive.speed": log_map.speed, "drive.track": log_map.track}
-    numbers: dict[str, float] = {key: value for key, value in given.items() if value}
-    draws = fit.draws
-    evidence = {key: value for key, value in fit.evidence.items() if key != "held_out"}
-    if compared is not None:
-        evidence["held_out"] = compared.to_dict()
-    if compared is not None and not compared.is_better:
-        draws = {}
-        notes.append("The robot file's numbers predict better than the fit, and stay.")
-    else:
-        numbers |= fit.numbers
-    parts = Parts(fit.fitted, numbers, draws, fit.method, tuple(notes), evidence=evidence)
+    parts = Parts(fit.fitted, fit.numbers, fit.draws, fit.method, tuple(notes), evidence=fit.evidence)
+    parts = chosen_parts(parts, compared, {key: value for key, value in given.items() if value})
     observe: Observe = "track" if len(log.poses) else "encoders"
     arena = log_map.arena or "open"
     made = calibration_of("motion", parts, name, str(path), log_map.label, observe, (), arena, seed)

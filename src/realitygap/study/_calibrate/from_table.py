@@ -16,7 +16,7 @@ from realitygap.platforms import JyroPlatform
 from realitygap.records import write_whole
 from realitygap.world import Calibration, RobotModel, load_robot, robot_names
 
-from .hold_out import FITTED, NOISE, NOMINAL, TABLE, Compared, HoldOut
+from .hold_out import FITTED, NOISE, NOMINAL, TABLE, Compared, HoldOut, chosen_parts
 from .one import calibration_of, measured_at
 from .parts import Parts
 
@@ -84,15 +84,12 @@ def calibrate_from_table(
         )
     except ValueError as error:
         raise StudyError(f"{path}: {error}") from None
-    notes = [*table.notes, *notes, *fit.notes]
-    numbers, draws, evidence = fit.numbers, fit.draws, dict(fit.evidence)
+    compared = None
     if not seen.all():
         compared = _compare(table, bearing, seen, robot, robot.with_numbers(fit.numbers), hold_out)
-        evidence["held_out"] = compared.to_dict()
-        if not compared.is_better:
-            numbers, draws = {}, {}
-            notes.append("The robot file's numbers predict better than the fit, and stay.")
-    parts = Parts(fit.fitted, numbers, draws, fit.method, tuple(notes), evidence=evidence)
+    notes = [*table.notes, *notes, *fit.notes]
+    parts = Parts(fit.fitted, fit.numbers, fit.draws, fit.method, tuple(notes), evidence=fit.evidence)
+    parts = chosen_parts(parts, compared, {})
     made = calibration_of("sensors", parts, name, str(path), table_map.label, "cells", (), "", seed)
     return made.model_copy(update={"trials": 1, "measured": measured_at(Path(path))})
 

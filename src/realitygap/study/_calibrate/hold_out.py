@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 from realitygap.errors import StudyError
+
+from .parts import Parts
 
 HoldOut = float | Literal["blocks"]
 
 FITTED, NOMINAL, NOISE, TABLE = "fitted", "nominal numbers", "nominal, uniform noise", "lookup table"
 """The predictions that are compared: the fit, and three that it has to beat."""
+
+POSTERIOR = "draws of the posterior"
+"""The mean prediction of robots with draws of the posterior, which is also compared if trials are held out."""
 
 MOST_SHARE = 0.9
 
@@ -52,12 +57,36 @@ class Compared:
             "errors": plain,
             "more": more,
             "by": by,
+            "recommended": self.recommended,
         }
 
     @property
     def is_better(self) -> bool:
         """Whether the fit predicts better than the nominal numbers."""
         return self.errors[FITTED] < self.errors[NOMINAL]
+
+    @property
+    def recommended(self) -> str:
+        """The numbers with the smallest error: `NOMINAL`, also if others are equal, `FITTED`, or `POSTERIOR`."""
+        numbers = [name for name in (NOMINAL, FITTED, POSTERIOR) if name in self.errors]
+        return min(numbers, key=self.errors.__getitem__)
+
+
+def chosen_parts(parts: Parts, compared: Compared | None, given: Mapping[str, float]) -> Parts:
+    """Return the parts of a fit to a log or a table, without its numbers if the robot file's predict better.
+
+    Args:
+        parts: The parts, with the numbers of the fit.
+        compared: The errors on the unseen part; None if the fit saw everything.
+        given: Numbers of the recording itself, which stay.
+    """
+    evidence = {key: value for key, value in parts.evidence.items() if key != "held_out"}
+    if compared is not None:
+        evidence["held_out"] = compared.to_dict()
+    if compared is None or compared.is_better:
+        return replace(parts, numbers={**given, **parts.numbers}, evidence=evidence)
+    notes = (*parts.notes, "The robot file's numbers predict better than the fit, and stay.")
+    return replace(parts, numbers=dict(given), draws={}, notes=notes, evidence=evidence)
 
 
 def hold_out_of(text: str) -> HoldOut:

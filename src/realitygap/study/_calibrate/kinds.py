@@ -17,7 +17,6 @@ from realitygap.calibration import (
     Moved,
     Placement,
     SensorFit,
-    Simulate,
     contact_plans,
     fit_contact,
     fit_motion,
@@ -38,6 +37,7 @@ from realitygap.robots import Command
 from realitygap.trials import TrialPlan
 from realitygap.world import Arena, Pose, RobotModel, distance_to_segment
 
+from .held_out_trials import Numbers, compare_on_trials
 from .parts import Parts
 from .whole import ALL_TRIALS, all_plans, fit_everything
 
@@ -273,6 +273,9 @@ def _drawn_of(fit: SensorFit, placements: Sequence[Placement]) -> dict[str, Any]
 
 # motion and contact
 
+OF_MOTION = ("ahead", "turn", "wheels")
+"""Kinds of observation that a fit of motors can predict."""
+
 
 def _motion_plans(arena: Arena, robot: RobotModel, budget: int | None) -> Sequence[TrialPlan]:
     return motion_plans(arena, robot) if budget is None else motion_plans(arena, robot, budget)
@@ -282,8 +285,17 @@ def _fit_motion(
     trials: Sequence[TrialRecord], robot: RobotModel, arena: Arena, observe: Observe, seed: int
 ) -> Parts:
     moving = _of_purpose(trials, "motion")
-    fit = fit_motion(moving, _replay(moving, robot, arena), robot, arena, observe=observe, seed=seed)
-    return _told_of_ends(_parts_of(fit), is_cut=True)
+    ensemble = _ensemble(moving, robot, arena)
+
+    def fit(some: Sequence[TrialRecord]) -> MotionFit:
+        return fit_motion(some, ensemble.replay, robot, arena, observe=observe, seed=seed)
+
+    def numbers(some: Sequence[TrialRecord]) -> Numbers:
+        made = fit(some)
+        return made.numbers, made.draws
+
+    parts = _told_of_ends(_parts_of(fit(moving)), is_cut=True)
+    return compare_on_trials(parts, moving, numbers, ensemble, kinds=OF_MOTION, seed=seed)
 
 
 def _contact_plans(arena: Arena, robot: RobotModel, budget: int | None) -> Sequence[TrialPlan]:
@@ -294,7 +306,7 @@ def _fit_contact(
     trials: Sequence[TrialRecord], robot: RobotModel, arena: Arena, observe: Observe, seed: int
 ) -> Parts:
     met = _of_purpose(trials, "contact")
-    simulate = _replay(met, robot, arena)
+    simulate = _ensemble(met, robot, arena).replay
     return _parts_of(fit_contact(met, simulate, robot, arena, observe=observe, seed=seed))
 
 
@@ -305,11 +317,11 @@ def _of_purpose(trials: Sequence[TrialRecord], purpose: str) -> list[TrialRecord
     ]
 
 
-def _replay(trials: Sequence[TrialRecord], robot: RobotModel, arena: Arena) -> Simulate:
-    """Trials in `sim` with other numbers."""
+def _ensemble(trials: Sequence[TrialRecord], robot: RobotModel, arena: Arena) -> SimEnsemble:
+    """Return robots of `sim` with other numbers, for trials."""
     step_s = step_of(trials) if trials else robot.step_s
     ranges = ranges_of(scribbler_prior(robot), robot)
-    return SimEnsemble(SimPlatform(robot=robot, step_s=step_s), arena, ranges=ranges).replay
+    return SimEnsemble(SimPlatform(robot=robot, step_s=step_s), arena, ranges=ranges)
 
 
 def _parts_of(fit: MotionFit) -> Parts:

@@ -40,6 +40,7 @@ from realitygap.records import Observe, TrialRecord
 from realitygap.trials import Target, TrialPlan
 from realitygap.world import Arena, Calibration, Distribution, Fitted, RobotModel
 
+from .held_out_trials import compare_on_trials
 from .parts import SOFTWARE, Parts
 
 METHOD = (
@@ -219,12 +220,11 @@ class _Fit:
         if not self.evidence(trials):
             return self._as_it_is()
         posterior = self.posterior(trials, effort)
-        middle = {name: np.median(value, keepdims=True) for name, value in posterior.values.items()}
-        draws = self.numbers(posterior.values)
+        numbers, draws = self.robots(posterior)
         found = misfits(self.evidence(trials), self.simulate, draws, key=self.seed)
-        return Parts(
+        parts = Parts(
             fitted=tuple(_fitted(parameter, posterior) for parameter in self.prior),
-            numbers={name: float(value[0]) for name, value in self.numbers(middle).items()},
+            numbers=numbers,
             draws=draws,
             method=METHOD,
             notes=tuple(_said_of(misfit) for misfit in found),
@@ -232,6 +232,19 @@ class _Fit:
             misspecification_p=min(1.0, len(found) * min(misfit.p for misfit in found)),
             evidence={"misfit": {misfit.kind: round(misfit.share, 4) for misfit in found}},
         )
+        return compare_on_trials(
+            parts,
+            trials,
+            lambda some: self.robots(self.posterior(some, "least")),
+            self.ensemble,
+            seed=self.seed,
+        )
+
+    def robots(self, posterior: Posterior) -> tuple[dict[str, float], dict[str, Floats]]:
+        """Return the robot's numbers at the median of a posterior, and in each of its draws."""
+        middle = {name: np.median(value, keepdims=True) for name, value in posterior.values.items()}
+        estimate = {name: float(value[0]) for name, value in self.numbers(middle).items()}
+        return estimate, self.numbers(posterior.values)
 
     def chosen(self, posterior: Posterior, n: int, number: int) -> list[TrialPlan]:
         """The n trials that tell most of how controllers do that were not tried."""

@@ -1,0 +1,129 @@
+"""The error of a calibration on trials that a second fit does not see, next to that of the robot file's numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from realitygap.calibration import PREDICTED, Evidence, Floats, Vectors, evidence_of, prediction_errors
+from realitygap.evolution import Genome
+from realitygap.platforms import SimEnsemble
+from realitygap.records import TrialRecord
+from realitygap.world import Distribution
+
+from .hold_out import FITTED, NOMINAL, POSTERIOR, Compared
+from .parts import Parts
+
+SHARE_OF_TRIALS = 0.2
+"""Share of the trials that the second fit does not see."""
+
+LEAST_TRIALS = 5
+"""Trials below which none are held out."""
+
+N_ROBOTS = 100
+"""Simulated robots whose mean is a prediction."""
+
+Numbers = tuple[Mapping[str, float], Mapping[str, Sequence[float] | Floats]]
+"""The estimate and draws of the robot's numbers, by dotted name."""
+
+
+def is_held_out(n: int, share: float) -> list[bool]:
+    """Return which of n trials are held out: evenly spread, so that all kinds of trials that take turns are among them.
+
+    No trial is held out if there are fewer than `LEAST_TRIALS`.
+    """
+    n_held_out = round(share * n) if n >= LEAST_TRIALS else 0
+    return [(2 * k + 1) * n_held_out // (2 * n) < (2 * k + 3) * n_held_out // (2 * n) for k in range(n)]
+
+
+def compare_on_trials(
+    parts: Parts,
+    trials: Sequence[TrialRecord],
+    fit: Callable[[Sequence[TrialRecord]], Numbers],
+    ensemble: SimEnsemble,
+    *,
+    kinds: Sequence[str] = PREDICTED,
+    share: float = SHARE_OF_TRIALS,
+    seed: int = 0,
+) -> Parts:
+    """Return the parts of a fit with the errors on held-out trials, and with a recommendation as the first note.
+
+    The numbers stay those of the fit to all trials. They are judged by a second fit, which does not see some trials
+    and predicts them.
+
+    Args:
+        parts: The parts of the fit to all trials.
+        trials: All trials.
+        fit: The second fit: from some trials, the estimate and draws of the robot's numbers, by dotted name.
+        ensemble: Simulates the robot on whose numbers the fits build.
+        kinds: Kinds of observation that count.
+        share: Share of the trials that are held out; 0 for none.
+        seed: Seed of the predictions.
+    """
+    held = is_held_out(len(trials), share)
+    if not any(held):
+        return parts
+    unseen = [trial for trial, is_held in zip(trials, held, strict=True) if is_held]
+    evidence, every = _evidence(unseen, ensemble), _evidence(trials, ensemble)
+    try:
+        estimate, draws = fit([trial for trial, is_held in zip(trials, held, strict=True) if not is_held])
+    except ValueError:  # without them, the others are too few for a fit
+        return parts
+    if not evidence or not estimate:
+        return parts
+    own = ensemble.platform.robot.numbers()
+    nominal = {name: _center(own[name]) for name in estimate}
+    some = np.linspace(0, len(next(iter(draws.values()))) - 1, N_ROBOTS).astype(int)
+    robots = {
+        FITTED: {name: np.full(N_ROBOTS, value) for name, value in estimate.items()},
+        NOMINAL: {name: np.full(N_ROBOTS, value) for name, value in nominal.items()},
+        POSTERIOR: {name: np.asarray(values, np.float64)[some] for name, values in draws.items()},
+    }
+
+    def simulate(one: Evidence, numbers: Mapping[str, Floats], key: int) -> Vectors:
+        return ensemble.summarize(one.play, numbers, key, one.of, keep=one.keep)
+
+    by_kind = {
+        name: prediction_errors(evidence, every, simulate, numbers, kinds=kinds, key=seed)
+        for name, numbers in robots.items()
+    }
+    seen = list(by_kind[NOMINAL])
+    if not seen:
+        return parts
+    compared = Compared(
+        f"share of the variance of {len(unseen)} held-out trials of {len(trials)} that is not predicted, mean over "
+        f"{', '.join(seen)}",
+        "",
+        len(unseen),
+        {name: float(np.mean(list(errors.values()))) for name, errors in by_kind.items()},
+        {kind: {name: errors[kind] for name, errors in by_kind.items()} for kind in seen},
+    )
+    found = {**parts.evidence, "held_out": compared.to_dict()}
+    return replace(parts, notes=(_advice(compared, len(trials)), *parts.notes), evidence=found)
+
+
+def _center(value: float | Distribution) -> float:
+    return value.center if isinstance(value, Distribution) else value
+
+
+def _evidence(trials: Sequence[TrialRecord], ensemble: SimEnsemble) -> list[Evidence]:
+    genomes = [Genome.from_json(trial.genome) if trial.genome else None for trial in trials]
+    return evidence_of(trials, genomes, ensemble.arena.grid.n_cells)
+
+
+def _advice(compared: Compared, n: int) -> str:
+    """Return the recommendation in words."""
+    errors = compared.errors
+    text = (
+        f"{compared.n} of {n} trials were held out. A fit to the others leaves {errors[FITTED]:.3g} of their variance "
+        f"unexplained, draws of its posterior {errors[POSTERIOR]:.3g}, and the numbers that it started from "
+        f"{errors[NOMINAL]:.3g}."
+    )
+    advice = {
+        FITTED: "Use this calibration.",
+        POSTERIOR: "Use this calibration with draws of the posterior (--randomize posterior).",
+        NOMINAL: "The numbers that it started from predict best: use them instead, or record more trials.",
+    }
+    return f"{text} {advice[compared.recommended]}"

@@ -29,6 +29,7 @@ from realitygap.report import (
 from realitygap.report._drawing import inline
 from realitygap.report._export import tables_of
 from realitygap.report._individuals_figure import _moved_apart, draw_better
+from realitygap.report._latex import latex_table
 from realitygap.report._species_figure import count_species
 from realitygap.report._structures import _canonical, count_structures, structures_frame
 from realitygap.report._tally import read_tally
@@ -293,6 +294,23 @@ def test_export_writes_every_figure_and_table(tiny_study, tmp_path):
     compared = pl.read_csv(tmp_path / "figures" / "data-comparisons.csv")
     conclusions = [row["Conclusion"] for row in shown if row["Conclusion"]]
     assert sorted(conclusions) == sorted(compared["conclusion"])
+    files = sorted((tmp_path / "figures").glob("*.tex"))
+    assert [file.stem for file in files] == sorted(n for n, _, _ in tables_of(page) if n.startswith("table-"))
+    for file in files:
+        text = file.read_text("utf-8")
+        kinds = re.search(r"\\begin\{tabular\}\{([lr]+)\}", text)[1]
+        rows = [line for line in text.splitlines() if line.endswith(r"\\")]
+        assert {len(re.findall(r"(?<!\\)&", row)) + 1 for row in rows if "multicolumn" not in row} == {
+            len(kinds)
+        }
+        assert not re.search(r"(?<!\\)[%#_]", text)
+
+
+def test_a_table_for_latex_escapes_its_texts_and_aligns_numbers():
+    assert latex_table("Table 2. a_b", "x", [["p", "q"], ["2·10⁻⁶", "−0.1 & –"], ["part", ""]]).splitlines()[2:9] == [
+        r"\caption{a\_b}", r"\label{tab:x}", r"\begin{tabular}{rl}", r"\toprule", r"p & q \\", r"\midrule",
+        r"2$\cdot10^{-6}$ & −0.1 \& -- \\",
+    ]  # fmt: skip
 
 
 def test_a_page_without_export_names_no_files(tiny_html):

@@ -20,7 +20,9 @@ def report(
     ] = None,
     figures: Annotated[
         Path | None,
-        typer.Option(metavar="DIR2", help="Folder for every figure as SVG and PDF, and every table as CSV."),
+        typer.Option(
+            metavar="DIR2", help="Folder for every figure as SVG and PDF, and every table as CSV and LaTeX."
+        ),
     ] = None,
     open_page: Annotated[bool, typer.Option("--open", help="Show the page in the browser.")] = False,
 ) -> None:

@@ -16,6 +16,7 @@ from realitygap.errors import RecordError
 from realitygap.records import write_whole
 from realitygap.report._comparisons import comparisons_frame
 from realitygap.report._formats import drawing_bytes
+from realitygap.report._latex import latex_table
 from realitygap.report._placed import figures_in
 from realitygap.report._species_figure import SpeciesCounts
 from realitygap.report._structures import structures_frame
@@ -32,7 +33,7 @@ class Exported:
     Attributes:
         folder: where.
         figures: names without ending; each is there as SVG and as PDF.
-        tables: names of the CSV files that hold the page's tables as shown.
+        tables: names of the CSV files that hold the page's tables as shown; numbered ones are there as .tex, too.
         data: names of those that hold numbers behind figures, in full precision.
     """
 
@@ -43,7 +44,9 @@ class Exported:
 
 
 def export_page(folder: Path, tally: Tally, content: Mapping[str, Any], page: str) -> Exported:
-    """Write every figure as SVG and PDF and every table as CSV, each file whole or not at all.
+    """Write every figure as SVG and PDF and every table as CSV, numbered ones also as LaTeX.
+
+    Each file is written whole or not at all.
 
     Args:
         folder: where; made when it is not there. Files of other names in it stay.
@@ -76,7 +79,12 @@ def export_page(folder: Path, tally: Tally, content: Mapping[str, Any], page: st
     for name, caption, rows in tables_of(page):
         write_whole(folder / f"{name}.csv", _csv(rows), within=folder)
         tables.append(f"{name}.csv")
-        notes.append(f"{name}.csv\n    {caption}")
+        names = f"{name}.csv"
+        if name.startswith("table-"):
+            latex = latex_table(caption, name.removeprefix("table-"), rows)
+            write_whole(folder / f"{name}.tex", latex.encode("utf-8", "replace"), within=folder)
+            names += f", {name}.tex"
+        notes.append(f"{names}\n    {caption}")
     data = []
     for name, caption, frame in _frames(tally, content):
         write_whole(folder / f"{name}.csv", frame.write_csv().encode("utf-8"), within=folder)

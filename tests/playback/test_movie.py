@@ -190,11 +190,11 @@ def test_an_mp4_plays_as_long_as_the_trial(tmp_path):
 
 
 def test_without_ffmpeg_an_mp4_is_refused_in_one_sentence(tmp_path, monkeypatch):
-    monkeypatch.setattr(_movie.shutil, "which", lambda name: None)
+    monkeypatch.setattr(_movie.shutil, "which", lambda name, path=None: None)
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
     with pytest.raises(RealityGapError, match=r"needs the program ffmpeg.*(--extra |\[)video"):
         save_movie(straight(), tmp_path / "a.mp4")
-    monkeypatch.setattr(_movie.shutil, "which", lambda name: "/bin/false")
+    monkeypatch.setattr(_movie.shutil, "which", lambda name, path=None: "/bin/false")
     with pytest.raises(RealityGapError, match="did not make the movie"):
         save_movie(straight(), tmp_path / "a.mp4")
     assert not list(tmp_path.iterdir())

@@ -66,8 +66,6 @@ population = 3
 generations = 2
 [platform.scribbler]
 steps = 4
-[platform.sim]
-steps = 4
 [[condition]]
 name = "robot"
 platform = "scribbler"
@@ -76,7 +74,7 @@ platform = "scribbler"
 
 @pytest.mark.slow
 def test_champions_keep_their_inputs_and_meet_targets_that_lack_them(tmp_path: Path) -> None:
-    study = parse_study(TASK + _SMALL.replace('"scribbler"', '"sim"'), "small.toml")
+    study = parse_study(TASK + _SMALL.replace("scribbler", "sim"), "small.toml")
     folder = run_study(study, tmp_path / "sim", threads=1).folder
     (champion,) = sample_controllers(folder.path, 1, 1)
     assert champion.genome.interface.inputs == INPUTS
@@ -85,5 +83,5 @@ def test_champions_keep_their_inputs_and_meet_targets_that_lack_them(tmp_path: P
 
 
 def _random(tmp_path: Path) -> Path:
-    text = TASK + _SMALL.replace('"scribbler"', '"sim"') + 'selection = "random"\n'
+    text = TASK + _SMALL.replace("scribbler", "sim") + 'selection = "random"\n'
     return run_study(parse_study(text, "small.toml"), tmp_path / "random", threads=1).folder.path

@@ -6,6 +6,7 @@ port ends it.
 
 from __future__ import annotations
 
+import socket
 import weakref
 from urllib.parse import parse_qsl, urlsplit
 
@@ -32,6 +33,7 @@ class PlaygroundPort(SocketPort):  # type: ignore[misc]  # pyserial has no types
 
     witness: Playground | None = None
     arena: Arena | None = None
+    _socket: socket.socket | None = None  # pyserial sets it when it connects, and closes ports that never did
 
     def open(self) -> None:
         """Start the playground and connect to its robot.

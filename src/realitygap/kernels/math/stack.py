@@ -46,7 +46,7 @@ def member_of(kind: type[T]) -> Callable[[T, int], T]:
             space[f"take_{name}"] = member_of(hint)
             parts.append(f"take_{name}(stack.{name}, k)")
         else:
-            parts.append(f"stack.{name}[k]" if typing.get_origin(hint) is np.ndarray else f"stack.{name}")
+            parts.append(f"stack.{name}" if hint in (bool, int, float) else f"stack.{name}[k]")
     exec(f"def member(stack, k):\n    return kind({', '.join(parts)})\n", space)
     space["member"].__module__ = __name__
     kernel: Callable[[T, int], T] = inlined(space["member"])

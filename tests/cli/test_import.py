@@ -159,6 +159,29 @@ def test_motion_is_fitted_to_a_log_and_compared(log, tmp_path):
 
 
 @pytest.mark.slow
+def test_motion_is_fitted_to_all_trials_of_a_log(log, tmp_path):
+    """The longest trial was the only one that counted. Here it stands still but for a moment."""
+    (tmp_path / "drive.map.toml").write_text(f'trial = "trial"\n{MAP}', "utf-8")
+    tables = []
+    for number, n in enumerate((120, 160, 120, 12)):
+        commands, poses = drive(n, seed=number, noise=0.002)
+        if n == 160:
+            commands[20:], poses[21:] = 0.0, poses[20]
+        table = rows(commands / 1.1, poses)
+        tables.append(np.column_stack([np.full(len(table), number), table]))
+    write(log, np.concatenate(tables), "trial,t,left,right,x,y,heading")
+    fit = tmp_path / "fit.toml"
+    run("calibrate", "motion", "--from", log, "-o", fit)
+    made = load_calibration(fit)
+    assert made.trials == 3
+    assert any(note.startswith("The fit uses 3 of 4 trials. The others are too short") for note in made.notes)
+    assert made.evidence["held_out"]["measure"].endswith("mean of 3 trials")
+    gain = {each.name: each for each in made.fitted}["drive.gain"]
+    assert gain.estimate == pytest.approx(1.1, abs=0.02)
+    assert gain.identified
+
+
+@pytest.mark.slow
 def test_blocks_of_a_log_are_each_predicted(log, tmp_path):
     write(log, rows(*drive(160, seed=3, noise=0.002)))
     fit = tmp_path / "fit.toml"

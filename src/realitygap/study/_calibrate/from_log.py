@@ -1,7 +1,8 @@
-"""A calibration of a drive to a log that another program wrote."""
+"""A calibration of a drive to the trials of a log that another program wrote."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -9,7 +10,15 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from realitygap.calibration import HeldOut, MotionLogFit, drive_on, fit_motion_log, look_up_motion
+from realitygap.calibration import (
+    HeldOut,
+    MotionLog,
+    MotionLogFit,
+    drive_on,
+    fit_motion_logs,
+    look_up_motion,
+    motion_log,
+)
 from realitygap.errors import StudyError
 from realitygap.logs import Diagnosis, Log, LogMap, diagnose, mapping_of, read_logs, robot_of
 from realitygap.platforms import JyroPlatform
@@ -26,6 +35,7 @@ FEWEST_STEPS = 20
 """Of a log: fewer tell nothing of a half that is held out."""
 NOISE_DRAWS = 100
 N_SPEEDS = 3
+LEFT_OUT = " The others are too short, stand still, or show no poses or encoders."
 HARMLESS = ("half track", "double track", "clock", "heading offset")
 """Mistakes that a fit survives: they are noted."""
 
@@ -48,8 +58,9 @@ def calibrate_from_log(
         path: The log.
         map_file: Its mapping; that next to the log, or a guess by the names of its columns, if not given.
         base: The robot that drove, by name or file; as the mapping says if not given.
-        hold_out: What the fit does not see. A share: the end of the log. blocks: the log is cut into four, each is
-            fitted in its first half and predicted in its second, and the numbers are those of a fit to everything.
+        hold_out: The part that the fit does not see. A share: the end of each trial; a trial that is too short is seen
+            wholly. blocks: each trial is cut into four, each is fitted in its first half and predicted in its second,
+            and the numbers are those of a fit to everything.
         seed: Of draws.
         step_s: Length of a step, in place of the mapping's [s].
         drop_bad_rows: Whether rows with mistakes are left out.
@@ -62,31 +73,36 @@ def calibrate_from_log(
     if step_s is not None:
         log_map = log_map.model_copy(update={"step_s": step_s})
     name, robot = robot_of(log_map, None if base is None else str(base))
-    log, n_logs = _longest(path, log_map, robot, drop_bad_rows=drop_bad_rows)
-    diagnosis = diagnose(log, robot.drive.speed, robot.drive.track)
+    logs, n_logs = _usable(path, log_map, robot, drop_bad_rows=drop_bad_rows)
+    longest = max(logs, key=lambda log: len(log.commands))
+    diagnosis = diagnose(longest, robot.drive.speed, robot.drive.track)
     _refuse_mistakes(path, diagnosis)
-    fit, compared = _fit(path, log, robot, hold_out, seed)
-    notes = [f"Mapping: {origin}.", *log.notes, *_notes(diagnosis), *fit.notes]
+    fit, compared = _fit(path, logs, robot, hold_out, seed)
+    rows = dict.fromkeys(note for log in logs for note in log.notes)
+    notes = [f"Mapping: {origin}.", *rows, *_notes(diagnosis), *fit.notes]
     if n_logs > 1:
-        notes.append(f"The fit uses the longest of {n_logs} trials{f', {log.name}' if log.name else ''}.")
+        notes.append(f"The fit uses {len(logs)} of {n_logs} trials.{LEFT_OUT if len(logs) < n_logs else ''}")
     given = {"drive.speed": log_map.speed, "drive.track": log_map.track}
     parts = Parts(fit.fitted, fit.numbers, fit.draws, fit.method, tuple(notes), evidence=fit.evidence)
     parts = chosen_parts(parts, compared, {key: value for key, value in given.items() if value})
-    observe: Observe = "track" if len(log.poses) else "encoders"
+    observe: Observe = "track" if len(longest.poses) else "encoders"
     arena = log_map.arena or "open"
     made = calibration_of("motion", parts, name, str(path), log_map.label, observe, (), arena, seed)
-    more = {"trials": 1, "step_s": round(log.step_s, 4), "measured": measured_at(Path(path))}
+    more = {"trials": len(logs), "step_s": round(longest.step_s, 4), "measured": measured_at(Path(path))}
     return made.model_copy(update=more)
 
 
-def _longest(path: str | Path, log_map: LogMap, robot: RobotModel, *, drop_bad_rows: bool) -> tuple[Log, int]:
-    """The longest trial of a log, and the number of its trials."""
-    longest, n = None, 0
-    for log in read_logs(path, log_map, robot, drop_bad_rows=drop_bad_rows):
-        n += 1
-        if longest is None or len(log.commands) > len(longest.commands):
-            longest = log
-    if longest is None or not (len(longest.poses) or len(longest.wheels)):
+def _usable(
+    path: str | Path, log_map: LogMap, robot: RobotModel, *, drop_bad_rows: bool
+) -> tuple[list[Log], int]:
+    """Return the trials of a log that a fit can use, and the number of all.
+
+    Raises:
+        StudyError: None can be used; the message names what the longest lacks.
+    """
+    every = list(read_logs(path, log_map, robot, drop_bad_rows=drop_bad_rows))
+    longest = max(every, key=lambda log: len(log.commands), default=None)
+    if longest is None or not any(len(log.poses) or len(log.wheels) for log in every):
         raise StudyError(
             f"{path} has commands alone. Expected poses or encoders, too: add [poses] or [wheels] to the mapping."
         )
@@ -95,7 +111,19 @@ def _longest(path: str | Path, log_map: LogMap, robot: RobotModel, *, drop_bad_r
             f"{path} has {len(longest.commands)} steps of {longest.step_s:.3g} s, expected at least {FEWEST_STEPS}. "
             "Record more, or choose a shorter step_s."
         )
-    return longest, n
+    usable = []
+    error = None
+    for log in every:
+        try:
+            _motion_log(log)
+        except ValueError as problem:
+            error = problem if log is longest else error
+        else:
+            if len(log.commands) >= FEWEST_STEPS:
+                usable.append(log)
+    if not usable:
+        raise StudyError(f"{path}: {error}")
+    return usable, len(every)
 
 
 def _refuse_mistakes(path: str | Path, diagnosis: Diagnosis) -> None:
@@ -118,24 +146,41 @@ def _notes(diagnosis: Diagnosis) -> list[str]:
 
 
 def _fit(
-    path: str | Path, log: Log, robot: RobotModel, hold_out: HoldOut, seed: int
+    path: str | Path, logs: Sequence[Log], robot: RobotModel, hold_out: HoldOut, seed: int
 ) -> tuple[MotionLogFit, Compared | None]:
-    """The fit, and the errors on what it did not see."""
+    """Return the fit to all trials, and the errors on the parts that a fit did not see."""
     try:
         if hold_out != "blocks":
-            fit = _fit_one(log, robot, hold_out, seed)
-            return fit, None if fit.held_out is None else _compare(log, robot, fit.held_out, hold_out, seed)
-        n = len(log.commands)
-        edges = np.linspace(0, n, BLOCKS + 1).astype(int)
-        found = []
-        for first, end in pairwise(edges):
-            part = _part(log, int(first), int(end))
-            held_out = _fit_one(part, robot, 0.5, seed).held_out
-            if held_out is not None:
-                found.append(_compare(part, robot, held_out, 0.5, seed))
-        return _fit_one(log, robot, 0.0, seed), _joined(found)
+            fit = _fit_to(logs, robot, hold_out, seed)
+            errors = [
+                _compare(log, robot, held_out, hold_out, seed)
+                for log, held_out in zip(logs, fit.by_log, strict=True)
+                if held_out is not None
+            ]
+            return fit, _joined(errors, "trials")
+        errors = [block for log in logs for block in _blocks(log, robot, seed)]
+        if not errors:
+            n = max(len(log.commands) for log in logs)
+            raise ValueError(
+                f"The longest trial has {n} steps, too few for {BLOCKS} blocks. Hold out a share."
+            )
+        return _fit_to(logs, robot, 0.0, seed), _joined(errors, "blocks")
     except ValueError as error:
         raise StudyError(f"{path}: {error}") from None
+
+
+def _blocks(log: Log, robot: RobotModel, seed: int) -> list[Compared]:
+    """Return the errors on the second half of each part of a trial; none if its parts are too short."""
+    errors = []
+    for first, end in pairwise(np.linspace(0, len(log.commands), BLOCKS + 1).astype(int)):
+        part = _part(log, int(first), int(end))
+        try:
+            (held_out,) = _fit_to([part], robot, 0.5, seed).by_log
+        except ValueError:
+            continue
+        if held_out is not None:
+            errors.append(_compare(part, robot, held_out, 0.5, seed))
+    return errors
 
 
 def _part(log: Log, first: int, end: int) -> Log:
@@ -155,12 +200,13 @@ def _arrays(log: Log) -> tuple[Floats, Floats, Floats | None]:
     return log.time_s, commands, log.poses if log.has_heading else log.poses[:, :2]
 
 
-def _fit_one(log: Log, robot: RobotModel, hold_out: float, seed: int) -> MotionLogFit:
+def _motion_log(log: Log) -> MotionLog:
     time_s, commands, poses = _arrays(log)
-    encoders = log.wheels if len(log.wheels) else None
-    return fit_motion_log(
-        time_s, commands, robot, poses=poses, encoders=encoders, hold_out=hold_out, seed=seed
-    )
+    return motion_log(time_s, commands, poses=poses, encoders=log.wheels if len(log.wheels) else None)
+
+
+def _fit_to(logs: Sequence[Log], robot: RobotModel, hold_out: float, seed: int) -> MotionLogFit:
+    return fit_motion_logs([_motion_log(log) for log in logs], robot, hold_out=hold_out, seed=seed)
 
 
 def _split(time_s: Floats, hold_out: float) -> int:
@@ -226,18 +272,21 @@ def _wheel_baselines(
     }
 
 
-def _joined(found: list[Compared]) -> Compared | None:
-    """The errors of several blocks as their mean, weighted by observations."""
-    if not found:
+def _joined(errors: Sequence[Compared], parts: str) -> Compared | None:
+    """Return the mean errors of several trials or blocks, weighted by observations."""
+    if not errors:
         return None
-    n = sum(each.n for each in found)
+    if len(errors) == 1 and parts == "trials":
+        return errors[0]
+    n = sum(each.n for each in errors)
 
     def mean(rows: list[tuple[int, float]]) -> float:
         return sum(weight * value for weight, value in rows) / sum(weight for weight, _ in rows)
 
-    errors = {name: mean([(each.n, each.errors[name]) for each in found]) for name in found[0].errors}
+    first = errors[0]
+    means = {name: mean([(each.n, each.errors[name]) for each in errors]) for name in first.errors}
     more = {
-        key: {name: mean([(each.n, each.more[key][name]) for each in found]) for name in found[0].more[key]}
-        for key in found[0].more
+        key: {name: mean([(each.n, each.more[key][name]) for each in errors]) for name in first.more[key]}
+        for key in first.more
     }
-    return Compared(f"{found[0].measure}, mean of {len(found)} blocks", found[0].unit, n, errors, more)
+    return Compared(f"{first.measure}, mean of {len(errors)} {parts}", first.unit, n, means, more)

@@ -6,6 +6,7 @@ import difflib
 import operator
 from collections.abc import Iterable
 from importlib import import_module
+from importlib.util import find_spec
 from numbers import Real
 from typing import Any
 
@@ -98,12 +99,26 @@ def from_extra(module: str, extra: str) -> Any:
     except ImportError as error:
         if isinstance(error.__cause__ or error.__context__, KeyboardInterrupt):
             raise KeyboardInterrupt from error
-        from realitygap._how_to_run import install_command  # here, because every command imports this module
+        raise _missing(module, extra, f"cannot be imported ({error})") from error
 
-        raise MissingExtraError(
-            f"This needs {module.partition('.')[0]}, which comes with the extra '{extra}' and cannot be imported "
-            f"({error}). Install it: {install_command(extra)}"
-        ) from error
+
+def require_extra(module: str, extra: str) -> None:
+    """Refuse work for which another process will need an extra, before any of it is done.
+
+    Raises:
+        MissingExtraError: The module is not installed; the text has the command that installs it.
+    """
+    if find_spec(module) is None:
+        raise _missing(module, extra, "is not installed")
+
+
+def _missing(module: str, extra: str, problem: str) -> MissingExtraError:
+    from realitygap._how_to_run import install_command  # here, because every command imports this module
+
+    return MissingExtraError(
+        f"This needs {module.partition('.')[0]}, which comes with the extra '{extra}' and {problem}. Install it: "
+        f"{install_command(extra)}"
+    )
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:

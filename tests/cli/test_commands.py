@@ -473,6 +473,8 @@ def test_message_shows_control_characters_of_a_file_as_escapes(tmp_path):
         ),
         (("gap", "rover.toml", "jyro"), "write sim:rover.toml"),
         (("robot", "drive", "sim", "1"), "use emulator://s2"),
+        (("new-study", "paper"), "To copy the study paper: realitygap new-study my-study.toml --from paper"),
+        (("try", ".", "--on", "jyro"), "Export one: realitygap export . -o champion.json"),
     ],
 )
 def test_what_newcomers_type_gets_a_command_that_works(words, expected):

@@ -296,7 +296,10 @@ def test_arenas_by_name_begin_where_their_files_say_unless_a_study_does():
     ("values", "says"),
     [
         ({"preset": "papr"}, "ArenaSettings.preset: expected avoid, goal, "),
-        ({"preset": "goal", "start": "left"}, "ArenaSettings.start: is only for the paper's arena, expected"),
+        (
+            {"preset": "goal", "start": "left"},
+            "ArenaSettings.start: is only for the paper's arena. Remove it",
+        ),
         ({"file": "none.toml"}, "ArenaSettings.file: There is no arena file none.toml."),
         ({"preset": "goal", "file": "none.toml"}, "no arena file"),
         ({"start": [5.0, 0.1, 0.0]}, "start lies outside the arena: expected 0 < x < 1.0668"),

@@ -36,15 +36,19 @@ Json = Annotated[bool, typer.Option("--json", help="Print data as JSON.")]
 
 LONGEST_DRIVE_S = 3600.0
 
+_NO_PORTS = ("sim", "jyro", "enki", "emulator", "scribbler", "thymio")
+"""Words for robots that newcomers give as a port."""
+
 
 @contextmanager
 def _opened(port: str, record: Path | None) -> Iterator[tuple[Any, Any]]:
     """The functions of the robot's family and the robot on a port, stopped and let go of in the end."""
     from realitygap.robots import is_in_this_program
 
-    if port in ("sim", "jyro"):
+    if port in _NO_PORTS:
         raise RobotError(
-            f"{port} is a simulator, which has no port. For an emulated robot, use emulator://s2."
+            f"{port} is no port. For an emulated robot, use emulator://s2. `realitygap robot list` lists the ports of "
+            "this machine."
         )
     if port.startswith("recording:"):
         raise RobotError(f"{port} is a recording: `realitygap robot show-recording` shows it.")

@@ -157,11 +157,13 @@ def new_study(
 
     In Python: realitygap.study.study_template("my-study")
     """
-    from realitygap.study import study_template
+    from realitygap.study import named_studies, study_template
 
     if path.suffix != ".toml":
+        copy = f" To copy the study {path}: realitygap new-study my-study.toml --from {path}"
         raise StudyError(
             f"{path} does not end in .toml. Expected the name of a study file, such as my-study.toml."
+            + (copy if str(path) in named_studies() else "")
         )
     text = study_template(_as_name(path.stem), source)
     try:

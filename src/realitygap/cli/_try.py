@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 import statistics
 from pathlib import Path
 from typing import Annotated
@@ -79,6 +80,11 @@ def try_genome(
 
     if observe not in OBSERVATIONS:
         raise StudyError(f"Unknown observation {observe!r}. {did_you_mean(observe, OBSERVATIONS)}")
+    if genome.is_dir():
+        raise StudyError(
+            f"{genome} is a folder, expected a genome. Export one: realitygap export {shlex.quote(str(genome))} -o "
+            "champion.json"
+        )
     controller = Genome.load(genome)
     if inputs is not None or outputs is not None:
         seen = controller.interface.inputs if inputs is None else _names(inputs)

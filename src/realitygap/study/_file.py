@@ -105,9 +105,16 @@ def _load_study(study: str | Path, seed: int | None, replicates: int | None) -> 
             raise StudyError(
                 f"There is no file {path}. `realitygap new-study {shlex.quote(str(path))}` writes one to start from."
             )
+        if name and path.with_suffix(".toml").exists():
+            raise StudyError(f"Unknown study {name!r}. Did you mean the file {path.with_suffix('.toml')}?")
         raise StudyError(
             f"Unknown study {name!r}. {did_you_mean(name, named_studies())} A file of your own ends in .toml; "
             "`realitygap new-study` writes one."
+        )
+    if path.joinpath("study.json").is_file():
+        raise StudyError(
+            f"{path} is a folder of results, expected a study by name or its file. To look at the results: realitygap "
+            f"report {shlex.quote(str(path))}"
         )
     try:
         text = read_file(path, MOST_TOML_BYTES).decode("utf-8")

@@ -101,7 +101,8 @@ class ArenaSettings(Settings):
     @classmethod
     def _is_known(cls, preset: str) -> str:
         if preset not in arena_names():
-            raise ValueError(f"expected {', '.join(arena_names())}")
+            hint = f". Name a file by file = {preset!r}" if preset.endswith(".toml") else ""
+            raise ValueError(f"expected {', '.join(arena_names())}{hint}")
         return preset
 
     @field_validator("file")
@@ -124,7 +125,9 @@ class ArenaSettings(Settings):
         arena = _arena_of(info.data["preset"], info.data["read"])
         if isinstance(start, str):
             if info.data["read"] is not None or arena.name != "paper":
-                raise ValueError("is only for the paper's arena, expected [x, y, heading]")
+                raise ValueError(
+                    "is only for the paper's arena. Remove it to start where the arena says, or write [x, y, heading]"
+                )
             return start
         x, y, heading = start
         if enclosing_walls(arena.walls) and not is_inside(arena, x, y):

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, ClassVar, Self
 
 from pydantic import Field
 
+from realitygap.errors import require_extra
 from realitygap.evolution import ControllerInterface, inputs_of_robot
 from realitygap.robots import Robot
 from realitygap.trials import PlatformTrials, Target
@@ -93,6 +94,7 @@ class TwinPlatform(Platform):
 
     def open(self, arena: Arena, how: Opening) -> Target:
         """Open the twin for trials one by one, in separate processes."""
+        require_extra("mujoco", "twin")
         return TwinTarget(self.file, arena, how.processes, name=how.name)
 
     def prepare(
@@ -100,6 +102,7 @@ class TwinPlatform(Platform):
     ) -> PlatformTrials:
         """Set the twin up for many trials, shared among processes."""
         self.check_noise(noise)
+        require_extra("mujoco", "twin")
         pool = shared_pool(self.file, self.sha256, arena)
         known = inputs_of_robot(pool.n_sensors, pool.channels)
         ControllerInterface(tuple(inputs)).check(known, "A network", f"twin {self.file}")

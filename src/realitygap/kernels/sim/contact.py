@@ -209,7 +209,8 @@ def _resolve(shape, lanes, near):
             part += 1  # Jyro looks where a step ends, and not before it turns there
             continue
         if part == last and shape.enclosed:
-            clearance(shape, p, near.pose, near, near.active, near.first.gap)
+            # Straight pushes turn nothing.
+            clearance(shape, p, near.pose, sweep == 0, near, near.active, near.first.gap)
             if shape.row_shape.size == 0 and count_touching(near.first.gap) == 0:
                 break
             choose_walls(shape, p, near)
@@ -326,7 +327,7 @@ def settle(shape, lanes, near):
     pose, proposed, low = lanes.pose, lanes.proposed, lanes.low
     to_axles(proposed, lanes.p[shape.row_drive + AXLE], near.pose)
     fill(near.active, low.dtype.type(1.0))
-    clearance(shape, lanes.p, near.pose, near, near.active, low)
+    clearance(shape, lanes.p, near.pose, True, near, near.active, low)
     if shape.contact == FREEZE and shape.row_shape.size == 0:
         _note_stalls(low, lanes.stalled, lanes.n_stalls)
         keep_where_low(low, pose.x, proposed.x)

@@ -100,10 +100,11 @@ class Near(NamedTuple):
     active: Row  # above 0 where contact is of interest
     low: Row  # the least gap met so far
     give: Rows  # (4,) what the body gives when it is pushed: `unsaturated` of `_sim_push`
-    pushes: Rows  # (23,) room of `give_way` of `_sim_push`
+    pushes: Rows  # (28,) room of `give_way`
     moved: Rows  # (5,) how it is pushed free: `give_way`
     effort: Rows  # (4,) asked for, as lengths: straight on and by turning; carried out: length and turn
     gaps: Rows  # (n_walls,) how far the body is from each wall [m]
+    heights: Rows  # (n_walls * parts,) how low the lowest corner of each part is along each wall's normal [m]
     walls: Rows  # (8,) of the nearest two: normal x, y, offset and gap
     seen: Rows  # (5 * most corners of an obstacle + 1,) its corners and normals from the body, and its radius
     met: Rows  # likewise, of the obstacle that each body is about to meet
@@ -161,10 +162,11 @@ def make_near(shape, dtype):
         active=row(),
         low=row(),
         give=rows(4),
-        pushes=rows(23),
+        pushes=rows(28),
         moved=rows(5),
         effort=rows(4),
         gaps=rows(shape.n_walls),
+        heights=rows(shape.n_walls * shape.part_corners.size),
         walls=rows(8),
         seen=rows(5 * int(shape.shape_corners.max(initial=1)) + 1),
         met=rows(5 * int(shape.shape_corners.max(initial=1)) + 1),

@@ -168,23 +168,20 @@ def _turn_alone(first, friction, give, pose, before, spins):
 
 
 @stage
-def _see_halfway(contact, give, pose, before, spins, half_sine, half_cosine, held):
-    """A contact with bodies halfway through their motion with the push of `_turn_alone`.
+def _stand_halfway(pose, before, spins, half_sine, half_cosine, halfway):
+    """Bodies halfway through their motion with the push of `_turn_alone`.
 
     Args:
-        contact, give, pose, before: Of `give_way`.
+        pose, before: Of `give_way`.
         spins: Of `_turn_alone`.
         half_sine, half_cosine: Written: of the heading halfway.
-        held: (8, LANES) written: normal; torques of normal and tangent; what the body gives; slip.
+        halfway: (5, LANES) written: sine and cosine of the turn to there; the motion along and across [m], and around
+            [rad].
     """
     x, y, heading, sine, cosine = pose.x, pose.y, pose.heading, pose.sine, pose.cosine
     old_x, old_y, old_heading = before.x, before.y, before.heading
-    gap, facing, beside, corner_x, corner_y, rounding = contact
-    along, across, around, both = give[0], give[1], give[2], give[3]
-    to_a, to_b, to_n, to_t, to_nn, to_tt, to_nt, to_slip = (
-        held[0], held[1], held[2], held[3], held[4], held[5], held[6], held[7],
-    )  # fmt: skip
-    real = gap.dtype.type
+    to_s, to_c, along, across, around = halfway[0], halfway[1], halfway[2], halfway[3], halfway[4]
+    real = half_sine.dtype.type
     for k in range(LANES):
         d_x = x[k] - old_x[k]
         d_y = y[k] - old_y[k]
@@ -192,15 +189,38 @@ def _see_halfway(contact, give, pose, before, spins, half_sine, half_cosine, hel
         turned = (turned - np.floor(turned + real(0.5))) * real(TWO_PI)
         by_s, by_c = sin_cos_of_small(_between(real(0.5) * (spins[k] - turned)))
         h_s, h_c = turned_by(sine[k], cosine[k], by_s, by_c)
-        m_x = d_x * h_c + d_y * h_s
-        m_y = d_y * h_c - d_x * h_s
+        to_s[k] = by_s
+        to_c[k] = by_c
+        along[k] = d_x * h_c + d_y * h_s
+        across[k] = d_y * h_c - d_x * h_s
+        around[k] = turned
+        half_sine[k] = h_s
+        half_cosine[k] = h_c
+
+
+@stage
+def _see_halfway(contact, give, halfway, held):
+    """A contact with bodies as `_stand_halfway` has them.
+
+    Args:
+        contact, give: Of `give_way`.
+        halfway: Of `_stand_halfway`.
+        held: (8, LANES) written: normal; torques of normal and tangent; what the body gives; slip.
+    """
+    facing, beside, corner_x, corner_y, rounding = contact[1:]
+    along, across, around, both = give[0], give[1], give[2], give[3]
+    to_s, to_c, go_x, go_y, turned = halfway[0], halfway[1], halfway[2], halfway[3], halfway[4]
+    to_a, to_b, to_n, to_t, to_nn, to_tt, to_nt, to_slip = (
+        held[0], held[1], held[2], held[3], held[4], held[5], held[6], held[7],
+    )  # fmt: skip
+    for k in range(LANES):
+        by_s = to_s[k]
+        by_c = to_c[k]
         a = by_c * facing[k] + by_s * beside[k]
         b = by_c * beside[k] - by_s * facing[k]
         turn_n = corner_x[k] * b - corner_y[k] * a
         turn_t = corner_x[k] * a + corner_y[k] * b - rounding[k]
         nn, tt, nt = _gives(along[k], across[k], around[k], both[k], a, b, turn_n, turn_t)
-        half_sine[k] = h_s
-        half_cosine[k] = h_c
         to_a[k] = a
         to_b[k] = b
         to_n[k] = turn_n
@@ -208,7 +228,7 @@ def _see_halfway(contact, give, pose, before, spins, half_sine, half_cosine, hel
         to_nn[k] = nn
         to_tt[k] = tt
         to_nt[k] = nt
-        to_slip[k] = m_y * a - m_x * b + turned * turn_t
+        to_slip[k] = go_y[k] * a - go_x[k] * b + turned[k] * turn_t
 
 
 @stage
@@ -274,14 +294,15 @@ def give_way(first, second, friction, give, pose, before, pushes, moved):
         friction: Coefficient.
         give: (4, LANES) of `unsaturated` or `saturated`.
         pose, before: Now, and before the motion.
-        pushes: (23, LANES) room.
+        pushes: (28, LANES) room.
         moved: (5, LANES) written: along and across [m], around [rad], sine and cosine of the heading halfway.
     """
     real = first.gap.dtype.type
-    held, next_held, one, two = pushes[:8], pushes[8:16], pushes[16:19], pushes[19:22]
-    _turn_alone(first, friction, give, pose, before, pushes[22])
-    _see_halfway(first, give, pose, before, pushes[22], moved[3], moved[4], held)
-    _see_halfway(second, give, pose, before, pushes[22], moved[3], moved[4], next_held)
+    held, next_held, one, two, halfway = pushes[:8], pushes[8:16], pushes[16:19], pushes[19:22], pushes[22:27]
+    _turn_alone(first, friction, give, pose, before, pushes[27])
+    _stand_halfway(pose, before, pushes[27], moved[3], moved[4], halfway)
+    _see_halfway(first, give, halfway, held)
+    _see_halfway(second, give, halfway, next_held)
     for k in range(3):
         fill(two[k], real(0.0))
     for _ in range(2):

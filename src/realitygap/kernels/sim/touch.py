@@ -131,19 +131,13 @@ def _deeper_in_shape(found, r, radius, within, counts, first, second, lane):
 
 
 @inlined
-def _see_shape(shape, p, near, q, lane):
-    """Write the corners of an obstacle, as bodies see them, into `near.seen`; return which bodies it may be near.
+def _see_shape(shape, p, near, q, seen, lane):
+    """Write the corners of an obstacle, as bodies see them, into `seen`; return which bodies it may be near.
 
     That is where the boxes around both are not apart along the axes of the body or the normals of the obstacle.
     """
     real = p.dtype.type
-    pose, seen, m, first, bounds = (
-        near.pose,
-        near.seen,
-        shape.shape_corners[q],
-        shape.row_shape[q],
-        shape.row_bounds,
-    )
+    pose, m, first, bounds = near.pose, shape.shape_corners[q], shape.row_shape[q], shape.row_bounds
     from_x, from_y = load_row(pose.x, lane), load_row(pose.y, lane)
     sine, cosine = load_row(pose.sine, lane), load_row(pose.cosine, lane)
     least_x, most_x = load(p, bounds, lane), load(p, bounds + 1, lane)
@@ -233,19 +227,22 @@ def _touch_shapes(shape, p, near, first, stop, lane):
     Most bodies are near at most one of them. So all lanes meet their first at the same time, then their second.
     """
     real = p.dtype.type
-    m, seen, met = shape.shape_corners[first], near.seen, near.met
+    m, met = shape.shape_corners[first], near.met
     before = spread(real(-1.0))
     while True:
         now, is_last = before, True
         for q in range(first, stop):
+            # What the first one leaves in other lanes, the next ones replace, or nothing reads.
+            seen = met if q == first else near.seen
             number = spread(real(q))
-            waits = _see_shape(shape, p, near, q, lane) & (number > before)
+            waits = _see_shape(shape, p, near, q, seen, lane) & (number > before)
             takes = waits & (now == before)
             is_last = is_last and not any_of(waits & (now > before))
             if any_of(takes):
                 now = pick(takes, number, now)
-                for row in range(PER_CORNER * m + 1):
-                    store(pick(takes, load(seen, row, lane), load(met, row, lane)), met, row, lane)
+                if q > first:
+                    for row in range(PER_CORNER * m + 1):
+                        store(pick(takes, load(seen, row, lane), load(met, row, lane)), met, row, lane)
         counts = now > before
         if any_of(counts):
             _touch_seen(shape, p, near, m, counts, lane)

@@ -27,13 +27,14 @@ def _see_plane(rows, row, pose, lane):
 
 
 @kernel
-def clearance(shape, p, pose, near, active, low):
+def clearance(shape, p, pose, turned, near, active, low):
     """How far bodies are from each wall of a room [m], below zero inside it.
 
     Args:
         shape, p: Structure and numbers.
         pose: Of the axles.
-        near: `gaps` is written.
+        turned: Whether headings may be others than at the last call. If not, `near.heights` has how low bodies reach.
+        near: `gaps` and `heights` are written.
         active: (LANES,) above 0 where it is of interest; `low` is written in vectors with such a lane.
         low: Written: the least of the gaps.
     """
@@ -46,8 +47,11 @@ def clearance(shape, p, pose, near, active, low):
             center, along, across = _see_plane(p, shape.row_plane + 3 * w, pose, lane)
             gap = spread(real(FAR))
             for part in range(shape.part_corners.size):
-                n = shape.part_corners[part]
-                height = low_height(p, shape.row_outline[part], n, along, across, lane)
+                n, row = shape.part_corners[part], shape.part_corners.size * w + part
+                if turned:
+                    height = low_height(p, shape.row_outline[part], n, along, across, lane)
+                    store(height, near.heights, row, lane)
+                height = load(near.heights, row, lane)
                 now = height + center - load(p, shape.row_part[part] + 2 * n, lane)
                 gap = pick(now < gap, now, gap)
             store(gap, near.gaps, w, lane)

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
+
+from realitygap.world import Fitted
 
 Choice = Literal["fitted", "nominal"]
 
@@ -35,3 +37,33 @@ class HeldOut:
     def recommended(self) -> Choice:
         """The numbers with the smaller error; nominal if both are equal."""
         return "fitted" if self.fitted < self.nominal else "nominal"
+
+
+@dataclass(frozen=True)
+class HeldOutFit:
+    """A fit to a recording, with its errors on the part that it did not see.
+
+    Attributes:
+        fitted: Parameters with 90 % intervals.
+        numbers: The estimate by the robot's dotted names.
+        draws: (d,) draws of each number, jointly.
+        held_out: Errors on the part that the fit did not see; None if it saw everything.
+        recommended: The numbers to use.
+        method: The method, with its source.
+        notes: Further results in words.
+        evidence: Data for figures.
+    """
+
+    fitted: tuple[Fitted, ...]
+    numbers: dict[str, float]
+    draws: dict[str, tuple[float, ...]]
+    held_out: HeldOut | None
+    recommended: Choice
+    method: str = ""
+    notes: tuple[str, ...] = ()
+    evidence: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def recommended_numbers(self) -> dict[str, float]:
+        """The fitted numbers, or none if those of the robot's file predict better."""
+        return dict(self.numbers) if self.recommended == "fitted" else {}

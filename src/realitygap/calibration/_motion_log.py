@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from realitygap.world import Fitted, RobotModel
 
-from ._held_out import Choice, HeldOut
+from ._held_out import HeldOut, HeldOutFit
 from ._log_model import MotionLog, encoder_likelihood, seen_rows, track, wheel_steps
 from ._simulate import Floats, plain_numbers
 
@@ -105,35 +105,17 @@ LEAST_NOISE = 0.002
 
 
 @dataclass(frozen=True)
-class MotionLogFit:
-    """A drive fitted to logs.
+class MotionLogFit(HeldOutFit):
+    """A drive fitted to logs; attributes as in `HeldOutFit`, and one more.
+
+    `evidence` has the predicted and seen path of the unseen part of the first log with one.
 
     Attributes:
-        fitted: Parameters with 90 % intervals.
-        numbers: The estimate by the robot's dotted names.
-        draws: (d,) draws of each number, jointly.
-        held_out: Errors on the parts that the fit did not see; None if it saw everything.
-        recommended: The numbers to use.
-        by_log: The same errors for each log; None for a log that the fit saw wholly.
-        method: The method, with its source.
-        notes: Further results in words.
-        evidence: Data for figures: the predicted and seen path of the unseen part of the first log with one.
+        by_log: Errors on the unseen part of each log; None for a log that the fit saw wholly.
     """
 
-    fitted: tuple[Fitted, ...]
-    numbers: dict[str, float]
-    draws: dict[str, tuple[float, ...]]
-    held_out: HeldOut | None
-    recommended: Choice
-    by_log: tuple[HeldOut | None, ...] = ()
     method: str = METHOD
-    notes: tuple[str, ...] = ()
-    evidence: dict[str, Any] = field(default_factory=dict)
-
-    @property
-    def recommended_numbers(self) -> dict[str, float]:
-        """The fitted numbers, or none if those of the robot's file predict better."""
-        return dict(self.numbers) if self.recommended == "fitted" else {}
+    by_log: tuple[HeldOut | None, ...] = ()
 
 
 def fit_motion_log(
@@ -217,7 +199,7 @@ def fit_motion_logs(
         {name: tuple(value.tolist()) for name, value in _robot_numbers(drawn).items()},
         held_out,
         held_out.recommended if held_out else "fitted",
-        by_log,
+        by_log=by_log,
         evidence=next((each[1] for each in predicted if each is not None), {}),
     )
 

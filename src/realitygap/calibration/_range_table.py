@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any, Literal
+from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from realitygap.world import Fitted, RobotModel
 
-from ._held_out import Choice, HeldOut
+from ._held_out import HeldOut, HeldOutFit
 from ._simulate import Bools, Floats, Ints
 
 MeasuredFrom = Literal["body", "origin", "sensor"]
@@ -81,33 +81,10 @@ LEAST = {"cone": 0.02, "incidence": 0.3, "compression": 0.3, "amplitude": 0.01, 
 
 
 @dataclass(frozen=True)
-class RangeTableFit:
-    """Range sensors fitted to a table.
+class RangeTableFit(HeldOutFit):
+    """Range sensors fitted to a table; attributes as in `HeldOutFit`."""
 
-    Attributes:
-        fitted: Parameters with 90 % intervals.
-        numbers: The estimate by the robot's dotted names.
-        draws: (d,) draws of each number, jointly.
-        held_out: Errors on the places that the fit did not see; None if it saw everything.
-        recommended: The numbers to use.
-        method: The method, with its source.
-        notes: Further results in words.
-        evidence: Data for figures.
-    """
-
-    fitted: tuple[Fitted, ...]
-    numbers: dict[str, float]
-    draws: dict[str, tuple[float, ...]]
-    held_out: HeldOut | None
-    recommended: Choice
     method: str = METHOD
-    notes: tuple[str, ...] = ()
-    evidence: dict[str, Any] = field(default_factory=dict)
-
-    @property
-    def recommended_numbers(self) -> dict[str, float]:
-        """The fitted numbers, or none if those of the robot's file predict better."""
-        return dict(self.numbers) if self.recommended == "fitted" else {}
 
 
 def fit_range_table(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, Self, TypeVar
 
 from pydantic import BeforeValidator, Field, model_validator
 
@@ -20,6 +20,7 @@ def _column(value: Any) -> Any:
 
 Column = Annotated[str, BeforeValidator(_column)]
 Sign = Literal[1, -1]
+Map = TypeVar("Map", bound=Settings)
 
 
 class TextFormat(Settings):
@@ -226,20 +227,39 @@ def load_log_map(path: str | Path) -> LogMap:
         LogError: The file cannot be read or has mistakes; the message has each with its place.
     """
     path = Path(path)
+    values = read_map(path)
+    for key in ("robot", "arena", "controller"):
+        name = values.get(key)
+        if isinstance(name, str) and name and (path.parent / name).is_file():
+            values[key] = str(path.parent / name)
+    return checked_map(LogMap, values, path)
+
+
+def read_map(path: Path) -> dict[str, Any]:
+    """Return the values in the TOML file of a mapping.
+
+    Raises:
+        LogError: The file cannot be read, or is not TOML.
+    """
     try:
-        values = parse_toml(read_file(path, MOST_TOML_BYTES).decode())
+        return parse_toml(read_file(path, MOST_TOML_BYTES).decode())
     except OSError as error:
         raise LogError(
             f"Cannot read the mapping {path}: {error.strerror or error}. Name a TOML file."
         ) from None
     except ValueError as error:
         raise LogError(f"{path}: it is not TOML: {error}.") from None
-    for key in ("robot", "arena", "controller"):
-        name = values.get(key)
-        if isinstance(name, str) and name and (path.parent / name).is_file():
-            values[key] = str(path.parent / name)
+
+
+def checked_map(kind: type[Map], values: dict[str, Any], path: Path) -> Map:
+    """Return the mapping with these values.
+
+    Raises:
+        LogError: It has mistakes; the message has each with its place.
+    """
     try:
-        return LogMap(**values)
+        return kind(**values)
     except ValueError as error:
-        lines = [line.removeprefix("LogMap.").removeprefix("LogMap: ") for line in str(error).split("\n")]
+        name = kind.__name__
+        lines = [line.removeprefix(f"{name}.").removeprefix(f"{name}: ") for line in str(error).split("\n")]
         raise LogError("\n".join(f"{path}: {line}" for line in lines)) from None

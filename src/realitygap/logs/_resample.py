@@ -6,6 +6,7 @@ The grid begins at the first command, and has a point every step.
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 
 import numpy as np
 
@@ -82,8 +83,8 @@ class HeldMean:
         return _padded(np.concatenate(self._parts), n)
 
 
-class Interpolated:
-    """Values at each point, by straight lines between samples; nan where samples are too far apart."""
+class _AtPoints(ABC):
+    """Values of a signal at each point; nan where no sample is near."""
 
     def __init__(self, grid: Grid, width: int) -> None:
         self._grid, self._parts, self._n = grid, [np.empty((0, width))], 0
@@ -100,13 +101,24 @@ class Interpolated:
             values = np.concatenate([self._last[1][None], values])
         end = self._grid.until(float(times[-1]))
         if end > self._n:
-            points = self._grid.times(self._n, end)
-            points[-1] = min(points[-1], times[-1])
-            self._parts.append(self._at(points, times, values))
+            self._parts.append(self._at(self._grid.times(self._n, end), times, values))
             self._n = end
         self._last = float(times[-1]), values[-1]
 
+    @abstractmethod
     def _at(self, points: Floats, times: Floats, values: Floats) -> Floats:
+        """Return (p, k) values at (p,) points, from (b,) times and (b, k) values."""
+
+    def rows(self, n: int) -> Floats:
+        """(n, k) the values at the first n points; nan beyond the last sample."""
+        return _padded(np.concatenate(self._parts), n)
+
+
+class Interpolated(_AtPoints):
+    """Values at each point, by straight lines between samples; nan where samples are too far apart."""
+
+    def _at(self, points: Floats, times: Floats, values: Floats) -> Floats:
+        points[-1] = min(points[-1], times[-1])
         after = np.clip(np.searchsorted(times, points - 1e-6 * self._grid.step_s), 0, len(times) - 1)
         before = np.maximum(after - 1, 0)
         at = np.stack([np.interp(points, times, values[:, k]) for k in range(values.shape[1])], 1)
@@ -117,40 +129,15 @@ class Interpolated:
         at[~is_known] = np.nan
         return at
 
-    def rows(self, n: int) -> Floats:
-        """(n, k) the values at the first n points; nan beyond the last sample."""
-        return _padded(np.concatenate(self._parts), n)
 
-
-class Held:
+class Held(_AtPoints):
     """The last sample at each point; nan where it is too old."""
 
-    def __init__(self, grid: Grid, width: int) -> None:
-        self._grid, self._parts, self._n = grid, [np.empty((0, width))], 0
-        self._last: tuple[float, Floats] | None = None
-        self._gap = 0.0
-
-    def push(self, times: Floats, values: Floats) -> None:
-        """Take (b,) times and (b, k) values, after all that came before."""
-        if not len(times):
-            return
-        self._gap = self._gap or _gap_of(times, self._grid.step_s)
-        if self._last is not None:
-            times = np.concatenate([[self._last[0]], times])
-            values = np.concatenate([self._last[1][None], values])
-        end = self._grid.until(float(times[-1]))
-        if end > self._n:
-            points = self._grid.times(self._n, end)
-            index = np.searchsorted(times, points + 1e-6 * self._grid.step_s, side="right") - 1
-            at = values[np.maximum(index, 0)].copy()
-            at[(index < 0) | (points - times[np.maximum(index, 0)] > self._gap)] = np.nan
-            self._parts.append(at)
-            self._n = end
-        self._last = float(times[-1]), values[-1]
-
-    def rows(self, n: int) -> Floats:
-        """(n, k) the values at the first n points; nan beyond the last sample."""
-        return _padded(np.concatenate(self._parts), n)
+    def _at(self, points: Floats, times: Floats, values: Floats) -> Floats:
+        index = np.searchsorted(times, points + 1e-6 * self._grid.step_s, side="right") - 1
+        at = values[np.maximum(index, 0)].copy()
+        at[(index < 0) | (points - times[np.maximum(index, 0)] > self._gap)] = np.nan
+        return at
 
 
 def _gap_of(times: Floats, step_s: float) -> float:

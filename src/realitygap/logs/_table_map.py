@@ -7,12 +7,10 @@ from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
-from realitygap._limits import MOST_TOML_BYTES, parse_toml, read_file
-from realitygap.errors import LogError
 from realitygap.settings import Settings
 from realitygap.world import toml_table
 
-from ._log_map import Column, TextFormat
+from ._log_map import Column, TextFormat, checked_map, read_map
 
 MeasuredFrom = Literal["body", "origin", "sensor"]
 
@@ -86,16 +84,4 @@ def load_table_map(path: str | Path) -> TableMap:
         LogError: The file cannot be read or has mistakes; the message has each with its place.
     """
     path = Path(path)
-    try:
-        values = parse_toml(read_file(path, MOST_TOML_BYTES).decode())
-    except OSError as error:
-        raise LogError(
-            f"Cannot read the mapping {path}: {error.strerror or error}. Name a TOML file."
-        ) from None
-    except ValueError as error:
-        raise LogError(f"{path}: it is not TOML: {error}.") from None
-    try:
-        return TableMap(**values)
-    except ValueError as error:
-        lines = [line.removeprefix("TableMap.").removeprefix("TableMap: ") for line in str(error).split("\n")]
-        raise LogError("\n".join(f"{path}: {line}" for line in lines)) from None
+    return checked_map(TableMap, read_map(path), path)

@@ -14,8 +14,8 @@ from realitygap.platforms import SimEnsemble, SimPlatform, SimTarget
 from realitygap.study import calibrate_all
 from realitygap.study._calibrate.held_out_trials import compare_on_trials, is_held_out
 from realitygap.study._calibrate.parts import Parts
-from realitygap.study._calibrate.whole import all_plans
-from realitygap.world import paper_arena
+from realitygap.study._calibrate.whole import _bound_by_prior, all_plans
+from realitygap.world import Fitted, paper_arena
 
 pytestmark = pytest.mark.slow
 
@@ -137,3 +137,21 @@ def test_held_out_trials_are_spread_and_recommend_what_predicts_them():
     few = compare_on_trials(right, trials[:4], lambda _: 1 / 0, SimEnsemble(SimPlatform(), ARENA, threads=1))
     assert few is right
     assert np.flatnonzero(is_held_out(20, 0.2)).tolist() == [4, 9, 14, 19]  # of both kinds of trials
+
+
+def test_parameters_at_an_end_of_their_prior_are_named():
+    """A Thymio that does not turn at walls had `contact.ang` at the end of its prior, and no note said so."""
+
+    def fitted(name, low, high):
+        ends = {
+            "low": low,
+            "high": high,
+            "estimate": (low + high) / 2,
+            "prior_low": 50.0,
+            "prior_high": 3000.0,
+        }
+        return Fitted(name=name, identified=True, unit="1/m2", **ends)
+
+    (note,) = _bound_by_prior([fitted("contact.ang", 50.1, 80.0), fitted("drive.track", 100.0, 200.0)])
+    assert note.startswith("At an end of its prior: contact.ang (50 to 3e+03 1/m2). ")
+    assert not _bound_by_prior([fitted("drive.heading_noise_per_m", 50.1, 80.0)])

@@ -6,7 +6,7 @@ from ._contact import fit_contact
 from ._contact_plans import contact_plans
 from ._evidence import LEAST_STEPS, Evidence, Vectors, evidence_of
 from ._excitation import excitation, random_controllers
-from ._handles import MOTION
+from ._handles import CONTACT, MOTION
 from ._held_out import HeldOut
 from ._log_model import MotionLog
 from ._motion import MotionFit, fit_motion
@@ -28,6 +28,7 @@ from .infrared._plans import distance_of, placements_of, sensor_plans
 from .infrared._readings import Placement
 
 __all__ = [
+    "CONTACT",
     "LEAST_PLACEMENTS",
     "LEAST_STEPS",
     "MOTION",

@@ -66,6 +66,11 @@ class Fitted(Settings):
         return self
 
     @property
+    def is_bound(self) -> bool:
+        """Whether its interval begins at an end of the prior that may cut something off."""
+        return _is_bound(self.model_dump())
+
+    @property
     def is_at_end(self) -> bool:
         """Whether it is told, and lies at or beyond an end of what was thought possible that is not 0."""
         ways = [self.estimate - self.prior_low if self.prior_low else math.inf]

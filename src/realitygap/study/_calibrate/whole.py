@@ -9,7 +9,9 @@ from datetime import UTC, datetime
 import numpy as np
 
 from realitygap.calibration import (
+    CONTACT,
     LEAST_STEPS,
+    MOTION,
     Effort,
     Evidence,
     Floats,
@@ -222,12 +224,13 @@ class _Fit:
         posterior = self.posterior(trials, effort)
         numbers, draws = self.robots(posterior)
         found = misfits(self.evidence(trials), self.simulate, draws, key=self.seed)
+        fitted = tuple(_fitted(parameter, posterior) for parameter in self.prior)
         parts = Parts(
-            fitted=tuple(_fitted(parameter, posterior) for parameter in self.prior),
+            fitted=fitted,
             numbers=numbers,
             draws=draws,
             method=METHOD,
-            notes=tuple(_said_of(misfit) for misfit in found),
+            notes=(*_bound_by_prior(fitted), *(_said_of(misfit) for misfit in found)),
             misspecified=any(misfit.is_too_large for misfit in found),
             misspecification_p=min(1.0, len(found) * min(misfit.p for misfit in found)),
             evidence={"misfit": {misfit.kind: round(misfit.share, 4) for misfit in found}},
@@ -306,6 +309,24 @@ def _fitted(parameter: Parameter, posterior: Posterior) -> Fitted:
         identified=bool(identified),
         unit=parameter.unit,
         advice="" if identified else f"To identify it, record {parameter.advice}.",
+    )
+
+
+def _bound_by_prior(fitted: Sequence[Fitted]) -> tuple[str, ...]:
+    """Return a note on the parameters of motion and contact that the prior limits; none if there are none.
+
+    Noise is left out: a robot without any is at the lower end.
+    """
+    bound = [each for each in fitted if each.is_bound and each.name in (*MOTION, *CONTACT)]
+    if not bound:
+        return ()
+    names = ", ".join(
+        f"{each.name} ({each.prior_low:.3g} to {each.prior_high:.3g} {each.unit}".rstrip() + ")"
+        for each in bound
+    )
+    return (
+        f"At an end of its prior: {names}. The prior is around the robot file's number and may not include this robot. "
+        "Build on a robot file with another number (--base FILE).",
     )
 
 

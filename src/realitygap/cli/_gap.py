@@ -221,6 +221,8 @@ def gap(
     _print(result, found.study.replay)
     if found.why is not None:
         _print_why(found.why)
+    if report is None and sys.stdout.isatty():
+        typer.echo("With --report gap.html, the command also writes these numbers and figures as a page.")
 
 
 def _observer(target: str, witness: str | None) -> PortObserver | None:

@@ -46,8 +46,13 @@ class Fitted(Settings):
     @model_validator(mode="before")
     @classmethod
     def _is_not_identified_by_its_prior(cls, values: Any) -> Any:
-        """An interval that begins at an end of the prior is that of the prior, however narrow it is."""
-        if not isinstance(values, Mapping) or not values.get("identified") or not _is_bound(values):
+        """An interval that begins at an end of the prior is that of the prior, however narrow it is.
+
+        If it is wide, the advice still names that end if the estimate is there.
+        """
+        if not isinstance(values, Mapping) or not _is_bound(values):
+            return values
+        if not values.get("identified") and not _is_bound(values, "estimate", "estimate"):
             return values
         low, high, unit = values["prior_low"], values["prior_high"], values.get("unit", "")
         advice = (
@@ -78,16 +83,22 @@ class Fitted(Settings):
         return self.identified and min(ways) < NEAR_END * (self.prior_high - self.prior_low)
 
 
-def _is_bound(values: Mapping[str, Any]) -> bool:
-    """Whether an interval begins at an end of its prior. At 0, and at 1 of what is at most 1, nothing is cut off."""
+def _is_bound(values: Mapping[str, Any], lower: str = "low", upper: str = "high") -> bool:
+    """Whether an interval begins at an end of its prior. At 0, and at 1 of what is at most 1, nothing is cut off.
+
+    Args:
+        values: Those of `Fitted`.
+        lower, upper: The values that are compared with the ends of the prior.
+    """
+    names = ("low", "high", "prior_low", "prior_high", lower, upper)
     try:
-        low, high, least, most = (float(values[name]) for name in ("low", "high", "prior_low", "prior_high"))
+        low, high, least, most, first, last = (float(values[name]) for name in names)
     except (KeyError, TypeError, ValueError):
         return False
     if low < least or high > most:
         return False
     near = AT_WALL * (high - low)
-    return (least != 0.0 and low - least <= near) or ((least, most) != (0.0, 1.0) and most - high <= near)
+    return (least != 0.0 and first - least <= near) or ((least, most) != (0.0, 1.0) and most - last <= near)
 
 
 class Calibration(Settings):

@@ -325,8 +325,8 @@ def _bound_by_prior(fitted: Sequence[Fitted]) -> tuple[str, ...]:
         for each in bound
     )
     return (
-        f"At an end of its prior: {names}. The prior is around the robot file's number and may not include this robot. "
-        "Build on a robot file with another number (--base FILE).",
+        f"Intervals that reach an end of their prior: {names}. The prior is around the robot file's numbers and may "
+        "not include this robot. Build on a robot file with other numbers (--base FILE).",
     )
 
 

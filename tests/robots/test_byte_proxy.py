@@ -68,6 +68,8 @@ def test_shares_disturb_about_so_many_bytes_and_the_same_ones_for_a_seed():
 
 def test_cut_ends_both_connections_and_the_client_can_come_again(ends):
     proxy, client, robot = ends
+    client.sendall(b"a")
+    assert received(robot, 1) == b"a"  # from here on the proxy knows both connections
     proxy.cut()
     assert client.recv(1) == b""
     assert robot.recv(1) == b""

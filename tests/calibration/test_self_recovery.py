@@ -14,7 +14,7 @@ from realitygap.world import load_robot, paper_arena, robot_names
 FITTED = ("ir", "pulses", "lorentz")
 NAMES = ("amplitude", "decay", "half_width", "noise_gain", "noise_uniform", "burst")
 FEWEST = 0.8
-"""Share of the 90 % intervals. There are about 65. If each held its number with a chance of .9, chance alone would fail
+"""Share of the 90 % intervals. There are about 80. If each held its number with a chance of .9, chance alone would fail
 one run in 100 or fewer."""
 
 

@@ -1,4 +1,4 @@
-"""What a twin is: every number of a robot of real wheels, motors and sensors, as a file describes it."""
+"""The parameters of a twin: body, wheels, motors, battery, and sensors of a robot, as in a twin file."""
 
 from __future__ import annotations
 
@@ -27,31 +27,36 @@ SHELL = (
 
 
 class TwinChassis(Settings):
-    """What can collide, and how heavy it is."""
+    """The shell, which can collide, and its mass."""
 
     corners: tuple[tuple[Offset, Offset], ...] = Field(
         SHELL,
         min_length=3,
         max_length=MOST_CORNERS,
-        description="Of the shell from above, x and y [m], counter-clockwise, before they are grown.",
+        description="Corners of the shell from above, x and y [m], counter-clockwise, before `corner_radius` is added.",
     )
     corner_radius: Annotated[float, Field(ge=0.001, le=0.1)] = Field(
-        0.010, description="By which the shell is grown to all sides, which rounds its corners [m]."
+        0.010, description="Distance by which the shell grows on all sides, which rounds its corners [m]."
     )
     length_scale: Annotated[float, Field(ge=0.5, le=2)] = Field(
-        1.0, description="By which the x of all corners is multiplied."
+        1.0, description="Factor for the x of all corners."
     )
-    width_scale: Annotated[float, Field(ge=0.5, le=2)] = Field(1.0, description="Of their y.")
+    width_scale: Annotated[float, Field(ge=0.5, le=2)] = Field(
+        1.0, description="Factor for the y of all corners."
+    )
     cardboard: tuple[Length, Length] | None = Field(
         None,
-        description="Length and width of a box of cardboard around the shell [m]; left out where there is none.",
+        description="Length and width of a box of cardboard around the shell [m]. Left out if there is none.",
     )
-    mass: Annotated[float, Field(ge=0.1, le=10)] = Field(0.9, description="Of all but the wheels [kg].")
+    mass: Annotated[float, Field(ge=0.1, le=10)] = Field(
+        0.9, description="Mass of the robot without its wheels [kg]."
+    )
     inertia: Annotated[float, Field(ge=1e-4, le=0.1)] = Field(
-        0.003, description="Of all but the wheels, about the vertical [kg m2]."
+        0.003, description="Moment of inertia about the vertical, without the wheels [kg m2]."
     )
     center: Annotated[float, Field(ge=-0.05, le=0.05)] = Field(
-        0.012, description="Of its mass, ahead of the pen [m]: between the wheels and the caster."
+        0.012,
+        description="Position of the center of mass, ahead of the pen [m]. It is between the wheels and the caster.",
     )
 
     @model_validator(mode="after")
@@ -63,183 +68,205 @@ class TwinChassis(Settings):
 
 
 class TwinWheels(Settings):
-    """The two driven wheels, and what they stand on besides."""
+    """The two driven wheels and the other supports."""
 
-    diameter: Annotated[float, Field(ge=0.02, le=0.2)] = Field(0.0794, description="[m].")
+    diameter: Annotated[float, Field(ge=0.02, le=0.2)] = Field(0.0794, description="Diameter of a wheel [m].")
     track: Annotated[float, Field(ge=0.05, le=0.4)] = Field(
-        0.153, description="Between their points of contact with the floor [m]."
+        0.153, description="Distance between the contact points of the wheels with the floor [m]."
     )
-    axle: Annotated[float, Field(ge=-0.05, le=0.05)] = Field(0.0, description="Ahead of the pen [m].")
-    friction: Annotated[float, Field(ge=0.05, le=3)] = Field(0.6, description="Between wheel and floor: mu.")
-    mass: Annotated[float, Field(ge=0.005, le=0.5)] = Field(0.03, description="Of one wheel [kg].")
-    caster: Offset = Field(
-        0.0758, description="Where the third support touches the floor, ahead of the pen [m]."
+    axle: Annotated[float, Field(ge=-0.05, le=0.05)] = Field(
+        0.0, description="Position of the axle, ahead of the pen [m]."
     )
+    friction: Annotated[float, Field(ge=0.05, le=3)] = Field(
+        0.6, description="Friction coefficient mu between wheel and floor."
+    )
+    mass: Annotated[float, Field(ge=0.005, le=0.5)] = Field(0.03, description="Mass of one wheel [kg].")
+    caster: Offset = Field(0.0758, description="Position of the third support, ahead of the pen [m].")
     caster_friction: Annotated[float, Field(ge=0, le=2)] = Field(
-        0.0, description="Between it and the floor: mu; 0 where it rolls freely."
+        0.0, description="Friction coefficient mu between caster and floor. 0: it rolls freely."
     )
     skid: Offset = Field(
-        -0.065, description="What touches the floor where it tips to the other end, likewise [m]."
+        -0.065,
+        description="Position of the support at the other end, ahead of the pen [m]. It touches the floor if the robot "
+        "tips.",
     )
 
 
 class TwinWalls(Settings):
-    """How the shell meets walls and obstacles."""
+    """Contact of the shell with walls and obstacles."""
 
-    friction: Annotated[float, Field(ge=0, le=3)] = Field(0.3, description="Between shell and wall: mu.")
+    friction: Annotated[float, Field(ge=0, le=3)] = Field(
+        0.3, description="Friction coefficient mu between shell and wall."
+    )
 
 
 class TwinMotors(Settings):
-    """How commands turn the wheels."""
+    """Response of the wheels to commands."""
 
     speed: Annotated[float, Field(ge=0.01, le=1)] = Field(
         0.15, description="Speed of a wheel at full command [m/s]."
     )
     ahead: Literal[1, -1] = Field(
-        1, description="Which end is ahead: 1 the one with caster and Fluke (+x), -1 the other one."
+        1, description="Front of the robot: 1 is the end with caster and Fluke (+x), -1 the other end."
     )
     stepped: bool = Field(
-        True, description="Whether speeds come in an S2's 12 steps, and rise by one of them each 20 ms."
+        True, description="Whether speed has the 12 steps of an S2 and rises by at most one step in 20 ms."
     )
     lag: Annotated[float, Field(ge=0, le=2)] = Field(
-        0.03, description="Time in which a wheel comes within 1/e of the speed it is told [s]."
+        0.03, description="Time constant with which a wheel approaches its commanded speed [s]."
     )
     gain_left: Annotated[float, Field(ge=0, le=3)] = Field(
-        1.0, description="Speed of the left wheel for each that it is told."
+        1.0, description="Speed of the left wheel divided by its commanded speed."
     )
-    gain_right: Annotated[float, Field(ge=0, le=3)] = Field(1.0, description="Of the right wheel.")
+    gain_right: Annotated[float, Field(ge=0, le=3)] = Field(
+        1.0, description="Speed of the right wheel divided by its commanded speed."
+    )
     dead_band_left: Share = Field(
         0.0, description="Share of full speed below which the left wheel stands still."
     )
-    dead_band_right: Share = Field(0.0, description="Of the right wheel.")
+    dead_band_right: Share = Field(
+        0.0, description="Share of full speed below which the right wheel stands still."
+    )
     soft_dead_band_left: Share = Field(
         0.0,
-        description="Share d of full speed up to which the left wheel stands still, and from which it starts from 0: "
+        description="Share d of full speed up to which the left wheel stands still. Above it, the speed is "
         "(|u| - d) / (1 - d).",
     )
     soft_dead_band_right: Share = Field(0.0, description="Soft dead band of the right wheel.")
     torque: Annotated[float, Field(ge=0.005, le=1)] = Field(
-        0.25, description="The most that a motor gives, on a full battery [N m]."
+        0.25, description="Maximum torque of a motor with a full battery [N m]."
     )
     stiffness: Annotated[float, Field(ge=0.002, le=0.5)] = Field(
         0.1,
-        description="Torque against each rad/s by which a wheel is off [N m s]: little lets loads slow it.",
+        description="Torque per rad/s of speed error of a wheel [N m s]. If it is small, loads slow the wheel.",
     )
     delay: Annotated[float, Field(ge=0, le=2)] = Field(
-        0.03, description="From a command until the wheels hear it [s]."
+        0.03, description="Time from a command until it reaches the motors [s]."
     )
     delay_jitter: Annotated[float, Field(ge=0, le=1)] = Field(
-        0.02, description="The delay of a command is delay + delay_jitter * U(-1, 1), and at least 0 [s]."
+        0.02,
+        description="Random part of the delay [s]. A command has the delay max(0, delay + delay_jitter * U(-1, 1)).",
     )
     drift_per_m: Annotated[float, Field(ge=-3, le=3)] = Field(
-        0.0, description="Turn to the left in each meter driven [rad]."
+        0.0, description="Unwanted turn to the left per meter driven [rad]."
     )
     wander: Annotated[float, Field(ge=0, le=0.5)] = Field(
-        0.01, description="Standard deviation of the share by which each wheel's speed wanders."
+        0.01, description="Standard deviation of the slow relative fluctuation of each wheel's speed."
     )
     wander_s: Annotated[float, Field(ge=0.05, le=60)] = Field(
-        1.0, description="Time in which it forgets how it was [s]."
+        1.0, description="Correlation time of this fluctuation [s]."
     )
 
 
 class TwinBattery(Settings):
     """The cells that feed the motors and the infrared."""
 
-    volts: Annotated[float, Field(ge=4, le=12)] = Field(8.8, description="At the start of a trial [V].")
+    volts: Annotated[float, Field(ge=4, le=12)] = Field(
+        8.8, description="Voltage at the start of a trial [V]."
+    )
     full: Annotated[float, Field(ge=4, le=12)] = Field(
-        9.0, description="At which speeds and torques are as said above [V]."
+        9.0, description="Voltage at which `motors.speed` and `motors.torque` hold [V]."
     )
     fall_per_s: Annotated[float, Field(ge=0, le=0.1)] = Field(
-        0.0005, description="Lost in each second of driving at full speed [V/s]."
+        0.0005, description="Voltage loss per second of driving at full speed [V/s]."
     )
     sag: Annotated[float, Field(ge=0, le=3)] = Field(
-        0.15, description="By which the voltage falls while both wheels are driven at full speed [V]."
+        0.15, description="Voltage drop while both wheels are driven at full speed [V]."
     )
     slows: Share = Field(
-        0.0, description="How far speeds follow the voltage: 0 where they are regulated, 1 in proportion."
+        0.0, description="Effect of the voltage on speeds: 0 is none (regulated), 1 is proportional."
     )
 
 
 class TwinMount(Settings):
-    """Where an infrared sensor is."""
+    """Position and direction of an infrared sensor."""
 
-    x: Offset = Field(0.089, description="Ahead of the pen [m], before the shell is scaled.")
-    y: Offset = Field(0.0, description="To the left of it [m], likewise.")
-    direction: Angle = Field(0.0, description="In which it looks, positive to the left [rad].")
+    x: Offset = Field(0.089, description="Position ahead of the pen [m], before the shell is scaled.")
+    y: Offset = Field(0.0, description="Position to the left of the pen [m], before the shell is scaled.")
+    direction: Angle = Field(0.0, description="Direction of the sensor, positive to the left [rad].")
     gain: Annotated[float, Field(ge=0, le=10)] = Field(
-        1.0, description="By which its light is stronger than that of others."
+        1.0, description="Factor for the light that this sensor receives."
     )
 
 
 class TwinIr(Settings):
-    """Infrared sensors that send pulses and count those that come back."""
+    """Infrared sensors that send pulses and count the pulses that return."""
 
     mount: tuple[TwinMount, ...] = Field(
         (TwinMount(), TwinMount(), TwinMount()),
         min_length=1,
         max_length=MOST_MOUNTS,
-        description="From left to right; a Fluke 2 asks its one emitter three times.",
+        description="Sensors from left to right. A Fluke 2 has one emitter, which it uses three times.",
     )
     cone: Annotated[float, Field(ge=0, le=1.5)] = Field(
-        0.1745, description="Half the angle in which it sends light [rad]."
+        0.1745, description="Half the opening angle of the emitted light [rad]."
     )
-    rays: int = Field(7, ge=1, le=63, description="Rays in the cone; each sends back light of its own.")
+    rays: int = Field(
+        7, ge=1, le=63, description="Number of rays in the cone. Their returned light is added up."
+    )
     half: Annotated[float, Field(ge=0.01, le=1)] = Field(
-        0.12, description="Distance of a wall, straight ahead, from which half the pulses come back [m]."
+        0.12, description="Distance of a wall straight ahead at which half the pulses return [m]."
     )
     steepness: Annotated[float, Field(ge=0.3, le=20)] = Field(
-        2.0, description="Of the pulses' share over the light: share = 1 / (1 + light ** -steepness)."
+        2.0, description="Steepness of the share of returned pulses: share = 1 / (1 + light ** -steepness)."
     )
     incidence: Annotated[float, Field(ge=0, le=8)] = Field(
-        1.0, description="Power of the cosine between ray and wall's normal that light comes back with."
+        1.0,
+        description="Exponent of the cosine between ray and wall normal, by which the returned light is multiplied.",
     )
     reach: Annotated[float, Field(ge=0.05, le=5)] = Field(
-        1.0, description="Beyond which nothing comes back [m]."
+        1.0, description="Maximum distance from which light returns [m]."
     )
-    pulses: int = Field(10, ge=1, le=1000, description="Sent for one reading.")
+    pulses: int = Field(10, ge=1, le=1000, description="Number of pulses for one reading.")
     spread: Annotated[float, Field(ge=0, le=0.95)] = Field(
-        0.1, description="Correlation of the pulses of one reading: 0 is binomial, more is over-dispersed."
+        0.1,
+        description="Correlation of the pulses of one reading. 0: the count is binomial; above 0: it is overdispersed.",
     )
     noise: Annotated[float, Field(ge=0, le=2)] = Field(
         0.1, description="Standard deviation of the logarithm of the light from reading to reading."
     )
     memory: Annotated[float, Field(ge=0, le=0.99)] = Field(
-        0.0, description="Correlation of this noise between a command and the next."
+        0.0, description="Correlation of this noise between consecutive commands."
     )
-    missed: Share = Field(0.0, description="Probability that a reading is 0 whatever is there.")
+    missed: Share = Field(0.0, description="Probability that a reading is 0 regardless of the walls.")
     supply: Annotated[float, Field(ge=0, le=8)] = Field(
-        1.0, description="Power of the battery's share of its full voltage that the light goes with."
+        1.0,
+        description="Exponent of the relative battery voltage (volts / full), by which the light is multiplied.",
     )
 
 
 class TwinStall(Settings):
-    """How it knows that it is held up: as an S2, by its idler wheel."""
+    """Stall detection by the idler wheel, as in an S2."""
 
     share: Share = Field(
-        0.5, description="It stalls where the caster rolls less than this share of what the wheels turn."
+        0.5,
+        description="The robot reports a stall if the caster rolls less than this share of the wheels' distance.",
     )
     window: Annotated[float, Field(ge=0.05, le=10)] = Field(
-        1.6, description="Time over which both are averaged [s]."
+        1.6, description="Time over which both distances are averaged [s]."
     )
 
 
 class TwinEncoders(Settings):
-    """What it knows of how far its wheels turned."""
+    """Wheel encoders: the reported distances of the wheels."""
 
     gain_left: Annotated[float, Field(ge=0.2, le=5)] = Field(
-        1.0, description="Way told for each meter that the left wheel turned."
+        1.0, description="Reported distance per meter that the left wheel turned."
     )
-    gain_right: Annotated[float, Field(ge=0.2, le=5)] = Field(1.0, description="Of the right wheel.")
+    gain_right: Annotated[float, Field(ge=0.2, le=5)] = Field(
+        1.0, description="Reported distance per meter that the right wheel turned."
+    )
     noise_per_m: Annotated[float, Field(ge=0, le=0.2)] = Field(
-        0.001, description="Standard deviation after one meter [m]; grows with the root of the way."
+        0.001,
+        description="Standard deviation after one meter [m]. It grows with the square root of the distance.",
     )
     count: Annotated[float, Field(ge=0, le=0.02)] = Field(
-        0.00025, description="In which ways are told [m]; 0 for any."
+        0.00025, description="Resolution of reported distances [m]. 0: unlimited."
     )
 
 
 class TwinLightMount(TwinMount):
-    """Place and direction of a light sensor."""
+    """Position and direction of a light sensor."""
 
 
 class TwinLight(Settings):
@@ -253,16 +280,17 @@ class TwinLight(Settings):
         ),
         min_length=1,
         max_length=MOST_MOUNTS,
-        description="Sensors in the order of their names; a Scribbler has them at the end without the caster.",
+        description="Sensors in the order of their names. A Scribbler has them at the end without the caster.",
     )
     room: Annotated[float, Field(ge=0, le=100)] = Field(
-        1.0, description="Light of the room from all sides; a lamp of strength 1 at 1 m gives 1."
+        1.0, description="Ambient light from all sides. A lamp of strength 1 at a distance of 1 m gives 1."
     )
     lobe: Annotated[float, Field(ge=0.1, le=20)] = Field(
-        2.0, description="Power of the cosine between sensor and lamp that light arrives with."
+        2.0,
+        description="Exponent of the cosine between sensor and lamp, by which the light of the lamp is multiplied.",
     )
     half: Annotated[float, Field(ge=0.001, le=100)] = Field(
-        1.0, description="Light at which the reading is one half: reading = 1 - half / (2 light), at least 0."
+        1.0, description="Light at which the reading is one half: reading = max(0, 1 - half / (2 light))."
     )
     noise: Annotated[float, Field(ge=0, le=2)] = Field(
         0.004, description="Standard deviation of the logarithm of the light from reading to reading."
@@ -270,13 +298,13 @@ class TwinLight(Settings):
 
 
 class TwinLine(Settings):
-    """Sensors below it, which see whether the floor is dark."""
+    """Sensors below the robot that detect a dark floor."""
 
     mount: tuple[tuple[Offset, Offset], ...] = Field(
         ((-0.05, -0.005), (-0.05, 0.005)),
         min_length=1,
         max_length=MOST_MOUNTS,
-        description="Ahead of the pen and to the left of it [m], in the order of their names.",
+        description="Positions ahead of the pen and to the left of it [m], in the order of the sensors' names.",
     )
     threshold: Share = Field(0.5, description="Brightness below which the floor is dark.")
 
@@ -284,58 +312,68 @@ class TwinLine(Settings):
 class TwinPatch(Settings):
     """A round spot of sticky floor."""
 
-    x: Annotated[float, Field(ge=-100, le=100)] = Field(description="Of its center in the arena [m].")
-    y: Annotated[float, Field(ge=-100, le=100)] = Field(description="[m].")
-    radius: Annotated[float, Field(gt=0, le=100)] = Field(description="[m].")
-    slows: Share = Field(0.5, description="Share of a wheel's speed that is lost on it.")
+    x: Annotated[float, Field(ge=-100, le=100)] = Field(description="x of its center in the arena [m].")
+    y: Annotated[float, Field(ge=-100, le=100)] = Field(description="y of its center in the arena [m].")
+    radius: Annotated[float, Field(gt=0, le=100)] = Field(description="Radius of the patch [m].")
+    slows: Share = Field(0.5, description="Share of its speed that a wheel loses on the patch.")
 
 
 class TwinOddities(Settings):
-    """What the platform `sim` has no numbers for."""
+    """Effects that the platform `sim` cannot model."""
 
-    slope: Annotated[float, Field(ge=0, le=0.35)] = Field(
-        0.0, description="By which the floor is tilted [rad]."
-    )
-    uphill: Angle = Field(0.0, description="Heading in which it rises [rad].")
+    slope: Annotated[float, Field(ge=0, le=0.35)] = Field(0.0, description="Slope angle of the floor [rad].")
+    uphill: Angle = Field(0.0, description="Uphill heading [rad].")
     turn_at: Annotated[float, Field(ge=0, le=3600)] = Field(
-        0.0, description="Time in a trial at which gains change [s]."
+        0.0, description="Time in a trial at which the wheels' gains change [s]. 0: never."
     )
     turned_left: Annotated[float, Field(ge=0, le=3)] = Field(
-        1.0, description="By which the left wheel's speed is multiplied from then on."
+        1.0, description="Factor for the left wheel's speed after `turn_at`."
     )
-    turned_right: Annotated[float, Field(ge=0, le=3)] = Field(1.0, description="The right wheel's.")
+    turned_right: Annotated[float, Field(ge=0, le=3)] = Field(
+        1.0, description="Factor for the right wheel's speed after `turn_at`."
+    )
     compass: Share = Field(
-        0.0, description="Share of the speed that is lost or gained with the cosine of the heading."
+        0.0,
+        description="Effect of the heading on speed: the factor 1 + compass * cos(heading - compass_heading).",
     )
-    compass_heading: Angle = Field(0.0, description="Heading in which it is fastest [rad].")
+    compass_heading: Angle = Field(0.0, description="Heading at which the robot is fastest [rad].")
     latch: int = Field(
-        0, ge=0, le=1000, description="Commands for which a reading is held before the sensor is asked again."
+        0,
+        ge=0,
+        le=1000,
+        description="Number of commands for which a reading is kept before the sensor is read again.",
     )
     inverted: bool = Field(False, description="Whether sensors answer 1 - reading.")
     swapped: bool = Field(False, description="Whether the wheels' cables are swapped.")
-    patch: TwinPatch | None = Field(None, description="A sticky spot of floor; left out where there is none.")
+    patch: TwinPatch | None = Field(None, description="A sticky spot of floor. Left out if there is none.")
 
 
 class TwinModel(Settings):
-    """A twin of the Scribbler: a robot of wheels, motors and sensors in MuJoCo, as pseudo-reality.
+    """A twin of the Scribbler: a robot with wheels, motors, and sensors in MuJoCo, used as pseudo-reality.
 
-    Frame: origin at the pen, x towards the end with the caster, which is the Fluke's, y to the left. Meters, radians,
+    Frame: origin at the pen, x towards the end with the caster and the Fluke, y to the left. Meters, radians,
     seconds, kilograms, volts.
 
     Raises:
-        ValueError: A value is unknown or out of its range; every mistake with its place.
+        ValueError: A key is unknown or a value is out of its range. The message lists all mistakes with their places.
     """
 
-    format: Literal["realitygap twin 1"] = Field("realitygap twin 1", description="Of the file.")
-    name: str = Field("twin", min_length=1, max_length=80, description="What to call it.")
-    family: str = Field("", max_length=80, description="From which it was drawn; empty where by hand.")
-    seed: int = Field(0, ge=0, lt=2**63, description="Of its noise, together with the number of a trial.")
+    format: Literal["realitygap twin 1"] = Field("realitygap twin 1", description="Format of the file.")
+    name: str = Field("twin", min_length=1, max_length=80, description="Name of the twin.")
+    family: str = Field(
+        "",
+        max_length=80,
+        description="Family that the twin was sampled from. Empty if it was written by hand.",
+    )
+    seed: int = Field(
+        0, ge=0, lt=2**63, description="Seed of the noise, combined with the number of a trial."
+    )
     engine: Literal["mujoco", "sim"] = Field(
         "mujoco",
-        description="What moves it: mujoco; or sim, the platform `sim` with its defaults behind the same wall, to "
-        "which there is no gap. Of all else in the file, sim takes only step_s and seed.",
+        description="Physics engine: mujoco, or sim, the platform `sim` with its defaults, used like a twin. Such a twin "
+        "has no gap to `sim`, and of this file only step_s and seed have an effect.",
     )
-    step_s: Annotated[float, Field(ge=0.02, le=60)] = Field(0.5, description="How long a command lasts [s].")
+    step_s: Annotated[float, Field(ge=0.02, le=60)] = Field(0.5, description="Duration of a command [s].")
     body: TwinChassis = TwinChassis()
     wheels: TwinWheels = TwinWheels()
     walls: TwinWalls = TwinWalls()
@@ -344,8 +382,8 @@ class TwinModel(Settings):
     ir: TwinIr = TwinIr()
     stall: TwinStall = TwinStall()
     encoders: TwinEncoders = TwinEncoders()
-    light: TwinLight | None = Field(None, description="Sensors of ambient light, if it has them.")
-    line: TwinLine | None = Field(None, description="Line sensors, if it has them.")
+    light: TwinLight | None = Field(None, description="Sensors of ambient light, if the twin has them.")
+    line: TwinLine | None = Field(None, description="Line sensors, if the twin has them.")
     oddities: TwinOddities = TwinOddities()
 
     @model_validator(mode="after")
@@ -360,12 +398,12 @@ class TwinModel(Settings):
 
     @model_serializer(mode="wrap")
     def _without_what_is_not_there(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """A twin without these sensors, or without a soft dead band, is written as before there were any."""
+        """Leave out sensors and soft dead bands that the twin lacks, so that files without them keep their hashes."""
         values: dict[str, Any] = handler(self)
         soft = [name for name in values["motors"] if name.startswith("soft_") and not values["motors"][name]]
         values["motors"] = {name: value for name, value in values["motors"].items() if name not in soft}
         return {key: value for key, value in values.items() if value is not None}
 
     def to_toml(self) -> str:
-        """The twin as a file, every number with its meaning; `load_twin` reads it."""
+        """Return the text of a twin file, with a comment for each number. `load_twin` reads it."""
         return toml_of(self)

@@ -1,4 +1,4 @@
-"""Platforms, whatever can try a controller, and the contract of a robot."""
+"""Platforms, which try controllers, and the contract of a robot."""
 
 from . import scribbler, thymio, twin
 from ._clock import Clock, SystemClock, VirtualClock

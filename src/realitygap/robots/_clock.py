@@ -1,4 +1,4 @@
-"""The time that a robot lives in: ours, or one that an emulator keeps."""
+"""The clock of a robot: real time, or the time of an emulator."""
 
 from __future__ import annotations
 
@@ -7,19 +7,19 @@ from collections.abc import Callable
 from typing import Protocol, runtime_checkable
 
 HEAR_S = 0.1
-"""The longest wait in one piece [s]: Ctrl-C that comes just before a piece begins is heard only after it."""
+"""Longest uninterrupted wait [s]. Ctrl-C that comes just before such a wait takes effect after it."""
 
 
 @runtime_checkable
 class Clock(Protocol):
-    """Tells the time and lets it pass; whoever has to do with a robot waits by its clock and by no other."""
+    """A clock that can be read and can wait. All code that times a robot uses the robot's own clock."""
 
     def now(self) -> float:
-        """The time [s], from any origin, never going back."""
+        """Time [s] since any origin. It never decreases."""
         ...
 
     def sleep(self, seconds: float) -> None:
-        """Let so much time pass [s]."""
+        """Wait for a number of seconds by this clock."""
         ...
 
 
@@ -36,10 +36,10 @@ class SystemClock:
 
 
 class VirtualClock:
-    """A clock of a robot in this program: time passes while the robot drives, and in `sleep`.
+    """The clock of a robot in this program: time passes only while the robot drives, and in `sleep`.
 
     Args:
-        wait: Lets time pass, such as by driving on; the clock alone goes on if not given.
+        wait: Advances the robot by a number of seconds. If not given, only the clock advances.
     """
 
     def __init__(self, wait: Callable[[float], None] | None = None) -> None:
@@ -59,7 +59,7 @@ class VirtualClock:
 
 
 def sleep(seconds: float) -> None:
-    """Let real time pass [s], so that whoever ends the program never waits for the end: a robot may be driving."""
+    """Wait in real time [s], in pieces so short that Ctrl-C and SIGTERM take effect soon: a robot may be driving."""
     until = time.monotonic() + seconds
     while seconds > HEAR_S:
         time.sleep(HEAR_S)

@@ -1,4 +1,4 @@
-"""The contract of a robot: what trials and calibration know of it, simulated or physical."""
+"""The contract of a robot, simulated or physical, on which trials and calibration depend."""
 
 from __future__ import annotations
 
@@ -9,23 +9,23 @@ from typing import Any, Literal, NamedTuple, Protocol, Self, runtime_checkable
 from realitygap.world import Pose
 
 Label = Literal["SIM", "TWIN", "EMULATED", "REAL"]
-"""What every figure says of the trials of a robot."""
+"""Label of a robot's trials in every figure."""
 
 
 class Command(NamedTuple):
-    """What a controller asks for: move (ahead positive) and turn (to the left positive), each -1 to 1."""
+    """A command of a controller: move (ahead positive) and turn (to the left positive), each -1 to 1."""
 
     move: float
     turn: float
 
 
 class Observation(NamedTuple):
-    """What a robot sees.
+    """The sensor values of a robot at one moment.
 
     Attributes:
-        readings: (s,) one a sensor from left to right, 0 (nothing seen) to 1 (as near as can be told).
-        stalled: Whether it is blocked.
-        raw: (s,) the same in the robot's native units, as they came.
+        readings: (s,) of the range sensors from left to right, 0 (nothing in range) to 1 (nearest).
+        stalled: Whether the robot is blocked.
+        raw: (s,) the same readings in the robot's native units.
         channels: Values of the sensors that `select_channels` chose, by name: `light.K`, `line.K` and `bump.K` from 0
             to 1, `encoder.K` (part of full speed in the last command) from -1 to 1.
     """
@@ -38,17 +38,17 @@ class Observation(NamedTuple):
 
 @runtime_checkable
 class Robot(Protocol):
-    """Anything that can be reset, read, driven and stopped.
+    """A robot that can be reset, read, driven, and stopped.
 
-    As a context manager it stops its motors and lets go of the robot on the way out, whatever happened.
+    As a context manager it stops its motors and releases the robot at the end of the block, also after an exception.
 
     A robot with other sensors than range sensors also has `channels`, their names, such as `light.0`, and a method
-    `select(names)`. Its observations then have the chosen ones: a sensor that no controller sees is not read.
+    `select(names)`. Its observations then have the chosen channels only. Sensors that no controller uses are not read.
 
     Attributes:
-        label: What figures of its trials say.
-        step_s: How long one command lasts [s].
-        n_sensors: How many readings an observation has.
+        label: Label of its trials in figures.
+        step_s: Duration of one command [s].
+        n_sensors: Number of range readings in an observation.
     """
 
     label: Label
@@ -59,29 +59,28 @@ class Robot(Protocol):
         """Begin a trial: motors stopped, clock at 0.
 
         Args:
-            pose: Where the robot is put, where the program can put it there; a physical robot has been put there by
-                an operator and ignores it.
+            pose: Start of the robot. A physical robot ignores it, because an operator has placed the robot.
         """
         ...
 
     def observe(self) -> Observation:
-        """Read the sensors; does not move the robot, nor stop it."""
+        """Read the sensors. This neither moves nor stops the robot."""
         ...
 
     def drive(self, command: Command) -> None:
-        """Carry out one command for `step_s`; the robot moves on until the next command or `stop`.
+        """Drive one command for `step_s`. The robot moves on until the next command or `stop`.
 
         Raises:
-            ValueError: A part is not within -1..1. The robot goes on as before.
+            ValueError: A part is not within -1..1. The robot keeps its previous command.
         """
         ...
 
     def stop(self) -> None:
-        """Stop the motors; safe to call at any moment, and twice."""
+        """Stop the motors. This is safe at any moment, and if called twice."""
         ...
 
     def close(self) -> None:
-        """Stop the motors and let go of the robot; safe to call twice."""
+        """Stop the motors and release the robot. This is safe if called twice."""
         ...
 
     def __enter__(self) -> Self: ...
@@ -92,18 +91,18 @@ class Robot(Protocol):
 
 
 def channels_of(robot: Any) -> tuple[str, ...]:
-    """Return the names of the sensors that a robot has besides its range sensors."""
+    """Return the names of a robot's sensors other than range sensors."""
     return tuple(getattr(robot, "channels", ()))
 
 
 def select_channels(robot: Any, names: Sequence[str]) -> None:
-    """Choose the sensors that a robot reads besides its range sensors, from the next `observe` on."""
+    """Choose the sensors, other than range sensors, that a robot reads from the next `observe` on."""
     if channels_of(robot):
         robot.select(tuple(names))
 
 
 def check_command(command: Command) -> Command:
-    """The command, if a robot may be given it.
+    """Return the command if it is valid.
 
     Raises:
         ValueError: A part is not a number within -1..1.

@@ -50,7 +50,7 @@ def split_port(port: str) -> tuple[str, str]:
 
 
 def is_in_this_program(port: str) -> bool:
-    """Return whether a port is that of an emulator in this program, which pyserial knows once it was imported."""
+    """Return whether a port belongs to an emulator in this program, which pyserial can open once it was imported."""
     return split_port(port)[1].startswith("emulator:")
 
 
@@ -60,7 +60,7 @@ def terminal_of(family: str) -> Any:
 
 
 def list_ports() -> list[PortGuess]:
-    """Return the serial ports of this machine; a family that recognizes its own device names it."""
+    """Return the serial ports of this machine. Each family names the ports of devices that it recognizes."""
     own: dict[str, PortGuess] = {}
     for family in _FAMILIES:
         if family != BARE:
@@ -74,11 +74,11 @@ def open_on(port: str, record: Path | None = None, watchdog_s: float | None = No
 
     Args:
         port: Name of the port; one without a family's name is that of a Scribbler.
-        record: A new file for all that is said.
-        watchdog_s: Silence of the program after which the motors stop [s]; None: as the family does by itself.
+        record: A new file for the recording of all messages.
+        watchdog_s: Silence of the program after which the motors stop [s]. None: the default of the family.
 
     Raises:
-        RobotError: It cannot be reached.
+        RobotError: The robot cannot be reached.
     """
     family, name = split_port(port)
     if not name:

@@ -1,4 +1,4 @@
-"""What robots share that live in this program: their ways out."""
+"""Base class of robots that live in this program: how they stop and close."""
 
 from __future__ import annotations
 
@@ -7,16 +7,19 @@ from realitygap.errors import RobotError
 
 
 class ProgramRobot(ClosedOnExit):
-    """A robot that lives in this program: it can be stopped, closed and left, and is not asked once it was closed."""
+    """A robot that lives in this program. Using it after it was closed is an error."""
 
     _is_open = True
     _closed = "This simulated robot is closed: make a new one."
 
     def stop(self) -> None:
-        """Nothing to do where it moves only while a command lasts; safe to call at any moment, and twice."""
+        """Do nothing, because the robot moves only while a command lasts.
+
+        This is safe at any moment, and if called twice.
+        """
 
     def close(self) -> None:
-        """Stop it and let go of it; safe to call twice."""
+        """Stop the robot and release it. This is safe if called twice."""
         self.stop()
         self._is_open = False
 

@@ -1,4 +1,4 @@
-"""A recording, opened as the robot that it is of."""
+"""A recording, opened as the robot that was recorded."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ NAME = "recording:"
 
 
 class RecordedRobot(ProgramRobot):
-    """Answers what a robot answered, as long as it is asked what it was asked.
+    """A robot that repeats recorded answers as long as it gets the recorded calls.
 
-    `reset` goes to the next recorded one. `stop` may come at any moment, as on every robot.
+    `reset` goes to the next recorded `reset`. `stop` is allowed at any moment, as on every robot.
 
     Args:
-        recording: A file, with or without `recording:` before it, or what `read_recording` gave.
+        recording: A file, with or without `recording:` before it, or a result of `read_recording`.
 
     Raises:
-        RecordError: The file cannot be read, or is not of a robot that was used.
+        RecordError: The file cannot be read, or has no use of a robot.
     """
 
     def __init__(self, recording: Recording | Path | str) -> None:
@@ -51,10 +51,10 @@ class RecordedRobot(ProgramRobot):
         self._n_steps = 0
 
     def select(self, names: Sequence[str]) -> None:
-        """Nothing: the sensors that were read are in the recording."""
+        """Do nothing: the recording determines the sensors."""
 
     def _take(self, name: str) -> Mapping[str, Any]:
-        """What was recorded at this point, which must be such a call."""
+        """Return the recorded line of this call, which must have the same name."""
         self._check_open()
         is_over = self._next == len(self._lines)
         line: Mapping[str, Any] = {"name": "end"} if is_over else self._lines[self._next]
@@ -77,23 +77,23 @@ class RecordedRobot(ProgramRobot):
         return values
 
     def reset(self, pose: Pose | None = None) -> None:
-        """Go to the beginning of the next recorded trial."""
+        """Go to the start of the next recorded trial."""
         while self._next < len(self._lines) and self._lines[self._next]["name"] != "reset":
             self._next += 1
         self._take("reset")
         self._n_steps = 0
 
     def observe(self) -> Observation:
-        """What the robot saw at this point."""
+        """Return the recorded observation of this point."""
         seen = self._take("observe")
         channels = seen.get("channels", {})
         return Observation(tuple(seen["readings"]), seen["stalled"], tuple(seen["raw"]), channels)
 
     def drive(self, command: Command) -> None:
-        """Nothing, if the robot was told just that.
+        """Do nothing if the command equals the recorded one.
 
         Raises:
-            RobotError: It was told something else.
+            RobotError: The command differs from the recorded one.
         """
         command = check_command(command)
         at = self._next

@@ -1,7 +1,7 @@
-"""A session with a robot in a file: what it was told, what it answered, and when.
+"""A session with a robot as a file: commands, answers, and their times.
 
-A line of JSON each, the first of which says what was recorded and in which units. A line is written in one go, so
-whatever happens the file holds all that was said up to the last line.
+Each line is JSON. The first line describes the robot and the units. A line is written in one call, so after a crash
+the file has all exchanges up to the last line.
 """
 
 from __future__ import annotations
@@ -49,18 +49,18 @@ COLUMNS = {
     "took_s": float,
     "outcome": str,
 }
-"""Of the table of a recording."""
+"""Columns of the table of a recording."""
 
 
 class Recorder:
-    """Writes a recording as it happens.
+    """Writes a recording line by line during a session.
 
     Args:
         path: A new file.
-        clock: The robot's.
+        clock: The clock of the robot.
 
     Raises:
-        RecordError: It is there already, or cannot be written.
+        RecordError: The file exists already, or cannot be written.
     """
 
     def __init__(self, path: Path | str, clock: Clock) -> None:
@@ -82,7 +82,7 @@ class Recorder:
             ) from error
 
     def begin(self, set_up: Mapping[str, Any]) -> None:
-        """Write the first line: what is recorded, of whom; what came before follows."""
+        """Write the first line, which describes the robot and the set-up, then the lines noted before it."""
         self._write(
             {
                 "format": FORMAT,
@@ -101,7 +101,7 @@ class Recorder:
     def wire(
         self, time_s: float, took_s: float, name: str, sent: bytes, answered: bytes, outcome: str
     ) -> None:
-        """Keep one command and its answer."""
+        """Record one command and its answer."""
         self._add(
             time_s,
             "wire",
@@ -110,11 +110,11 @@ class Recorder:
         )
 
     def call(self, name: str, **values: Any) -> None:
-        """Keep what the program asked, or what it saw."""
+        """Record a call of the program, or an observation."""
         self._add(self._clock.now(), "call", name, {"values": values} if values else {})
 
     def fault(self, name: str, error: BaseException) -> None:
-        """Keep what went wrong with a call."""
+        """Record an error of a call."""
         self._add(self._clock.now(), "fault", name, {"outcome": str(error)})
 
     def _add(self, time_s: float, kind: str, name: str, more: Mapping[str, Any]) -> None:
@@ -125,7 +125,7 @@ class Recorder:
             self._write(line)
 
     def _write(self, line: Mapping[str, Any]) -> None:
-        """Write a line; the first one that fails is said, and no more are tried, so that the robot can be stopped."""
+        """Write a line. Only the first failure raises an error, so that the robot can be stopped."""
         if self._is_broken:
             return
         data = json.dumps(line, separators=(",", ":")).encode() + b"\n"
@@ -141,7 +141,7 @@ class Recorder:
             raise RecordError(f"Could not write {self.path}: it is full. Earlier records are safe.")
 
     def close(self) -> None:
-        """Nothing more will be said."""
+        """Close the file. Later lines are skipped."""
         self._is_broken = True
         self._file.close()
 
@@ -152,9 +152,9 @@ class Recording:
 
     Attributes:
         path: Its file.
-        header: What was recorded, of whom, and with what.
-        lines: What was said, in order: `t` [s], `kind`, `name`, and what belongs to it.
-        is_whole: Whether the last line is complete; the one after a crash may not be, and is left out.
+        header: Description of the robot, the set-up, and the software.
+        lines: Exchanges in order: `t` [s], `kind`, `name`, and further values.
+        is_whole: Whether the last line is complete. After a crash it may be incomplete, and is left out.
     """
 
     path: Path
@@ -163,7 +163,7 @@ class Recording:
     is_whole: bool
 
     def table(self) -> pl.DataFrame:
-        """A row a line, with the columns of `COLUMNS`; what a line has not is null."""
+        """One row for each line, with the columns of `COLUMNS`. Missing values are null."""
         import polars as pl
 
         rows = [
@@ -177,8 +177,8 @@ def read_recording(path: Path | str) -> Recording:
     """Read a recording.
 
     Raises:
-        RecordError: There is none, or it is damaged before its last line.
-        RecordVersionError: It was written by another version.
+        RecordError: The file does not exist, or is damaged before its last line.
+        RecordVersionError: Another version wrote the file.
     """
     path = Path(path)
     try:
@@ -212,7 +212,7 @@ _EXPECTED = {float: "a number", str: "a text"}
 
 
 def _is_of_column(name: str, value: Any) -> bool:
-    """Whether a value of a line is of the type that its column has; `values` is written as JSON."""
+    """Return whether a value of a line has the type of its column. `values` is written as JSON."""
     if name not in COLUMNS or name == "values":
         return True
     return isinstance(value, int | float if COLUMNS[name] is float else str) and not isinstance(value, bool)

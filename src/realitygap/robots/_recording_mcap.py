@@ -23,15 +23,15 @@ def export_mcap(recording: Path | str, out: Path | str) -> int:
     Messages are JSON, with a schema; their time is that of the recording's beginning and the robot's clock since.
 
     Args:
-        recording: The file that was recorded.
-        out: The file to make; one that is there gives way once the new one is complete.
+        recording: The recording.
+        out: The file to write. An existing file is replaced when the new one is complete.
 
     Returns:
-        How many messages it has.
+        Number of messages.
 
     Raises:
-        RecordError: one cannot be read or the other written.
-        MissingExtraError: the package mcap, of the extra `export`, is not installed.
+        RecordError: The recording cannot be read, or the file cannot be written.
+        MissingExtraError: The package mcap, of the extra `export`, is not installed.
     """
     writer_of = from_extra("mcap.writer", "export").Writer
     source = read_recording(recording)
@@ -65,7 +65,7 @@ def _text(value: Any) -> str:
 
 
 def _message(line: Mapping[str, Any]) -> tuple[str, dict[str, Any]]:
-    """Topic and content of a line."""
+    """Return topic and content of a line."""
     if line["kind"] == "call":
         return f"/call/{line['name']}", dict(line.get("values", {}))
     rest = {key: value for key, value in line.items() if key not in ("t", "kind", "values")}

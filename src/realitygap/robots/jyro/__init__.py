@@ -1,8 +1,8 @@
-"""Jyro's world with all of its robots and devices, one step at a time: to teach with, and to try things out.
+"""Jyro's world with all of its robots and devices, one step at a time, for teaching and experiments.
 
 A `JyroWorld` holds walls, boxes, lamps and robots; robots carry devices. Lengths in meters, headings in radians
-counter-clockwise from +x. The physics is that of `realitygap simulate` and compiled; devices are Python, and one of
-your own is a class of a few lines (`Device`). Studies with many trials use the platform `jyro` instead.
+counter-clockwise from +x. The physics is that of `realitygap simulate` and compiled. Devices are Python; a custom
+device is a class of a few lines (`Device`). Studies with many trials use the platform `jyro` instead.
 """
 
 from . import _picture  # noqa: F401  # registers the picture of a world

@@ -19,23 +19,23 @@ if TYPE_CHECKING:
 SKY = "lightblue"
 GROUND = "#eef3dd"
 FAR = 10.0
-"""Where bars have shrunk to their least height and colors have faded [m]."""
+"""Distance at which bars have their minimum height and colors have faded [m]."""
 NO_LIMIT = 1000.0
-"""How far a ray goes [m]."""
+"""Maximum length of a ray [m]."""
 LAMP_FAR = 5.0
-"""Where a lamp is no more than a dot [m]."""
+"""Distance from which a lamp is a dot [m]."""
 LAMP_SIZE = 10
 """Radius of a lamp seen from nearby [pixels]."""
 OPENING = 2 * math.pi / 3
 
 
 class Column(NamedTuple):
-    """What one column of a camera sees.
+    """One column of a camera's picture.
 
     Attributes:
-        color: Of the wall or robot, as it was given.
-        height: Of the bar that stands for it [pixels].
-        distance: To it [m].
+        color: Color of the wall or robot, as given.
+        height: Height of its bar [pixels].
+        distance: Distance to it [m].
         closeness: 1 - distance / 10 m, and 0 beyond.
     """
 
@@ -56,20 +56,21 @@ class LampSeen(NamedTuple):
 class Camera(Device):
     """A color picture of walls, robots and lamps ahead, from the robot's center.
 
-    Each column of the picture is a ray. What it meets becomes a bar in its color around the horizon: the nearer, the
-    taller and the brighter; robots are half as tall as walls. Lamps are discs, whatever stands further away.
+    Each column of the picture is a ray. The wall or robot that it meets becomes a bar in its color around the horizon.
+    Nearer things are taller and brighter; robots are half as tall as walls. Lamps are discs, drawn over all bars behind
+    them.
 
     Args:
-        width, height: Of the picture [pixels].
-        field: Opening from left to right [rad].
+        width, height: Size of the picture [pixels].
+        field: Horizontal field of view [rad].
         fade: Whether colors fade with distance.
 
     Attributes:
-        columns: (width,) what each column sees, from left to right; None where it meets nothing.
-        lamps: All lamps, those behind it too.
+        columns: (width,) columns from left to right; None if the ray meets nothing.
+        lamps: All lamps, including those behind the robot.
 
-    Source: Jyro 0.3.2. Differs: there pictures of another size than 60 x 40 come out wrong, and lamps are yellow
-    whatever their color.
+    Source: Jyro 0.3.2. Differs: Jyro's pictures of another size than 60 x 40 are wrong, and its lamps are always
+    yellow.
     """
 
     kind = "camera"
@@ -93,7 +94,7 @@ class Camera(Device):
             angle -= step
 
     def read(self) -> None:
-        """Refresh what it sees."""
+        """Refresh the columns and the lamps."""
         distances, hits = self.robot.world.look(self.robot, self._mounts, NO_LIMIT)
         self.columns = [
             None if hit < 0 else self._column(distance, hit)
@@ -168,7 +169,7 @@ class Camera(Device):
         return file.getvalue()
 
     def rays(self) -> list[Shape]:
-        """The borders of what it sees."""
+        """The edges of the field of view."""
         shapes: list[Shape] = []
         for angle, column in ((self.field / 2, self.columns[0]), (-self.field / 2, self.columns[-1])):
             if column:
@@ -182,7 +183,7 @@ class Camera(Device):
         return [self.robot.polygon(((0.14, -0.06), (0.06, -0.06), (0.06, 0.06), (0.14, 0.06)), "black", None)]
 
     def to_dict(self) -> dict[str, Any]:
-        """Size, field, and what each column sees, as plain values."""
+        """Size, field, and columns, as plain values."""
         return super().to_dict() | {
             "width": self.width,
             "height": self.height,
@@ -195,13 +196,13 @@ class Camera(Device):
 class DepthCamera(Camera):
     """A gray picture of distances: white is near, black is `max_range` and further.
 
-    Floor and sky are ramps that darken towards the horizon. Lamps are not seen.
+    Floor and sky are ramps that darken towards the horizon. Lamps are invisible.
 
     Args:
-        max_range: Where bars are black [m].
-        width, height, field: As of `Camera`.
+        max_range: Distance at which bars are black [m].
+        width, height, field: As for `Camera`.
 
-    Source: Jyro 0.3.2. Differs: as `Camera` does; and `robot["depth-camera"]` finds it, so that a robot can have both.
+    Source: Jyro 0.3.2. Differs: as `Camera`. Its key is `robot["depth-camera"]`, so that a robot can have both cameras.
     """
 
     kind = "depth-camera"

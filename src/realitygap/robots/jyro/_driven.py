@@ -16,7 +16,7 @@ from ._robot import SceneRobot
 
 
 class DrivenRobot(ProgramRobot):
-    """One robot of a world as a controller drives it; the others follow their brains or their last command.
+    """A robot of a world that a controller drives. The other robots follow their brains or their last command.
 
     | command | least | most | unit |
     |---|---|---|---|
@@ -28,13 +28,13 @@ class DrivenRobot(ProgramRobot):
     | each ray of the range sensors | nothing within range | touching | distance [m] |
 
     Args:
-        robot: Which; it is in a world and has a range sensor.
-        sensors: Which of its range sensors are observed; all when not given.
-        speed: Of a full command [m/s].
-        turn_rate: Of a full command [rad/s].
+        robot: The robot, which is in a world and has a range sensor.
+        sensors: The range sensors to observe. Default: all of the robot.
+        speed: Speed of a full command [m/s].
+        turn_rate: Turn rate of a full command [rad/s].
 
     Raises:
-        RobotError: It is in no world, or has no range sensor.
+        RobotError: The robot is in no world, or has no range sensor.
     """
 
     label: Label = "SIM"
@@ -59,7 +59,7 @@ class DrivenRobot(ProgramRobot):
             )
 
     def reset(self, pose: Pose | None = None) -> None:
-        """Begin a trial: the whole world as at first, and this robot at a pose if one is given."""
+        """Begin a trial: reset the whole world, and place this robot at a pose if one is given."""
         self._check_open()
         self.world.reset()
         if pose is not None:
@@ -73,12 +73,12 @@ class DrivenRobot(ProgramRobot):
         return Observation(tuple(near.tolist()), self.robot.stalled, tuple(raw.tolist()))
 
     def drive(self, command: Command) -> None:
-        """Carry out one command, for one step of the world."""
+        """Drive one command, for one step of the world."""
         self._check_open()
         move, turn = check_command(command)
         self.robot.move(move * self.speed, turn * self.turn_rate)
         self.world.step()
 
     def stop(self) -> None:
-        """Stop it."""
+        """Stop the robot."""
         self.robot.stop()

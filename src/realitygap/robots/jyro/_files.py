@@ -20,13 +20,13 @@ def save_picture(picture: Picture, path: str | Path, width: int = 720) -> Path:
     """Write a picture; an existing file is replaced when the new one is complete.
 
     Args:
-        picture: What to write.
-        path: Ends in .svg or .png.
-        width: Of a .png [pixels].
+        picture: The picture.
+        path: A file that ends in .svg or .png.
+        width: Width of a .png [pixels].
 
     Raises:
-        ValueError: The path ends in something else.
-        RecordError: It cannot be written, or belongs to a study's results.
+        ValueError: The path has another ending.
+        RecordError: The file cannot be written, or belongs to a study's results.
     """
     path = Path(path)
     ending = path.suffix.lower()
@@ -40,14 +40,14 @@ def save_movie(pictures: Iterable[Picture], path: str | Path, each_s: float, wid
     """Write pictures as a GIF.
 
     Args:
-        pictures: One or more, made while they are written.
-        path: Ends in .gif.
-        each_s: How long each picture is shown [s].
-        width: Of the movie [pixels].
+        pictures: One or more pictures. They are drawn during writing.
+        path: A file that ends in .gif.
+        each_s: Duration of each picture [s].
+        width: Width of the movie [pixels].
 
     Raises:
-        ValueError: The path ends in something else.
-        RecordError: It cannot be written, or belongs to a study's results.
+        ValueError: The path has another ending.
+        RecordError: The file cannot be written, or belongs to a study's results.
     """
     path = Path(path)
     if path.suffix.lower() != ".gif":

@@ -19,7 +19,7 @@ OPEN = 0.12  # half of the opening when open [m]
 SPEED = 0.01  # by which half of the opening changes in a step [m]
 BEAMS = (MOUNT + 0.07, MOUNT + 0.14)  # ahead of the center [m]
 STORED = Pose(-1000.0, -1000.0, 1.5707963267948966)
-"""Where stored robots are put: far outside."""
+"""Pose of stored robots, far outside the world."""
 
 State = Literal["open", "close", "store", "deploy", "stop"]
 
@@ -28,16 +28,16 @@ class Gripper(Device):
     """Two paddles ahead of the robot, and two light beams between them.
 
     The paddles are part of the body: they collide, and other robots see them. `close` on something with a body
-    stalls the whole robot for as long as it tries: the paddles cannot move into it. So `store` what the open paddles
-    hold.
+    stalls the whole robot while it tries to close, because the paddles cannot move into it. So use `store` for a robot
+    between the open paddles.
 
     Attributes:
-        state: What it was told last.
+        state: The last command.
         opening: Half of the opening between the paddles, 0 to 0.12 [m].
         storage: Robots that are stored, in order.
 
-    Source: Jyro 0.3.2. Differs: there a stored robot never comes back, storing while a beam meets the paddle of another
-    gripper fails, and a reset leaves paddles and storage as they are.
+    Source: Jyro 0.3.2. Differs: in Jyro a stored robot never returns, `store` fails while a beam meets the paddle of
+    another gripper, and a reset changes neither paddles nor storage.
     """
 
     kind = "gripper"
@@ -48,7 +48,7 @@ class Gripper(Device):
         self.reset()
 
     def reset(self) -> None:
-        """Open, and with nothing stored."""
+        """Open the gripper, and empty its storage."""
         self.state: State = "open"
         self.opening = OPEN
         self.beams = (False, False)
@@ -69,7 +69,7 @@ class Gripper(Device):
         self.state, self._speed = "stop", 0.0
 
     def store(self) -> None:
-        """Take up the robots between the paddles, and begin to close."""
+        """Store the robots between the paddles, and begin to close."""
         self.state, self._speed = "store", -SPEED
         for robot in self._between:
             robot.place(STORED)
@@ -82,7 +82,7 @@ class Gripper(Device):
 
     @property
     def is_open(self) -> bool:
-        """Whether the paddles rest and are as far apart as they can be."""
+        """Whether the paddles rest at their maximum opening."""
         return self._speed == 0.0 and self.opening == OPEN
 
     @property
@@ -92,7 +92,7 @@ class Gripper(Device):
 
     @property
     def is_moving(self) -> bool:
-        """Whether the paddles move, or try to."""
+        """Whether the paddles move or are blocked on the way."""
         return self._speed != 0.0
 
     @property
@@ -101,7 +101,7 @@ class Gripper(Device):
         return np.array([*self.beams, self.is_closed, self.is_open, self.is_moving], np.float64)
 
     def read(self) -> None:
-        """Look along the beams, from the left paddle to the right."""
+        """Check the beams, from the left paddle to the right."""
         mounts = np.array([(ahead, self.opening, -np.pi / 2) for ahead in BEAMS])
         _, hits = self.robot.world.look(self.robot, mounts, 2 * self.opening)
         owners = [self.robot.world.what(hit)[1] if hit >= 0 else None for hit in hits.tolist()]

@@ -22,16 +22,16 @@ class LightSensor(MountedSensors):
     """The light at each of several points on the robot: the sum over lamps of intensity times brightness.
 
     At a distance d [m] the intensity is 1 - d / max_range (linear, 0 beyond), 0.2 / d (ambient) or its square
-    (direct), d limited to 0.2..max_range in the last two. It is half of that where a wall or another robot stands
-    between, unless `world.light_above_walls` lets it pass over walls. It comes from all directions alike.
+    (direct), d limited to 0.2..max_range in the last two. A wall or another robot between lamp and sensor halves it,
+    unless `world.light_above_walls` lets light pass over walls. The direction of the lamp has no effect.
 
     Args:
-        mounts: (s, 3) forward, left [m] of each; the direction is not used.
-        max_range: Where linear light has faded [m].
-        mode: How light fades.
-        groups: Names of parts of the sensors.
-        own_shadow: Whether the robot's own body throws a shadow on them.
-        shadows: Whether other robots do.
+        mounts: (s, 3) forward, left [m] of each sensor; the direction is unused.
+        max_range: Distance at which linear light is 0 [m].
+        mode: Decrease of light with distance.
+        groups: Names of groups of sensors.
+        own_shadow: Whether the robot's own body casts a shadow on its sensors.
+        shadows: Whether other robots cast shadows on them.
 
     Source: Jyro 0.3.2.
     """
@@ -54,7 +54,7 @@ class LightSensor(MountedSensors):
 
     @property
     def mode(self) -> LightMode:
-        """How light fades; it may be changed at any time."""
+        """The decrease of light with distance. It may be changed at any time."""
         return self._mode
 
     @mode.setter
@@ -74,7 +74,7 @@ class LightSensor(MountedSensors):
         )
 
     def shapes(self) -> list[Shape]:
-        """Where they are."""
+        """The positions of the sensors."""
         return [
             Disc(*self.robot.point(forward, left), 2.0, "#ffa500", "#ffff00", 0.6)
             for forward, left, _ in self.mounts.tolist()

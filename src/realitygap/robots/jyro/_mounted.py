@@ -17,13 +17,13 @@ class MountedSensors(Device):
 
     Args:
         mounts: (s, 3) forward [m], left [m] and direction [rad, positive to the left] of each on the robot.
-        max_range: How far they reach [m].
-        groups: Names of parts of them.
+        max_range: Maximum range [m].
+        groups: Names of groups of sensors.
 
     Attributes:
         mounts: (s, 3) as given.
         max_range: As given [m].
-        groups: Which of the sensors each name means.
+        groups: Indices of the sensors of each group, by name.
     """
 
     def __init__(
@@ -49,7 +49,7 @@ class MountedSensors(Device):
         return self._readings.copy()
 
     def group(self, name: str) -> NDArray[np.float64]:
-        """The readings of a part of the sensors; none where the part is empty.
+        """Return the readings of a group of sensors. They are empty if the group is.
 
         Raises:
             KeyError: There is no such group.

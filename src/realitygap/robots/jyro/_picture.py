@@ -1,4 +1,4 @@
-"""What a `JyroWorld` looks like from above, as plain shapes."""
+"""A `JyroWorld` from above, as plain shapes."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from realitygap.errors import did_you_mean
 from ._world import JyroWorld
 
 PARTS = ("boxes", "shapes", "lights", "walls", "trails", "rays", "bodies", "devices", "speech")
-"""What a picture is made of."""
+"""Parts of a picture."""
 LAMP_RADIUS = 0.25  # as Jyro draws them [m]
 _MARGIN = 0.03  # around everything, of the larger side
 _FAR = 100.0  # what is further away is not shown: stored robots are [m]
@@ -20,11 +20,11 @@ _ALONE = (-0.5, 0.5)  # what is shown of an empty world [m]
 
 @picture_of.register(JyroWorld)
 def world_picture(world: JyroWorld, hide: Collection[str] = ()) -> Picture:
-    """Boxes, walls, lamps, robots with what they carry and see, to scale.
+    """Return a picture of boxes, walls, lamps, and robots with their devices and rays, to scale.
 
     Args:
-        world: As it is now.
-        hide: What is left out: any of `PARTS`.
+        world: The world in its present state.
+        hide: Parts to leave out, of `PARTS`.
 
     Raises:
         ValueError: There is no such part.
@@ -58,7 +58,7 @@ def world_picture(world: JyroWorld, hide: Collection[str] = ()) -> Picture:
 
 
 def _borders(world: JyroWorld) -> tuple[float, float, float, float]:
-    """Left, right, bottom, top of what stands, or else of the robots [m]."""
+    """Return left, right, bottom, and top of all walls [m], or of the robots if there are no walls."""
     xs = [x for wall in world.walls for x in wall[::2]]
     ys = [y for wall in world.walls for y in wall[1::2]]
     if not xs:

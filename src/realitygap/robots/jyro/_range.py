@@ -1,4 +1,4 @@
-"""Range sensors: thin rays that measure how far the nearest wall or other robot is."""
+"""Range sensors: thin rays that measure the distance of the nearest wall or robot."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from realitygap.drawing import Ink, Line, Shape
 from ._mounted import MountedSensors
 
 RAYS_OF_A_CONE = 5
-"""How many rays stand for a cone; an odd number, so that one is its axis."""
+"""Number of rays in a cone. It is odd, so that one ray is the axis."""
 
 
 class RangeSensor(MountedSensors):
@@ -21,13 +21,13 @@ class RangeSensor(MountedSensors):
 
     Args:
         mounts: (s, 3) forward, left [m] and direction [rad] of each ray.
-        max_range: The reading where nothing is nearer [m].
-        kind: What `robot[kind]` finds it by, such as "ir" or "sonar".
-        groups: Names of parts of the rays.
-        arc: Width of the cone of each sensor [rad]; it reads the nearest along five rays over it. 0 is one ray.
-        noise: Level a: a reading is moved by a * max_range * U(-1, 1), and limited to 0..max_range.
+        max_range: The reading if nothing is nearer [m].
+        kind: Key of the sensor in `robot[kind]`, such as "ir" or "sonar".
+        groups: Names of groups of rays.
+        arc: Width of the cone of each sensor [rad]. The reading is the minimum along five rays in it. 0: one ray.
+        noise: Level a. a * max_range * U(-1, 1) is added to a reading, which is limited to 0..max_range.
 
-    Source: Jyro 0.3.2. Differs: there `arc` and `noise` are kept and never used, so here both are 0 when not given.
+    Source: Jyro 0.3.2. Differs: Jyro stores `arc` and `noise` but never uses them, so here both are 0 by default.
     """
 
     def __init__(
@@ -67,7 +67,7 @@ class RangeSensor(MountedSensors):
         return nearest
 
     def rays(self) -> list[Shape]:
-        """The rays, as far as they see."""
+        """The rays, up to the measured distance."""
         shapes: list[Shape] = []
         for (forward, left, direction), far in zip(self.mounts.tolist(), self._lengths(), strict=True):
             end = (forward + far * math.cos(direction), left + far * math.sin(direction))
@@ -79,12 +79,12 @@ class RangeSensor(MountedSensors):
 
 
 class Bumper(RangeSensor):
-    """Feelers that read 1 where something is nearer than their length, and 0 elsewhere.
+    """Feelers that read 1 if something is nearer than their length, and 0 otherwise.
 
     Args:
         mounts: (s, 3) forward, left [m] and direction [rad] of each feeler.
-        max_range: How long the feelers are [m].
-        groups: Names of parts of them.
+        max_range: Length of the feelers [m].
+        groups: Names of groups of feelers.
     """
 
     def __init__(
@@ -111,7 +111,7 @@ class Bumper(RangeSensor):
 
 
 def _rays(mounts: NDArray[np.float64], arc: float) -> NDArray[np.float64]:
-    """(s * k, 3) mounts of the rays of all sensors: one each, or several over the cone."""
+    """Return the (s * k, 3) mounts of the rays of all sensors: one ray each, or k over the cone."""
     if not arc:
         return mounts
     rays = np.repeat(mounts, RAYS_OF_A_CONE, axis=0)

@@ -1,4 +1,4 @@
-"""A robot in a `JyroWorld`, the devices that it carries, and what both ask of the world."""
+"""A robot in a `JyroWorld`, its devices, and the interface of the world that both use."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ Edge = tuple[float, float, float, float]
 Mount = tuple[float, float, float]
 """Forward [m], left [m], direction [rad, positive to the left], on a robot."""
 Part = Literal["trails", "rays", "bodies", "devices", "speech"]
-"""What a robot is drawn of."""
+"""A part of a robot's drawing."""
 _PORTRAIT = 1.0  # side of the picture of one robot [m]
 
 
 @dataclass
 class Lamp:
-    """A lamp: x, y [m], brightness (1 is usual), color; all may be changed, a reset puts them back."""
+    """A lamp: x, y [m], brightness (1 is usual), color. All may be changed; a reset restores them."""
 
     x: float
     y: float
@@ -35,7 +35,7 @@ class Lamp:
 
 
 class Surroundings(Protocol):
-    """The world of a robot, as the robot and its devices see it; `JyroWorld` describes the members."""
+    """The interface of the world for a robot and its devices. `JyroWorld` describes the members."""
 
     step_s: float
     lights: list[Lamp]
@@ -62,9 +62,9 @@ class Surroundings(Protocol):
 
 
 class Device:
-    """Something that a robot carries and that is read, or moves, once in each step.
+    """A device on a robot, which is read, or moves, once in each step.
 
-    A device of your own overrides what it needs of `read`, `move`, `edges`, `shapes` and `reset`:
+    A custom device overrides `read`, `move`, `edges`, `shapes`, and `reset` as needed:
 
         class Compass(Device):
             kind = "compass"
@@ -73,9 +73,9 @@ class Device:
                 self.heading = self.robot.pose.heading
 
     Attributes:
-        kind: What `robot[kind]` finds it by; the last added of a kind is found.
-        active: Whether it is read; an inactive one keeps its readings. It still moves and is in the way.
-        robot: Which robot carries it; known once it has been added.
+        kind: Key of the device in `robot[kind]`. The last added device of a kind is returned.
+        active: Whether it is read. An inactive device keeps its readings, and still moves and collides.
+        robot: The robot that carries it. Set when the device is added.
     """
 
     kind = "device"
@@ -85,32 +85,32 @@ class Device:
         self.active = True
 
     def read(self) -> None:
-        """Refresh the readings; at the end of each step, when all robots have moved."""
+        """Refresh the readings. Called at the end of each step, after all robots have moved."""
 
     def move(self) -> None:
-        """Advance by one step; right after the robot moved, and not when it was blocked."""
+        """Advance by one step. Called right after the robot moved, but not if it was blocked."""
 
     def reset(self) -> None:
-        """Back to what it was at first."""
+        """Restore the initial state."""
 
     def edges(self, *, ahead: bool) -> Sequence[Edge]:
-        """Edges that it adds to the robot's body, always as many.
+        """Return the edges that the device adds to the robot's body. Their number is constant.
 
         Args:
-            ahead: Whether as they will be after the next `move`; else as they are.
+            ahead: Whether to return the edges after the next `move`, instead of the present ones.
         """
         return ()
 
     def rays(self) -> list[Shape]:
-        """Shapes of its sight, drawn below the robot, in the world's coordinates [m]."""
+        """Shapes of the sensor's rays, drawn below the robot, in world coordinates [m]."""
         return []
 
     def shapes(self) -> list[Shape]:
-        """Shapes of the device, drawn above the robot, in the world's coordinates [m]."""
+        """Shapes of the device, drawn above the robot, in world coordinates [m]."""
         return []
 
     def to_dict(self) -> dict[str, Any]:
-        """Kind, whether it is active, and readings, as plain values."""
+        """Kind, `active`, and readings, as plain values."""
         return {"kind": self.kind, "active": self.active}
 
 
@@ -118,16 +118,16 @@ AnyDevice = TypeVar("AnyDevice", bound=Device)
 
 
 class SceneRobot:
-    """A robot with any outline, or none: then it collides with nothing and is seen by nobody.
+    """A robot with any outline, or none. Without an outline it collides with nothing, and no robot sees it.
 
     Args:
-        x, y: Where it begins [m].
-        heading: Where it faces [rad, counter-clockwise from +x].
-        name: What `world[name]` finds it by; the kind and a number when not given.
-        color: An X11 name or `#rrggbb`: what it looks like, to cameras too.
+        x, y: Start position [m].
+        heading: Start heading [rad, counter-clockwise from +x].
+        name: Key of the robot in `world[name]`. Default: its kind and a number.
+        color: An X11 name or `#rrggbb`, for pictures and for cameras.
         body: Corners of a closed outline in order, forward and left of the center [m].
         segments: Single edges that belong to the body as well, forward and left of both ends [m].
-        brain: Called with the robot in each step, when its turn to move has come.
+        brain: Function of the robot, called in each step before the robot moves.
 
     Attributes:
         speed: Commanded speed ahead [m/s].
@@ -136,12 +136,12 @@ class SceneRobot:
         speed_scale: Factor of both speeds, not of turning.
         stalled: Whether its last step was blocked.
         energy: 10000, less 1 for each step with a command other than 0; nothing depends on it.
-        keep_trail: Whether poses are kept in `trail`.
-        trail: Poses after each step or `place`, where they changed.
-        devices: What it carries, in the order of adding.
+        keep_trail: Whether poses are stored in `trail`.
+        trail: Poses after each step or `place` that changed the pose.
+        devices: Its devices in the order of adding.
 
-    Source: Jyro 0.3.2, `Robot`. Differs: odometry is right for sideways motion too; sideways is to the left, as all of
-    our numbers are; what it says can be drawn.
+    Source: Jyro 0.3.2, `Robot`. Differs: odometry is also right for sideways motion; sideways is positive to the left,
+    as everywhere in realitygap; the text of `say` can be drawn.
     """
 
     kind = "robot"
@@ -176,7 +176,7 @@ class SceneRobot:
 
     @property
     def world(self) -> Surroundings:
-        """The world that it is in; a RobotError if it is in none."""
+        """The world that the robot is in. A RobotError if it is in none."""
         if self._world is None:
             raise RobotError(
                 f"The {self.kind} {self.name or ''} is in no world: call world.add(robot) first."
@@ -185,11 +185,11 @@ class SceneRobot:
 
     @property
     def pose(self) -> Pose:
-        """Its pose; the heading lies in -pi..pi."""
+        """The pose of the robot; the heading is within -pi..pi."""
         return from_jyro(self._row)
 
     def place(self, pose: Sequence[float]) -> None:
-        """Put it at a pose, into other things, too; odometry stays."""
+        """Place the robot at a pose, even inside other things. Odometry does not change."""
         self._row[:] = to_jyro(pose)
         self._row[2] %= 2 * math.pi
         if self._world is not None:
@@ -202,17 +202,17 @@ class SceneRobot:
 
     @property
     def odometry(self) -> Pose:
-        """The pose as reckoned from its own motion since `localize`, or since the start: exact, without drift."""
+        """The pose as reckoned from the robot's motion since `localize` or the start: exact, without drift."""
         return self._odometry
 
     def localize(self, x: float = 0.0, y: float = 0.0, heading: float = 0.0) -> None:
-        """Set the odometry: x ahead [m], y to the left [m], heading [rad] in a frame of the robot's own."""
+        """Set the odometry: x ahead [m], y to the left [m], heading [rad], in a frame of the robot."""
         self._odometry = Pose(x, y, heading)
 
     # driving
 
     def move(self, speed: float, turn_rate: float) -> None:
-        """Drive at a speed [m/s] and turn to the left at a rate [rad/s] from now on, without any limit."""
+        """Drive at a speed [m/s] and turn to the left at a rate [rad/s] from now on. There are no limits."""
         self.speed, self.turn_rate = speed, turn_rate
 
     def translate(self, speed: float) -> None:
@@ -229,11 +229,11 @@ class SceneRobot:
         self.sideways = 0.0
 
     def say(self, text: str) -> None:
-        """Show a text next to it in pictures; an empty one removes it."""
+        """Show a text next to the robot in pictures. An empty text removes it."""
         self.speech = text
 
     def reset(self) -> None:
-        """Back to the start, stopped, with full energy and without a trail; its devices too."""
+        """Restore the start pose and the devices, stop the robot, fill its energy, and clear its trail."""
         self._row[:] = to_jyro(self._start)
         self._odometry = Pose(0.0, 0.0, 0.0)
         self.speed = self.sideways = self.turn_rate = 0.0
@@ -249,7 +249,7 @@ class SceneRobot:
     # devices
 
     def add(self, device: AnyDevice) -> AnyDevice:
-        """Give it a device, and get that device back.
+        """Add a device to the robot and return the device.
 
         Raises:
             RobotError: The device is on a robot already.
@@ -263,10 +263,10 @@ class SceneRobot:
         return device
 
     def __getitem__(self, kind: str) -> Any:
-        """The device of a kind that was added last.
+        """Return the last added device of a kind.
 
         Raises:
-            KeyError: It has none.
+            KeyError: The robot has no such device.
         """
         for device in reversed(self.devices):
             if device.kind == kind:
@@ -277,10 +277,10 @@ class SceneRobot:
     # what the world asks
 
     def edges(self, *, ahead: bool = False) -> NDArray[np.float64]:
-        """(e, 4) all edges of body and devices, forward and left of both ends [m].
+        """Return (e, 4) edges of body and devices, forward and left of both ends [m].
 
         Args:
-            ahead: Whether devices are taken as they will be after their next move.
+            ahead: Whether to return the edges of devices after their next move.
         """
         rows: list[Sequence[float]] = [
             (*corner, *self.body[i - 1]) for i, corner in enumerate(self.body)
@@ -291,7 +291,7 @@ class SceneRobot:
         return np.array(rows, np.float64).reshape(-1, 4)
 
     def _has_stepped(self, before: NDArray[np.float64]) -> None:
-        """Take note of a step that was not blocked: odometry, trail, devices."""
+        """Update odometry, trail, and devices after a step that was not blocked."""
         for device in self.devices:
             device.move()
         self._odometry = _reckoned(self._odometry, from_jyro(before), self.pose)
@@ -304,16 +304,16 @@ class SceneRobot:
     # showing
 
     def outlines(self) -> list[Shape]:
-        """The body as it is drawn."""
+        """The outline of the body as drawn."""
         return [self.polygon(self.body, self.color)] if self.body else []
 
     def polygon(self, corners: Sequence[Sequence[float]], fill: str, line: str | None = Ink.TEXT) -> Line:
-        """A filled polygon that is fixed to the robot: corners forward and left [m], an X11 color."""
+        """Return a filled polygon that is fixed to the robot: corners forward and left [m], an X11 color."""
         points = tuple(self.point(forward, left) for forward, left in corners)
         return Line(points, line, 0.8, closed=True, fill=hex_of(fill))
 
     def parts(self) -> dict[Part, list[Shape]]:
-        """Its shapes, part by part, from the hindmost to the foremost."""
+        """Return the shapes of the robot by part, from back to front."""
         return {
             "trails": self._trail_shapes(),
             "rays": [shape for device in self.devices if device.active for shape in device.rays()],
@@ -342,7 +342,7 @@ class SceneRobot:
         return [Text(x, y, self.speech, 8.0, "start", (8.0, 10.0), halo=True)]
 
     def _repr_svg_(self) -> str:
-        """The robot alone, with what it carries and without what it sees, in a square of 1 m."""
+        """The robot alone, with its devices and without its rays, in a square of 1 m."""
         x, y = self.point(0.0, 0.0)
         parts = self.parts()
         shapes = (*parts["bodies"], *parts["devices"], *parts["speech"])
@@ -368,7 +368,7 @@ class SceneRobot:
 
 
 def to_jyro(pose: Sequence[float]) -> NDArray[np.float64]:
-    """(3,) x, y [m], heading counter-clockwise from +y [rad]: Jyro's.
+    """Return (3,) x, y [m] and Jyro's heading: counter-clockwise from +y [rad].
 
     Raises:
         ValueError: The pose is not three finite numbers.
@@ -381,7 +381,7 @@ def to_jyro(pose: Sequence[float]) -> NDArray[np.float64]:
 
 
 def from_jyro(row: NDArray[np.float64]) -> Pose:
-    """The pose of x, y [m] and Jyro's heading [rad]; its own lies in -pi..pi."""
+    """Return the pose of x, y [m] and Jyro's heading [rad]. Its heading is within -pi..pi."""
     return Pose(float(row[0]), float(row[1]), math.remainder(float(row[2]) + math.pi / 2, 2 * math.pi))
 
 
@@ -397,7 +397,7 @@ def _segments(segments: Sequence[Sequence[float]]) -> list[Edge]:
 
 
 def _reckoned(odometry: Pose, before: Pose, after: Pose) -> Pose:
-    """Odometry carried on by the motion from one pose to another."""
+    """Return odometry advanced by the motion from one pose to another."""
     turn = odometry.heading - before.heading
     sine, cosine = math.sin(turn), math.cos(turn)
     dx, dy = after.x - before.x, after.y - before.y

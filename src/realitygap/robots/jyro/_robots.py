@@ -15,7 +15,7 @@ _Corners = list[tuple[float, float]]
 
 
 class _StockRobot(SceneRobot):
-    """A robot whose body is known."""
+    """A robot with a fixed body."""
 
     body_name: str
 
@@ -36,7 +36,7 @@ class _StockRobot(SceneRobot):
 
 
 class Scribbler(_StockRobot):
-    """A box of 0.18 x 0.16 m that is drawn rounder than it is."""
+    """A box of 0.18 x 0.16 m, drawn with a rounded outline."""
 
     kind = "scribbler"
     body_name = "Scribbler"
@@ -62,7 +62,7 @@ class Pioneer(_StockRobot):
 
 
 class Blimp(_StockRobot):
-    """A disc of 0.44 m without a body: it collides with nothing, and nobody sees it."""
+    """A disc of 0.44 m without a body: it collides with nothing, and no robot sees it."""
 
     kind = "blimp"
     body_name = "Blimp"
@@ -74,9 +74,9 @@ class Blimp(_StockRobot):
 
 
 class Puck(SceneRobot):
-    """A disc of 0.05 m, without a body unless one is given; nothing pushes it, a gripper can store it.
+    """A disc of 0.05 m, without a body unless one is given. Nothing pushes it; a gripper can store it.
 
-    Source: Jyro 0.3.2, where its friction has no effect either.
+    Source: Jyro 0.3.2. There too, its friction has no effect.
     """
 
     kind = "puck"

@@ -18,7 +18,7 @@ _Groups = dict[str, tuple[int, ...]]
 
 
 def _groups(n: int, **parts: tuple[int, ...]) -> _Groups:
-    """All of Jyro's names for parts of `n` sensors; those that are not given are empty."""
+    """Return groups for all of Jyro's names for parts of `n` sensors. Those not given are empty."""
     named = {name.replace("_", "-"): which for name, which in parts.items()}
     return {name: tuple(range(n)) if name == "all" else named.get(name, ()) for name in _PARTS}
 
@@ -30,9 +30,9 @@ _PAIR = _groups(
 
 
 class MyroIR(RangeSensor):
-    """Two infrared sensors that look to the front left and right, 0.5 m far.
+    """Two infrared sensors that look to the front left and right, with a range of 0.5 m.
 
-    Their mounts lie outside the Scribbler's box, as in Jyro: close to a wall they read from behind it.
+    Their mounts are outside the Scribbler's box, as in Jyro. Close to a wall, the rays begin behind the wall.
     """
 
     def __init__(self) -> None:

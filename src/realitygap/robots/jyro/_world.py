@@ -26,7 +26,7 @@ STEP_S = 0.1
 
 @dataclass(frozen=True)
 class Area:
-    """What walls stand around and pictures show filled: corners in order [m], and a color."""
+    """A filled area in pictures."""
 
     corners: tuple[tuple[float, float], ...]
     fill: str
@@ -49,20 +49,21 @@ class JyroWorld:
         arena: Walls, obstacles and lights to begin with; rounded corners are short straight walls. None for an empty
             world.
         step_s: Length of a step [s].
-        seed: Of the noise of sensors that have some.
+        seed: Seed of the sensors' noise.
 
     Attributes:
         time: Simulated time [s].
         n_steps: Steps since the start or the last reset.
-        robots: In the order of adding.
-        lights: Likewise; each may be changed at any time.
+        robots: Robots in the order of adding.
+        lights: Lamps in the order of adding. They may be changed at any time.
         areas: Insides of boxes and obstacles, which pictures show filled.
-        drawn: What else pictures show.
+        drawn: Further shapes in pictures.
         light_above_walls: Whether light passes over walls.
-        random: Where sensors take their noise from.
+        random: Generator of the sensors' noise.
 
-    Source: Jyro 0.3.2, `Physics` and `Simulator`. Differs: robots of one name are refused, where Jyro lets them pass
-    through each other; a reset sets time and devices back too; all sensors are read anew whenever something is added.
+    Source: Jyro 0.3.2, `Physics` and `Simulator`. Differs: two robots of one name are an error, whereas Jyro lets them
+    pass through each other; a reset also restores time and devices; all sensors are read again after something is
+    added.
     """
 
     def __init__(self, arena: Arena | None = None, *, step_s: float = STEP_S, seed: int = 0) -> None:
@@ -91,7 +92,7 @@ class JyroWorld:
     # what stands
 
     def add_wall(self, x1: float, y1: float, x2: float, y2: float, color: str = "black") -> None:
-        """Put up a wall from one point to another [m]."""
+        """Add a wall from one point to another [m]."""
         hex_of(color)
         ends = (float(x1), float(y1), float(x2), float(y2))
         if not np.isfinite(ends).all():
@@ -109,7 +110,7 @@ class JyroWorld:
         fill: str = "purple",
         wall_color: str | None = None,
     ) -> None:
-        """Put up four walls around two opposite corners [m]; robots may be within or without."""
+        """Add four walls around a box, given by two opposite corners [m]. Robots may be inside or outside."""
         color = fill if wall_color is None else wall_color
         hex_of(fill)
         left, right, bottom, top = min(x1, x2), max(x1, x2), min(y1, y2), max(y1, y2)
@@ -122,7 +123,7 @@ class JyroWorld:
     def add_polygon(
         self, corners: Sequence[Sequence[float]], fill: str = "purple", wall_color: str | None = None
     ) -> None:
-        """Put up walls around any outline: (c, 2) corners in order [m]."""
+        """Add walls around any outline: (c, 2) corners in order [m]."""
         hex_of(fill)
         points = tuple((float(x), float(y)) for x, y in corners)
         if len(points) < 3:
@@ -142,7 +143,7 @@ class JyroWorld:
             self.add_light(light.x, light.y, light.strength)
 
     def add_light(self, x: float, y: float, brightness: float = 1.0, color: str = "yellow") -> Lamp:
-        """Put up a lamp [m], and get it back."""
+        """Add a lamp [m] and return it."""
         hex_of(color)
         lamp = Lamp(x, y, brightness, color)
         self.lights.append(lamp)
@@ -151,7 +152,7 @@ class JyroWorld:
         return lamp
 
     def add_shape(self, shape: Shape) -> None:
-        """Show something in pictures [m]; nothing collides with it and nobody sees it."""
+        """Add a shape to pictures [m]. Robots neither see it nor collide with it."""
         self.drawn.append(shape)
 
     @property
@@ -165,7 +166,7 @@ class JyroWorld:
         return tuple(self._wall_colors)
 
     def add(self, robot: AnyRobot) -> AnyRobot:
-        """Put a robot into the world, and get it back.
+        """Add a robot to the world and return it.
 
         Raises:
             RobotError: It is in a world already, or its name is taken.
@@ -185,7 +186,7 @@ class JyroWorld:
         return next(name for k in range(1, len(taken) + 2) if (name := f"{kind}-{k}") not in taken)
 
     def __getitem__(self, name: str) -> SceneRobot:
-        """The robot of a name.
+        """Return the robot with a name.
 
         Raises:
             KeyError: There is none.
@@ -199,11 +200,11 @@ class JyroWorld:
     # going on
 
     def step(self, n_steps: int = 1, *, brains: bool = True) -> None:
-        """Go on by some steps.
+        """Advance the world by some steps.
 
         Args:
-            n_steps: How many.
-            brains: Whether robots are asked for commands; else they go on with those that they have.
+            n_steps: Number of steps.
+            brains: Whether to call the robots' brains. Otherwise robots keep their commands.
         """
         self._prepare()
         for _ in range(n_steps):
@@ -217,12 +218,12 @@ class JyroWorld:
             self._read()
 
     def run(self, seconds: float, *, brains: bool = True, real_time: bool = False) -> None:
-        """Go on for a time of the simulation [s], rounded to whole steps.
+        """Advance the world by a simulated time [s], rounded to whole steps.
 
         Args:
-            seconds: How long.
-            brains: Whether robots are asked for commands.
-            real_time: Whether to take as long as the simulation does.
+            seconds: Simulated time [s].
+            brains: Whether to call the robots' brains.
+            real_time: Whether to run at real-time speed.
         """
         for _ in range(round(seconds / self.step_s)):
             began = time.perf_counter()
@@ -231,7 +232,7 @@ class JyroWorld:
                 time.sleep(max(0.0, self.step_s - (time.perf_counter() - began)))
 
     def reset(self) -> None:
-        """Robots, devices, lamps and time as at first."""
+        """Restore the initial state of robots, devices, lamps, and time."""
         for lamp, first in zip(self.lights, self._first_lights, strict=True):
             lamp.x, lamp.y, lamp.brightness, lamp.color = first.x, first.y, first.brightness, first.color
         self._begin()
@@ -261,15 +262,16 @@ class JyroWorld:
     def look(
         self, robot: SceneRobot, mounts: NDArray[np.float64], reach: float
     ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-        """What rays from a robot meet first, other than the robot itself.
+        """Return what rays from a robot meet first, except the robot itself.
 
         Args:
-            robot: Which.
+            robot: The robot.
             mounts: (s, 3) forward, left [m] and direction [rad] of each ray.
-            reach: How far they go [m].
+            reach: Maximum length of a ray [m].
 
         Returns:
-            distances (s,) [m], `reach` where nothing is met; hits (s,): -1 there, else what `what` takes.
+            distances (s,) [m], `reach` if a ray meets nothing; hits (s,), -1 for nothing, otherwise an argument of
+            `what`.
         """
         distances, hits = np.empty(len(mounts)), np.empty(len(mounts), np.int64)
         number = self.robots.index(robot)
@@ -277,7 +279,7 @@ class JyroWorld:
         return np.minimum(distances, reach), hits
 
     def what(self, hit: int) -> tuple[str, SceneRobot | None]:
-        """What a ray met: its color, and which robot it is, or None for a wall."""
+        """Return the color of the thing that a ray met, and the robot, or None for a wall."""
         n_walls = len(self._walls)
         if hit < n_walls:
             return self._wall_colors[hit], None
@@ -287,7 +289,7 @@ class JyroWorld:
     def light_at(
         self, robot: SceneRobot, mounts: NDArray[np.float64], mode: int, reach: float, stops: int
     ) -> NDArray[np.float64]:
-        """(s,) the light that arrives at `mounts` (s, 3) of a robot; mode and stops as the kernel has them."""
+        """Return (s,) the light at `mounts` (s, 3) of a robot. `mode` and `stops` are those of the kernel."""
         lights = np.array([(lamp.x, lamp.y, lamp.brightness) for lamp in self.lights], np.float64).reshape(
             -1, 3
         )
@@ -299,13 +301,13 @@ class JyroWorld:
     # keeping the arrays
 
     def _has_changed(self) -> None:
-        """Something was added: the arrays are made anew, and all devices are read."""
+        """Rebuild the arrays and read all devices after something was added."""
         self._is_ready = False
         self._prepare()
         self._read()
 
     def _is_placed(self, robot: SceneRobot) -> None:
-        """A robot was put somewhere."""
+        """Update the arrays after a robot was placed."""
         if robot in self.robots:
             self._place(robot)
             self._read_devices(robot)
@@ -367,7 +369,7 @@ class JyroWorld:
         return save_picture(self.picture(), path, width)
 
     def save_movie(self, path: str | Path, n_steps: int, *, every: int = 1, width: int = 480) -> Path:
-        """Go on by some steps, and write what happens as a GIF that is as fast as the simulated time.
+        """Advance the world by some steps, and write them as a GIF that runs at the simulated speed.
 
         Args:
             path: Ends in .gif.
@@ -391,7 +393,7 @@ class JyroWorld:
                 yield self.picture()
 
     def to_dict(self) -> dict[str, Any]:
-        """Time, what stands and what all robots are and do, as plain values."""
+        """Time, walls, lamps, and the state of all robots, as plain values."""
         return {
             "time": self.time,
             "n_steps": self.n_steps,

@@ -1,8 +1,8 @@
 """The Parallax Scribbler (S1, S2, S3), alone or with a Fluke (1, 2), over its serial or Bluetooth port.
 
-`_codec` knows the bytes, `_reading` reads an answer, `_link` has the port and knows what to do when bytes are lost.
-The wheels, the senses, sound and light, who the robot is, its camera, what only an S2 does, and the rest of the Fluke
-have a file each; `_robot` puts them together and meets the contract.
+`_codec` converts values to bytes and back, `_reading` reads an answer, and `_link` owns the port and recovers from
+lost bytes. Wheels, sensors, sound and light, identity, camera, functions of an S2 only, and further functions of the
+Fluke have a file each. `_robot` combines them and meets the contract.
 """
 
 from ._codec import Blob, MotorStats, SensorBlock

@@ -1,4 +1,4 @@
-"""What a Fluke does beside sensing and seeing: infrared messages, servos, its log, resetting the robot."""
+"""Functions of a Fluke other than sensors and camera: infrared messages, servos, error log, reset of the robot."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from ._device import Device
 from .opcodes import COUNTED, Op
 
 RESET_S = 3.0
-"""How long a robot takes to begin anew [s]. Source: what Scribbler2-Python waits."""
+"""Time that a robot needs to restart [s]. Source: the wait in Scribbler2-Python."""
 FIRST_MESSAGES = (2, 8, 1)
-"""The firmware of the first Fluke that sends messages. Source: what Myro asks for."""
+"""First firmware of a Fluke that sends messages. Source: the check in Myro."""
 _EMITTERS = {"right": 1, "center": 2, "left": 4}
 
 
 class Board(Device):
-    """The parts of a Fluke that no trial needs."""
+    """The functions of a Fluke that no trial needs."""
 
     def _need_messages(self, what: str) -> None:
         self._need(what, self.info.has_fluke(*FIRST_MESSAGES), "a Fluke with firmware 2.8.1 or newer")
@@ -31,7 +31,7 @@ class Board(Device):
         self._tell_fluke("send_ir_message", Op.SEND_IR_MESSAGE, arguments, repeatable=False)
 
     def get_ir_message(self) -> bytes:
-        """The bytes that came by infrared since the last call; not asked again where the answer is lost."""
+        """Return the bytes that arrived by infrared since the last call. A lost answer is not requested again."""
         self._need_messages("get_ir_message")
         request = fluke_request("get_ir_message", Op.GET_IR_MESSAGE, answer=COUNTED, repeatable=False)
         return self._get(request, bytes)
@@ -49,7 +49,7 @@ class Board(Device):
         self._tell_fluke("servo", Op.SET_SERVO, arguments)
 
     def error_log(self) -> str:
-        """What a Fluke 2 wrote into its log."""
+        """Return the error log of a Fluke 2."""
         self.need_fluke_2("error_log")
         request = fluke_request("error_log", Op.GET_ERRORS, answer=COUNTED, repeatable=False)
         return self._get(request, bytes).decode("utf-8", "replace")
@@ -65,7 +65,7 @@ class Board(Device):
         A Fluke pulls the robot's reset line; without one the robot is asked to.
 
         Raises:
-            RobotError: It does not come back.
+            RobotError: The robot does not answer again.
         """
         self.need_robot("reset_robot")
         if self.info.fluke == "none":

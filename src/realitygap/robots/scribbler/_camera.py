@@ -21,19 +21,19 @@ Kind = Literal["jpeg", "jpeg-fast", "gray", "grayjpeg", "grayjpeg-fast", "grayra
 KINDS = ("jpeg", "jpeg-fast", "gray", "grayjpeg", "grayjpeg-fast", "grayraw", "color", "blob")
 
 PICTURE_WAIT_S = 6.0
-"""How long a camera may take before the first byte of a picture [s]."""
+"""Maximum time until the first byte of a picture [s]."""
 SETTLE_S = 0.15
-"""How long a register of the camera takes to settle [s]. Source: Myro's scribbler.py."""
+"""Time that a register of the camera needs to settle [s]. Source: Myro's scribbler.py."""
 FIRST_JPEG = (2, 7, 8)
-"""The firmware of the first Fluke that compresses pictures."""
+"""First firmware of a Fluke that compresses pictures."""
 RAW_WINDOW = 3
-"""Of the four windows, the one that raw gray pictures use; the other three are those of `bright`."""
+"""Window for raw gray pictures. The other three windows are those of `bright`."""
 DEFAULT_BLOB = (90, 4, 0, 255, 51, 136, 190, 255)
-"""Delay, smoothing and limits of Y, U, V. Source: what Myro sets as it connects."""
+"""Delay, smoothing, and limits of Y, U, V. Source: the values that Myro sets when it connects."""
 
 
 class Camera(Device):
-    """Pictures, brightness and blobs. The camera is set up at its first use, as Myro does as it connects."""
+    """Pictures, brightness, and blobs. The camera is set up at its first use, as Myro does when it connects."""
 
     _is_prepared = False
     _is_small = False
@@ -43,7 +43,7 @@ class Camera(Device):
     # setting up
 
     def _prepare(self, what: str) -> None:
-        """At the first use: automatic colors and exposure, the three windows of `bright`, the color of blobs."""
+        """Set up automatic colors and exposure, the windows of `bright`, and the color of blobs at the first use."""
         self.need_fluke(what)
         if self._is_prepared:
             return
@@ -69,7 +69,7 @@ class Camera(Device):
 
     @property
     def picture_size(self) -> Size:
-        """Width and height of a picture as the camera is set."""
+        """Return width and height of a picture with the present setting."""
         from ._images import FLUKE_1, FLUKE_2_LARGE, FLUKE_2_SMALL
 
         if self.info.fluke != "2":
@@ -88,9 +88,9 @@ class Camera(Device):
     def set_window(
         self, number: int, x_low: int, y_low: int, x_high: int, y_high: int, x_step: int, y_step: int
     ) -> None:
-        """Define window 0 to 3: columns and rows from low to high, both included, every so many.
+        """Define window 0 to 3: columns and rows from low to high, both included, in steps of `x_step` and `y_step`.
 
-        Odd columns are brightness, so an odd `x_low` with an even `x_step` sees brightness alone.
+        Odd columns are brightness, so an odd `x_low` with an even `x_step` selects brightness only.
         """
         window = whole_number("number", number, 0, 3)
         is_2 = self.info.fluke == "2"
@@ -106,7 +106,7 @@ class Camera(Device):
         self._tell_fluke("set_window", Op.SET_WINDOW, arguments)
 
     def set_white_balance(self, on: bool) -> None:
-        """Let the camera correct colors by itself, or not."""
+        """Switch automatic white balance on or off."""
         self._tell_fluke("set_white_balance", Op.WHITE_BALANCE_ON if on else Op.WHITE_BALANCE_OFF)
 
     def darken_camera(self, level: int = 0) -> None:
@@ -122,7 +122,7 @@ class Camera(Device):
             self._set_register(register, level)
 
     def auto_camera(self) -> None:
-        """Let the camera choose exposure, gain and colors, as it does at first."""
+        """Switch automatic exposure, gain, and colors on, as after a restart."""
         self._prepare("auto_camera")
         if self.info.fluke == "2":
             self._set_register(0x0D, 0x01)
@@ -132,7 +132,7 @@ class Camera(Device):
             self._set_register(register, value)
 
     def manual_camera(self, gain: int = 0x00, brightness: int = 0x80, exposure: int = 0x41) -> None:
-        """Choose gain, brightness and exposure, each 0 to 255; a Fluke 2 takes the exposure alone."""
+        """Set gain, brightness, and exposure, each 0 to 255. A Fluke 2 has the exposure only."""
         self._prepare("manual_camera")
         chosen = (("gain", gain), ("brightness", brightness), ("exposure", exposure))
         values = [whole_number(name, value, 0, 255) for name, value in chosen]
@@ -147,12 +147,12 @@ class Camera(Device):
     # seeing
 
     def picture(self, kind: Kind = "jpeg") -> Pixels:
-        """A picture, (h, w, 3) uint8 red, green, blue, or (h, w) uint8 in gray; rows from the top.
+        """Return a picture, (h, w, 3) uint8 red, green, blue, or (h, w) uint8 in gray; rows from the top.
 
         Args:
             kind: "jpeg" or "jpeg-fast" in color, "grayjpeg" (also "gray") or "grayjpeg-fast" in gray; "color" and
-                "grayraw" without compression, which takes many seconds; "blob": 255 where the color of
-                `configure_blob` is. A Fluke older than 2.7.8 knows no compression.
+                "grayraw" without compression, which takes many seconds; "blob": 255 for pixels with the color of
+                `configure_blob`. A Fluke older than 2.7.8 has no compression.
         """
         if kind not in KINDS:
             raise ValueError(f"Unknown kind of picture {kind!r}. {did_you_mean(str(kind), KINDS)}")
@@ -208,7 +208,7 @@ class Camera(Device):
         return self._get(request, lambda data: run_pixels(data, size, word))
 
     def bright(self) -> tuple[int, int, int]:
-        """How bright it is to the left, center and right: sums of the pixels of the camera's three windows."""
+        """Return the brightness to the left, center, and right: sums of the pixels in the camera's three windows."""
         self._prepare("bright")
         left, center, right = (
             self._get(
@@ -220,7 +220,7 @@ class Camera(Device):
         return left, center, right
 
     def blob(self) -> Blob:
-        """How many pixels have the color of `configure_blob`, and where their middle is."""
+        """Return the number of pixels that have the color of `configure_blob`, and their center."""
         self._prepare("blob")
         return self._get(_camera_request("blob", Op.GET_BLOB), codec.blob)
 
@@ -235,7 +235,7 @@ class Camera(Device):
         v_low: int = 190,
         v_high: int = 255,
     ) -> None:
-        """Choose which colors are a blob: limits of brightness Y and colors U and V, each 0 to 255."""
+        """Set the color range of a blob: limits of brightness Y and colors U and V, each 0 to 255."""
         self._prepare("configure_blob")
         values = (delay, smooth, y_low, y_high, u_low, u_high, v_low, v_high)
         arguments = bytes(whole_number("A value", value, 0, 255) for value in values)

@@ -1,7 +1,7 @@
-"""Bytes to values and back: what is sent for each command, and what its answer says. Nothing here waits or fails.
+"""Conversion between bytes and values: the bytes of each command, and the content of its answer. Nothing here waits.
 
-Except that an answer that no robot gives is refused (`ProtocolError`): on a link without checksums, that is how a lost
-byte shows.
+An answer that no robot gives raises a `ProtocolError`. On a link without checksums, this is how a lost byte is
+detected.
 
 Source: the protocol of Myro's firmware and clients (`opcodes.py`).
 """
@@ -18,28 +18,28 @@ from realitygap.errors import ProtocolError
 from .opcodes import FLUKE_2_COMMANDS, PACKET, ROBOT_ANSWERS, S2_ANSWERS, Op
 
 ANSWER_S = 2.0
-"""How long an answer may take to begin [s]: an S1 in the dark takes 0.4 s; the rest is for Bluetooth."""
+"""Maximum time until an answer begins [s]: an S1 in the dark needs 0.4 s; the rest is for Bluetooth."""
 
 VOLTS_PER_COUNT = 1 / 20.9813
-"""Of the battery's reading. Source: Myro's scribbler.py and the Fluke's fluke.c."""
+"""Voltage per count of the battery's reading. Source: Myro's scribbler.py and the Fluke's fluke.c."""
 
 MAX_OBSTACLE = 8191
-"""More than an obstacle sensor can count: the loop of a Fluke 1 allows about 8000."""
+"""A value above the range of an obstacle sensor: the loop of a Fluke 1 allows about 8000."""
 
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """One command as it goes over the wire, and what to expect of its answer.
+    """The bytes of one command, and the expected answer.
 
     Attributes:
-        name: What people call it.
+        name: Name of the command, for messages.
         data: All of its bytes.
-        answer: Bytes of its answer after the echo, or one of the kinds in `opcodes` (LINE, COUNTED ...).
-        echoed: Whether the bytes come back first, as a robot's do; a Fluke's do not.
-        repeatable: Whether sending it twice does what sending it once does.
-        wait_s: How long the answer may take to begin [s].
-        pause_s: How long the robot wants to be left alone afterwards [s].
-        may_stay_out: Whether a Fluke 2, which waits only 0.3 s for a robot, may swallow the answer.
+        answer: Number of bytes of its answer after the echo, or one of the kinds in `opcodes` (LINE, COUNTED ...).
+        echoed: Whether an echo precedes the answer. A robot sends an echo, a Fluke does not.
+        repeatable: Whether sending the command twice has the same effect as sending it once.
+        wait_s: Maximum time until the answer begins [s].
+        pause_s: Time without commands that the robot needs afterwards [s].
+        may_stay_out: Whether the answer may be missing, because a Fluke 2 waits only 0.3 s for a robot.
     """
 
     name: str
@@ -53,13 +53,13 @@ class Request:
 
 
 class SensorBlock(NamedTuple):
-    """All senses of a robot without its Fluke, as they came.
+    """All sensors of a robot without its Fluke, in raw values.
 
     Attributes:
         ir: (2,) left, right: 1 is free, 0 an obstacle.
         light: (3,) left, center, right: 0 (bright) to 65535 (dark).
         line: (2,) left, right: 1 is dark, a line.
-        stall: Whether the wheels do not turn as they should.
+        stall: Whether the robot reports a stall.
     """
 
     ir: tuple[int, int]
@@ -69,15 +69,15 @@ class SensorBlock(NamedTuple):
 
 
 class MotorStats(NamedTuple):
-    """How an S2 moves.
+    """State of the motors of an S2.
 
     Attributes:
         left: Encoder counts of the last 0.1 s, -128 to 127.
-        right: Likewise.
-        idler_age_s: Since when the idler wheel has not moved [s].
-        idler_speed: 0 to 63.
+        right: Encoder counts of the right wheel, as for `left`.
+        idler_age_s: Time since the idler wheel last moved [s].
+        idler_speed: Speed of the idler wheel, 0 to 63.
         moving: Whether a motor turns.
-        ready: Whether a new motion may be given.
+        ready: Whether the robot accepts a new motion.
     """
 
     left: int
@@ -89,7 +89,7 @@ class MotorStats(NamedTuple):
 
 
 class Blob(NamedTuple):
-    """The patch of the color asked for: how many pixels, and their middle in columns and rows of the picture."""
+    """The patch with the color of `configure_blob`: number of pixels, and their center in columns and rows."""
 
     n_pixels: int
     column: int
@@ -97,7 +97,7 @@ class Blob(NamedTuple):
 
 
 def packet(op: Op, arguments: bytes = b"") -> bytes:
-    """The nine bytes of a robot's command."""
+    """Return the nine bytes of a robot's command."""
     return bytes((op,)) + arguments.ljust(PACKET - 1, b"\0")
 
 
@@ -110,7 +110,7 @@ def robot_request(
     wait_s: float = ANSWER_S,
     may_stay_out: bool = False,
 ) -> Request:
-    """A command of the robot, answered with an echo and bytes as the table has them."""
+    """Return a command of the robot, which is answered with an echo and the number of bytes in the table."""
     answer = ROBOT_ANSWERS[op] if op in ROBOT_ANSWERS else S2_ANSWERS[op]
     return Request(
         name, packet(op, arguments), answer, True, repeatable, wait_s=wait_s, may_stay_out=may_stay_out
@@ -127,7 +127,7 @@ def fluke_request(
     wait_s: float = ANSWER_S,
     pause_s: float = 0.0,
 ) -> Request:
-    """A command of the Fluke; `answer` where the table leaves it open."""
+    """Return a command of the Fluke. `answer` is needed if the table has no length of the answer."""
     if answer is None:
         answer = FLUKE_2_COMMANDS[op].answer
     return Request(name, bytes((op,)) + arguments, answer, False, repeatable, wait_s, pause_s)
@@ -141,12 +141,12 @@ BATTERY = fluke_request("battery", Op.GET_BATTERY)
 
 
 def wheel_byte(value: float) -> int:
-    """The byte of one wheel: 0 full back, 100 stop, 200 full ahead; the fraction is cut off, as Myro does."""
+    """Return the byte of one wheel: 0 full back, 100 stop, 200 full ahead. The fraction is cut off, as in Myro."""
     return int((value + 1.0) * 100.0)
 
 
 def motors(left: float, right: float) -> Request:
-    """Turn the wheels, each -1 to 1, until told otherwise; the right one comes first on the wire."""
+    """Return the command that turns the wheels, each -1 to 1, until the next one. The right wheel is sent first."""
     return Request(
         "motors",
         bytes((Op.SET_MOTORS, wheel_byte(right), wheel_byte(left), 0, 0, 0, 0, 0, 0)),
@@ -156,9 +156,9 @@ def motors(left: float, right: float) -> Request:
 
 
 def is_echo(sent: bytes, got: bytes) -> bool:
-    """Whether these nine bytes are what a robot sends back of a command.
+    """Return whether nine bytes are the echo of a command.
 
-    A Fluke that has itself ahead turns the motors round before it passes them on, so their echo may come turned.
+    A Fluke whose own end is ahead swaps the motors before it passes the command on, so their echo may be swapped.
     """
     if sent == got:
         return True
@@ -175,7 +175,7 @@ def _bits(name: str, values: bytes) -> tuple[int, ...]:
 
 
 def sensor_block(answer: bytes) -> SensorBlock:
-    """The senses in the 11 bytes with which every setting is answered."""
+    """Decode the sensors from the 11 bytes that answer every setting."""
     ir_left, ir_right, left, center, right, line_left, line_right, stall = struct.unpack(">BBHHHBBB", answer)
     if ir_left > 1 or ir_right > 1 or line_left > 1 or line_right > 1 or stall > 1:
         _bits("A flag of the sensors", bytes((ir_left, ir_right, line_left, line_right, stall)))
@@ -183,22 +183,22 @@ def sensor_block(answer: bytes) -> SensorBlock:
 
 
 def nothing(answer: bytes) -> None:
-    """Of an answer that is of no interest."""
+    """Discard an answer."""
 
 
 def flag(answer: bytes) -> int:
-    """One byte that is 0 or 1."""
+    """Decode one byte that is 0 or 1."""
     return _bits("The answer", answer)[0]
 
 
 def two_flags(answer: bytes) -> tuple[int, int]:
-    """Left and right, each 0 or 1."""
+    """Decode left and right, each 0 or 1."""
     left, right = _bits("The answer", answer)
     return left, right
 
 
 def binary_block(answer: bytes) -> tuple[tuple[int, int], tuple[int, int], bool]:
-    """IR (left, right), line (left, right) and stall from the bits of one byte."""
+    """Decode IR (left, right), line (left, right), and stall from the bits of one byte."""
     bits = answer[0]
     if bits > 31:
         raise ProtocolError(f"The flags are {bits}, expected at most 31: a byte was lost or added")
@@ -206,18 +206,18 @@ def binary_block(answer: bytes) -> tuple[tuple[int, int], tuple[int, int], bool]
 
 
 def light_words(answer: bytes) -> tuple[int, int, int]:
-    """Light left, center, right."""
+    """Decode light left, center, right."""
     left, center, right = struct.unpack(">HHH", answer)
     return left, center, right
 
 
 def word(answer: bytes) -> int:
-    """A whole number of one to three bytes, high one first."""
+    """Decode a whole number of one to three bytes, high byte first."""
     return int.from_bytes(answer, "big")
 
 
 def obstacle(answer: bytes) -> int:
-    """How much infrared came back: 0 is free, 6400 and above an obstacle."""
+    """Decode the infrared light that returned: 0 is free, 6400 and above an obstacle."""
     value = int.from_bytes(answer, "big")
     if value > MAX_OBSTACLE:
         raise ProtocolError(
@@ -227,7 +227,7 @@ def obstacle(answer: bytes) -> int:
 
 
 def volts(answer: bytes) -> float:
-    """The battery [V]."""
+    """Decode the battery voltage [V]."""
     value = int.from_bytes(answer, "big")
     if value > 511:
         raise ProtocolError(f"The battery reads {value}, expected at most 511: a byte was lost or added")
@@ -235,44 +235,44 @@ def volts(answer: bytes) -> float:
 
 
 def distance(answer: bytes) -> int:
-    """How far an S2 sees: 0 (touching) to 99 (nothing seen)."""
+    """Decode the distance by an S2: 0 (touching) to 99 (nothing in range)."""
     if answer[0] > 100:
         raise ProtocolError(f"A distance is {answer[0]}, expected at most 100: a byte was lost or added")
     return answer[0]
 
 
 def signed_long(answer: bytes) -> int:
-    """Four bytes, two's complement."""
+    """Decode four bytes in two's complement."""
     return int.from_bytes(answer, "big", signed=True)
 
 
 def signed_longs(answer: bytes) -> tuple[int, int]:
-    """Eight bytes: two of them."""
+    """Decode two numbers from eight bytes."""
     one, other = struct.unpack(">ii", answer)
     return one, other
 
 
 def motor_stats(answer: bytes) -> MotorStats:
-    """How an S2 moves, from five bytes."""
+    """Decode the state of an S2's motors from five bytes."""
     left, right, age, idler, ready = struct.unpack(">bbBBB", answer)
     return MotorStats(left, right, age / 10, idler >> 2, bool(idler & 3), ready == 1)
 
 
 def blob(answer: bytes) -> Blob:
-    """Count, column and row from four bytes."""
+    """Decode count, column, and row from four bytes."""
     return Blob(*struct.unpack(">HBB", answer))
 
 
 def text(answer: bytes) -> str:
-    """Characters of a name, without what fills it up."""
+    """Decode the characters of a name, without padding."""
     return answer.decode("latin-1").strip("\0 ")
 
 
 def name_bytes(what: str, value: str) -> bytes:
-    """A name or password as 16 bytes, filled up with blanks as the robot's own are.
+    """Return a name or password as 16 bytes, padded with blanks as the robot's own names are.
 
     Raises:
-        ValueError: it is longer, or has a letter beyond ASCII.
+        ValueError: The name is longer, or has a character that is not ASCII.
     """
     if not value.isascii() or not value.isprintable() or len(value) > 16:
         raise ValueError(f"The {what} is {value!r}, expected at most 16 printable ASCII characters.")
@@ -280,13 +280,13 @@ def name_bytes(what: str, value: str) -> bytes:
 
 
 class InfoLine(NamedTuple):
-    """What a robot and its Fluke say of themselves.
+    """Models and firmware versions of a robot and its Fluke.
 
     Attributes:
-        model: "s1", "s2" (also an S3), or None where no robot answers.
+        model: "s1", "s2" (also an S3), or None if no robot answers.
         fluke: "none", "1" or "2".
-        robot_version: As it came; empty where there is no robot.
-        fluke_version: As it came; empty where there is no Fluke.
+        robot_version: Firmware version of the robot as sent. Empty if there is no robot.
+        fluke_version: Firmware version of the Fluke as sent. Empty if there is no Fluke.
     """
 
     model: str | None
@@ -300,7 +300,7 @@ _MODELS = {"scribbler": "s1", "scribbler2": "s2", "scribbler3": "s2"}
 
 
 def info_line(answer: bytes) -> InfoLine:
-    """Who answers, from the info line, whatever of an echo or of a name comes before it."""
+    """Decode the info line. Parts of an echo or of a name may precede it."""
     first = _INFO_KEY.search(answer)
     if first is None:
         raise ProtocolError(f"{answer[:60]!r} is not how a Scribbler or a Fluke presents itself")
@@ -332,10 +332,10 @@ _PLAIN_INFO = re.compile(
 
 
 def is_plain_info(answer: bytes) -> bool:
-    """Whether an info line is letter by letter as the firmware known to us writes it."""
+    """Return whether an info line has exactly the form of the known firmware."""
     return _PLAIN_INFO.fullmatch(answer) is not None
 
 
 def late_sensor_block(answer: bytes) -> SensorBlock | None:
-    """The senses, or None where a Fluke 2 did not wait for them."""
+    """Decode the sensors, or return None if a Fluke 2 did not wait for them."""
     return sensor_block(answer) if answer else None

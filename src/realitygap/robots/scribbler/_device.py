@@ -1,4 +1,4 @@
-"""An open robot: its link, who it is, and what every part of the driver builds on."""
+"""An open robot: its link, its identity, and the base class of all parts of the driver."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class RobotInfo:
-    """Who is at the other end of a port.
+    """Model, firmware, and port of a robot.
 
     Attributes:
         model: "s1", "s2" (also an S3), or None: a Fluke without a robot.
         fluke: "none", "1" or "2".
-        robot_version: Of the firmware, as it says; empty where there is no robot.
-        fluke_version: Of the Fluke's, likewise.
-        port: Its name.
-        label: What figures say of it.
+        robot_version: Firmware version of the robot as sent. Empty if there is no robot.
+        fluke_version: Firmware version of the Fluke as sent. Empty if there is no Fluke.
+        port: Name of the port.
+        label: Label of its trials in figures.
     """
 
     model: str | None
@@ -39,7 +39,7 @@ class RobotInfo:
     label: Label
 
     def has_fluke(self, *version: int) -> bool:
-        """Whether there is a Fluke with at least this firmware."""
+        """Return whether there is a Fluke with at least this firmware version."""
         return self.fluke != "none" and numbers(self.fluke_version) >= version
 
     def __str__(self) -> str:
@@ -50,40 +50,40 @@ class RobotInfo:
 
 
 class Device:
-    """What all parts of the driver share: asking, and knowing what the robot has."""
+    """Base class of all parts of the driver: sends requests, and checks what hardware the robot has."""
 
     link: Link
     info: RobotInfo
     last_sensors: SensorBlock | None = None
-    """The senses that came with the answer to the last setting; None before the first."""
+    """Sensors from the answer to the last setting. None before the first one."""
 
     @property
     def port(self) -> Any:
-        """The serial object; an emulated one has `clock` and `witness`."""
+        """The serial object. That of an emulated robot has `clock` and `witness`."""
         return self.link.port
 
     @property
     def faults(self) -> Faults:
-        """How often the link was disturbed so far."""
+        """Numbers of the faults of the link so far."""
         return self.link.faults
 
     def _get(self, request: Request, decode: Callable[[bytes], T]) -> T:
         return self.link.ask(request, decode)
 
     def _set(self, request: Request) -> SensorBlock:
-        """Have a setting of the robot carried out; its answer is what the robot senses."""
+        """Send a setting of the robot and return the sensors from its answer."""
         self.last_sensors = self.link.ask(request, codec.sensor_block)
         return self.last_sensors
 
     def _set_late(self, request: Request) -> None:
-        """The same where a Fluke 2 may not wait for the answer."""
+        """Send a setting of the robot whose answer a Fluke 2 may drop."""
         block = self.link.ask(request, codec.late_sensor_block)
         self.last_sensors = block if block is not None else self.last_sensors
 
     def _tell_fluke(
         self, name: str, op: Op, arguments: bytes = b"", *, repeatable: bool = True, pause_s: float = 0.0
     ) -> None:
-        """A setting of the Fluke, which answers none."""
+        """Send a setting of the Fluke, which has no answer."""
         self.need_fluke(name)
         request = codec.fluke_request(name, op, arguments, answer=0, repeatable=repeatable, pause_s=pause_s)
         self.link.ask(request, codec.nothing)
@@ -93,32 +93,32 @@ class Device:
             raise RobotError(f"'{what}' needs {who_has_it}; here is {self.info}.")
 
     def need_robot(self, what: str) -> None:
-        """Raise `RobotError` where no robot is behind the Fluke."""
+        """Raise `RobotError` if there is no robot behind the Fluke."""
         self._need(what, self.info.model is not None, "a robot (S1, S2 or S3)")
 
     def need_s2(self, what: str) -> None:
-        """Raise `RobotError` where the robot is not an S2 or S3."""
+        """Raise `RobotError` if the robot is not an S2 or S3."""
         self._need(what, self.info.model == "s2", "an S2 or S3")
 
     def need_fluke(self, what: str) -> None:
-        """Raise `RobotError` where there is no Fluke."""
+        """Raise `RobotError` if there is no Fluke."""
         self._need(what, self.info.fluke != "none", "a Fluke")
 
     def need_fluke_2(self, what: str) -> None:
-        """Raise `RobotError` where there is no Fluke 2."""
+        """Raise `RobotError` if there is no Fluke 2."""
         self._need(what, self.info.fluke == "2", "a Fluke 2")
 
 
 def numbers(version: str) -> tuple[int, ...]:
-    """A version to be compared with others."""
+    """Return a version as numbers that can be compared."""
     return tuple(int(each) for each in re.findall(r"\d+", version))
 
 
 def limited(name: str, value: float, low: float, high: float) -> float:
-    """The value, if it is within its range.
+    """Return a value if it is within its range.
 
     Raises:
-        ValueError: it is not.
+        ValueError: The value is out of range.
     """
     if not low <= value <= high:
         raise ValueError(f"{name} is {value!r}, expected {low:g} to {high:g}.")

@@ -1,4 +1,4 @@
-"""The wheels."""
+"""Functions that turn the wheels."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from ._device import Device, limited
 
 
 class Driving(Device):
-    """Turning the wheels. The robot keeps on doing what it was told last, until it is told something else."""
+    """Wheel commands. The robot keeps its last command until the next one."""
 
     def motors(self, left: float, right: float) -> SensorBlock:
-        """Turn the wheels, each -1 (full back) to 1 (full ahead), until told otherwise.
+        """Turn the wheels, each -1 (full back) to 1 (full ahead), until the next command.
 
         Returns:
-            What the robot sensed as it was told.
+            The sensors from the answer to the command.
 
         Raises:
-            ValueError: A wheel is out of range. The robot was not told.
+            ValueError: A wheel is out of range. Nothing was sent.
         """
         limited("left", left, -1.0, 1.0)
         limited("right", right, -1.0, 1.0)
@@ -25,6 +25,6 @@ class Driving(Device):
         return self._set(codec.motors(left, right))
 
     def stop(self) -> None:
-        """Stop the motors; safe to call at any moment, and twice."""
+        """Stop the motors. This is safe at any moment, and if called twice."""
         if self.info.model is not None and self.link.is_open:
             self._set(codec.STOP)

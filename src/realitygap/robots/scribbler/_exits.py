@@ -1,4 +1,4 @@
-"""So that a program that is told to end does so by the way on which motors are stopped."""
+"""Signal handlers that make a terminated program stop the motors first."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from types import FrameType
 from typing import Any
 
 _ENDING = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP", "SIGBREAK") if hasattr(signal, name)]
-"""What ends a program without a word, where it has not said otherwise: `kill`, and a closed terminal or window."""
+"""Signals that end a program without an exception by default: from `kill`, or a closed terminal or window."""
 
 
 class Exits:
-    """While a robot is open, turns signals that end the program into `SystemExit`, so that `with` blocks are left.
+    """While a robot is open, converts signals that end the program to `SystemExit`, so that `with` blocks are left.
 
-    Only signals that nobody else handles, and only from the main thread, where Python allows it. Each open robot
-    holds it once.
+    This affects only signals that have no other handler. It works in the main thread only, as Python requires. Each
+    open robot registers once.
     """
 
     def __init__(self) -> None:
@@ -25,7 +25,7 @@ class Exits:
         self._lock = threading.Lock()
 
     def hold(self) -> None:
-        """One more robot is open."""
+        """Register one more open robot."""
         with self._lock:
             self._n_open += 1
             if self._changed or threading.current_thread() is not threading.main_thread():
@@ -35,7 +35,7 @@ class Exits:
                     self._changed[number] = signal.signal(number, _end)
 
     def release(self) -> None:
-        """One less is."""
+        """Unregister an open robot."""
         with self._lock:
             self._n_open -= 1
             if self._n_open or threading.current_thread() is not threading.main_thread():

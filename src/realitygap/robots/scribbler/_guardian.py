@@ -17,9 +17,9 @@ from ._guardian_process import BEAT_S, GIVE_UP_S, MOVING, QUIT, READY, STANDING,
 
 PROGRAM = Path(__file__).with_name("_guardian_process.py")
 START_S = 10.0
-"""How long the guardian may take to start [s]; it takes some 20 ms."""
+"""Maximum time until the guardian has started [s]. It needs some 20 ms."""
 END_S = 2.0
-"""How long it may take to end [s]."""
+"""Maximum time until the guardian has ended [s]."""
 
 
 def descriptor_of(port: object) -> int | None:
@@ -41,10 +41,10 @@ class Guardian:
     Args:
         descriptor: Descriptor of the open port.
         on_death: Called from a thread if the guardian ends before `end` is called.
-        stop: Bytes that stop the motors of a robot that does not answer to them; a Scribbler's if not given.
+        stop: Bytes that stop the motors of a robot that does not answer them. Default: those of a Scribbler.
 
     Raises:
-        RobotError: It cannot be started.
+        RobotError: The guardian cannot be started.
     """
 
     def __init__(self, descriptor: int, on_death: Callable[[], None], stop: bytes = b"") -> None:
@@ -74,14 +74,14 @@ class Guardian:
 
     @property
     def process_id(self) -> int:
-        """The number of its process."""
+        """Number of the guardian's process."""
         return self._process.pid
 
     def expect_motion(self) -> None:
-        """Tell the guardian that the motors will run; to be called before they can.
+        """Report to the guardian that the motors will run. Call this before they can.
 
         Raises:
-            RobotError: It did not start.
+            RobotError: The guardian did not start.
         """
         with self._lock:
             if not self._is_ready:
@@ -92,14 +92,17 @@ class Guardian:
             self._tell(MOVING)
 
     def expect_rest(self) -> None:
-        """Tell the guardian that the motors are off."""
+        """Report to the guardian that the motors are off."""
         with self._lock:
             if self._is_moving:
                 self._is_moving = False
                 self._tell(STANDING)
 
     def has_stopped_motors(self) -> bool:
-        """Return whether it stopped the motors since the last call, as this program was silent; wait while it does."""
+        """Return whether the guardian stopped the motors since the last call because this program was silent.
+
+        Wait while it does.
+        """
         with self._lock:
             self._listen(0.0)
             if self._is_stopping:
@@ -108,7 +111,7 @@ class Guardian:
             return has_stopped
 
     def end(self) -> None:
-        """End the process; the port is then open in this program alone. Safe to call twice."""
+        """End the guardian. Then only this program has the port open. This is safe if called twice."""
         with self._lock:
             if self._ended.is_set():
                 return
@@ -141,7 +144,7 @@ class Guardian:
             pass  # it is gone, and the thread will notice
 
     def _listen(self, timeout_s: float) -> None:
-        """Take what the guardian says within a time [s], up to the end of what it is doing."""
+        """Handle the guardian's messages within a time [s], to the end of its present action."""
         while not self._ended.is_set() and select.select([self._out], [], [], timeout_s)[0]:
             messages = os.read(self._out, 64)
             if not messages:

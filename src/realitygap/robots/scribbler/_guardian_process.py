@@ -5,8 +5,8 @@ number of the program, and in hexadecimal the bytes that stop a robot other than
 from the program, standard output one to it; each message is one byte.
 
 For a Scribbler, a run of bytes `SET_MOTORS_OFF` is the packet "motors off" wherever a packet begins, as the robot
-ignores the bytes that follow its opcode. So the motors stop at once even if the program wrote only a part of its last
-packet: the first bytes complete that packet, the next nine are a packet of their own.
+ignores the bytes that follow its opcode. So the motors stop immediately even if the program wrote only a part of its
+last packet: the first bytes complete that packet, and the next nine are a separate packet.
 """
 
 from __future__ import annotations
@@ -19,20 +19,21 @@ import sys
 import time
 
 MOVING, STANDING, QUIT = b"m", b"s", b"q"
-"""From the program: the motors may be running, sent again every `BEAT_S`; they are off; the port is being closed."""
+"""Messages from the program: the motors may run (repeated every `BEAT_S`); the motors are off; the port will be closed.
+"""
 READY, STOPPING, STOPPED = b"r", b"f", b"d"
-"""To the program: watching; the program was silent, so the motors are being stopped; they are, or it was in vain."""
+"""Messages to the program: watching; stopping the motors, because the program was silent; stopped, or given up."""
 
 BEAT_S = 0.02
 """Time between two messages of a program whose robot may be moving [s]."""
 SILENT_S = 1.0
 """Silence after which a program whose robot may be moving counts as frozen [s]."""
 LOOK_S = 0.1
-"""Time between two looks at whether the program still exists, should its pipe be held open by another process [s]."""
+"""Time between two checks of whether the program still exists [s]. Another process may hold its pipe open."""
 ROUND_S = 0.1
 """Time between two packets "motors off" [s]."""
 GIVE_UP_S = 10.0
-"""Time after which a robot that does not answer is left alone [s]; a tone may keep it busy for 8 s."""
+"""Time after which the guardian gives up on a robot that does not answer [s]. A tone may keep it busy for 8 s."""
 
 STOP = bytes([108] * 9)
 BLOCK = 11
@@ -41,7 +42,7 @@ MOST_HEARD = 4096
 
 
 def main() -> None:
-    """Watch until the program closes the port, or is gone."""
+    """Watch until the program closes the port or ends."""
     port, program = int(sys.argv[1]), int(sys.argv[2])
     stop = bytes.fromhex(sys.argv[3]) if len(sys.argv) > 3 else b""
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT):
@@ -68,14 +69,14 @@ def main() -> None:
 
 
 def stop_motors(port: int, stop: bytes = b"") -> bool:
-    """Send "motors off" until the robot has answered twice: the first answer may be to a packet that was begun before.
+    """Send "motors off" until the robot has answered twice, because the first answer may belong to an earlier packet.
 
     Args:
         port: Descriptor of the port.
-        stop: Bytes to send three times to a robot that does not answer to them; empty for a Scribbler.
+        stop: Bytes to send three times to a robot that does not answer them. Empty for a Scribbler.
 
     Returns:
-        Whether it did, or whether all was sent.
+        Whether the robot answered, or whether all bytes were sent.
     """
     if stop:
         return _send_often(port, stop)
@@ -99,7 +100,7 @@ def stop_motors(port: int, stop: bytes = b"") -> bool:
 
 
 def _send_often(port: int, stop: bytes) -> bool:
-    """Send bytes three times: the first may complete a message that was begun before."""
+    """Send bytes three times, because the first bytes may complete an earlier message."""
     try:
         for _ in range(3):
             _send(port, stop, time.monotonic() + ROUND_S)
@@ -110,7 +111,7 @@ def _send_often(port: int, stop: bytes) -> bool:
 
 
 def n_stops(heard: bytes) -> int:
-    """Count the answers to "motors off": its echo and a sensor block, of which five bytes are 0 or 1."""
+    """Return the number of answers to "motors off": each is its echo and a sensor block, with five bytes of 0 or 1."""
     n = at = 0
     while (at := heard.find(STOP, at)) >= 0:
         block = heard[at + len(STOP) : at + len(STOP) + BLOCK]

@@ -1,4 +1,4 @@
-"""The process that has a port locked, as far as the system tells."""
+"""The process that has locked a port, if the system provides it."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ LOCKS = Path("/proc/locks")
 
 
 def holder_of(port: str) -> int | None:
-    """Return the number of the running process that locked a port; None if it has ended or is unknown."""
+    """Return the number of the running process that locked a port. None if it has ended or is unknown."""
     try:
         file = Path(port).stat()
         lines = LOCKS.read_text().splitlines()
@@ -24,7 +24,7 @@ def holder_of(port: str) -> int | None:
 
 
 def holder_words(process: int | None) -> str:
-    """Return a sentence on who has a port open, and what to do."""
+    """Return a sentence that names the process with the open port, and the next step."""
     if process is None:
         return "Another program holds it; close that one."
     if process == os.getpid():

@@ -1,4 +1,4 @@
-"""Who the robot is, and what it keeps when it is switched off."""
+"""Identity of the robot, and the values that it stores while it is switched off."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from .opcodes import Op
 Ahead = Literal["fluke", "scribbler"]
 
 _SCRIBBLER_AHEAD = 0xDF
-"""What the Fluke's memory begins with where the end with the light sensors is ahead."""
+"""First byte in the Fluke's memory if the end with the light sensors is ahead."""
 _GET_FORWARDNESS = fluke_request("forwardness", Op.GET_SERIAL_MEMORY, bytes(4))
 
 
 class Identity(Device):
-    """Names, passwords, bytes of one's own, which end is ahead."""
+    """Names, passwords, stored bytes, and the end that is ahead."""
 
     def _get_halves(self, name: str, first: Op, second: Op) -> str:
         self.need_robot(name)
@@ -53,12 +53,12 @@ class Identity(Device):
 
     @property
     def data(self) -> tuple[int, ...]:
-        """(8,) bytes that the robot keeps; the first four correct its motors, 127 is no correction."""
+        """Return (8,) bytes that the robot stores. The first four correct its motors; 127 is no correction."""
         self.need_robot("data")
         return tuple(self._get(robot_request("data", Op.GET_DATA), bytes))
 
     def set_data(self, values: tuple[int, ...] | list[int]) -> None:
-        """Have the robot keep 8 bytes, each 0 to 255."""
+        """Store 8 bytes in the robot, each 0 to 255."""
         self.need_robot("set_data")
         if len(values) != 8:
             raise ValueError(f"values has {len(values)} numbers, expected 8.")
@@ -66,24 +66,24 @@ class Identity(Device):
         self._set(robot_request("set_data", Op.SET_DATA, checked))
 
     def set_single_data(self, position: int, value: int) -> None:
-        """Have the robot keep one byte at position 0 to 7; beyond, it would overwrite what is not its own."""
+        """Store one byte at position 0 to 7. Beyond, it would overwrite other values of the robot."""
         self.need_robot("set_single_data")
         arguments = bytes((whole_number("position", position, 0, 7), whole_number("value", value, 0, 255)))
         self._set(robot_request("set_single_data", Op.SET_SINGLE_DATA, arguments))
 
     @property
     def forwardness(self) -> Ahead:
-        """Which end is ahead for `motors`: the one with the Fluke, or the one with the light sensors."""
+        """Return the end that is ahead for `motors`: the one with the Fluke, or the one with the light sensors."""
         if self.info.fluke == "none":
             return "scribbler"
         kept = self._get(_GET_FORWARDNESS, codec.word)
         return "scribbler" if kept == _SCRIBBLER_AHEAD else "fluke"
 
     def set_forwardness(self, ahead: Ahead) -> None:
-        """Choose which end is ahead for `motors`; the Fluke keeps that, and it is read back.
+        """Choose the end that is ahead for `motors`. The Fluke stores it, and it is read back.
 
         Raises:
-            RobotError: It did not keep it.
+            RobotError: The Fluke did not store it.
         """
         if ahead not in ("fluke", "scribbler"):
             raise ValueError(f"ahead is {ahead!r}, expected 'fluke' or 'scribbler'.")
@@ -97,6 +97,6 @@ class Identity(Device):
         )
 
     def set_ir_power(self, power: int) -> None:
-        """Set the power of the Fluke's infrared, 0 to 255 (135 as delivered; lower sees less far)."""
+        """Set the power of the Fluke's infrared, 0 to 255 (135 as delivered). Lower values have a shorter range."""
         arguments = struct.pack("B", whole_number("power", power, 0, 255))
         self._tell_fluke("set_ir_power", Op.SET_DONGLE_IR, arguments)

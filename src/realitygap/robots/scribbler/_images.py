@@ -1,4 +1,4 @@
-"""The bytes of the camera as arrays; nothing here waits."""
+"""Conversion of the camera's bytes to arrays. Nothing here waits."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Pixels = NDArray[np.uint8]
 
 
 class Size(NamedTuple):
-    """Of a picture, in pixels."""
+    """Size of a picture [pixels]."""
 
     width: int
     height: int
@@ -26,16 +26,16 @@ FLUKE_1 = Size(256, 192)
 FLUKE_2_LARGE = Size(1280, 800)
 FLUKE_2_SMALL = Size(427, 266)
 RUN_PIXELS = 4
-"""A run of a blob picture counts groups of so many columns."""
+"""Number of columns in a group. The runs of a blob picture count groups."""
 
 
 def jpeg_pixels(header: bytes, scan: bytes, size: Size, *, gray: bool) -> Pixels:
-    """(h, w, 3) or, in gray, (h, w) uint8 from the two parts of a JPEG file, stretched to the size of the camera.
+    """Decode the two parts of a JPEG file to (h, w, 3) or, in gray, (h, w) uint8, stretched to the camera's size.
 
     A Fluke 1 describes half the width.
 
     Raises:
-        ProtocolError: it is no picture.
+        ProtocolError: The bytes are no picture.
     """
     try:
         with open_image(io.BytesIO(header + scan[:-12]), 2 * max(size), ("JPEG",)) as file:
@@ -48,7 +48,7 @@ def jpeg_pixels(header: bytes, scan: bytes, size: Size, *, gray: bool) -> Pixels
 
 
 def raw_pixels(data: bytes, size: Size) -> Pixels:
-    """(h, w, 3) uint8 from one byte a pixel, in the order V Y U Y along a row."""
+    """Decode one byte a pixel, in the order V Y U Y along a row, to (h, w, 3) uint8."""
     rows = np.frombuffer(data, np.uint8).reshape(size.height, size.width).astype(np.float32)
     columns = np.arange(size.width)
     group = columns // RUN_PIXELS * RUN_PIXELS
@@ -62,18 +62,18 @@ def raw_pixels(data: bytes, size: Size) -> Pixels:
 
 
 def gray_window_pixels(data: bytes, size: Size) -> Pixels:
-    """(h, w) uint8 from a window of every other pixel and row."""
+    """Decode a window of every other pixel and row to (h, w) uint8."""
     window = np.frombuffer(data, np.uint8).reshape(size.height // 2, size.width // 2)
     return np.ascontiguousarray(window.repeat(2, axis=0).repeat(2, axis=1))
 
 
 def run_pixels(data: bytes, size: Size, word: int) -> Pixels:
-    """(h, w) uint8: 255 where a color was seen, from run lengths that begin with "not seen".
+    """Decode run lengths to (h, w) uint8: 255 for pixels with the color. The first run is without the color.
 
     Args:
         data: Run after run, in groups of four columns.
-        size: Of the picture.
-        word: Bytes of a run: 2 of a Fluke 1, 3 of a Fluke 2.
+        size: Size of the picture.
+        word: Bytes of a run: 2 for a Fluke 1, 3 for a Fluke 2.
     """
     n_runs = len(data) // word
     runs = np.frombuffer(data[: n_runs * word], np.uint8).reshape(n_runs, word).astype(np.int64)

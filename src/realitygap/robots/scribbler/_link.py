@@ -1,11 +1,12 @@
-"""The conversation with a robot over its port: the only code that touches pyserial.
+"""The link to a robot over its port. This is the only code that uses pyserial.
 
-A frame has no mark and no checksum, so a lost or added byte shifts all that follows. What holds the two sides together:
-one command at a time, echoes compared, values that no robot sends refused, and after every doubt silence, then a
-command whose echo proves that both count from the same byte again.
+A frame has no mark and no checksum, so a lost or added byte shifts all following bytes. Several rules keep the two
+sides synchronized. There is one command at a time. Echoes are compared. Values that no robot sends are refused. After
+every doubt the link waits for silence, then sends a command whose echo proves that both sides count from the same
+byte again.
 
-Source: the protocol of Myro's firmware and clients. Differs: where a Fluke 1 has counted part of a packet, which it
-never forgets, Myro has no way out; see `Link._release_counter`.
+Source: the protocol of Myro's firmware and clients. Differs: a Fluke 1 that has counted part of a packet keeps that
+count forever. Myro cannot recover from this; see `Link._release_counter`.
 """
 
 from __future__ import annotations
@@ -33,37 +34,37 @@ T = TypeVar("T")
 
 BAUD = 38400
 QUIET_S = 0.5
-"""Silence after which nothing more is on its way [s]. Source: Myro's manual_flush."""
+"""Silence after which no more bytes are expected [s]. Source: Myro's manual_flush."""
 FORGET_S = 1.2
-"""Silence after which a robot has thrown half a packet away [s]: its firmware does after 1 s."""
+"""Silence after which a robot has discarded half a packet [s]: its firmware does so after 1 s."""
 CHATTER_S = 4.0
-"""A port that is not silent for so long belongs to a robot that calls out its name, or to something else [s]."""
+"""A port without silence for this time belongs to a robot that repeats its name, or to another device [s]."""
 CHATTER_BYTES = 1 << 20
-"""Likewise for so many bytes, however fast they come."""
+"""The same limit as a number of bytes."""
 PROBE_S = 0.3
-"""How long a Fluke's battery reading may take when probing [s]."""
+"""Maximum time for a Fluke's battery reading when probing [s]."""
 MAX_PROBES = 12
-"""More than the bytes that any of the Fluke's counters can still wait for."""
+"""More than the bytes that any of the Fluke's counters can still expect."""
 WRITE_S = 2.0
-"""How long a port may refuse to take a command [s]."""
+"""Maximum time for which a port may refuse a command [s]."""
 ATTEMPTS = 5
-"""How often a command that is safe to repeat is sent: enough where half a percent of all bytes are lost."""
+"""Attempts for a command that is safe to repeat: enough if half a percent of all bytes are lost."""
 RECOVERIES = 8
-"""How often the same step is sought after one fault, while something is heard of the robot."""
+"""Attempts to resynchronize after one fault, while the robot sends anything."""
 SILENT_RECOVERIES = 3
-"""How often if nothing is."""
+"""Attempts to resynchronize if the robot sends nothing."""
 REOPENINGS = 8
-"""How often a port that hung up is opened again, once a second."""
+"""Attempts to open a port again that hung up, one per second."""
 GREETINGS = 4
-"""How often a robot is asked who it is."""
+"""Attempts to identify the robot."""
 SILENT_GREETINGS = 3
-"""How often if nothing at all comes: one that was reset as its port was opened is back by then."""
+"""Attempts to identify the robot if nothing arrives. A robot that was reset as its port was opened answers by then."""
 STRANGER_PROBES = 8
-"""Enough to release a Fluke, and less than a packet for a robot that has none."""
+"""Number of probes: enough to release a Fluke, and less than a packet for a robot without a Fluke."""
 LOCKED_S = 0.05
-"""Time between two attempts to open a port that the guardian of an ended program still has [s]."""
+"""Time between two attempts to open a port that the guardian of an ended program still holds [s]."""
 UNKNOWN_HOLDER_S = 2.0
-"""How long to try where the system does not tell who has a port locked [s]."""
+"""Time to retry if the system does not report which process locked the port [s]."""
 
 
 try:
@@ -81,15 +82,16 @@ _BY_DISTANCE = _MOVING - {Op.SET_MOTORS}
 
 @dataclass
 class Faults:
-    """How often the link was disturbed since it was opened.
+    """Numbers of faults of the link since it was opened.
 
     Attributes:
         retries: Commands sent again.
-        strays: Bytes that came when none were awaited.
-        recoveries: Times at which both sides had to find the same step again; the motors stood still meanwhile.
-        hang_ups: Times at which the port was gone.
-        watchdog_stops: Times at which the motors were stopped because the controlling loop was silent.
-        guardian_stops: Times at which they were because this program was frozen, or because its guardian ended.
+        strays: Bytes that arrived unexpectedly.
+        recoveries: Number of resynchronizations. The motors stood still during each.
+        hang_ups: Number of times the port disappeared.
+        watchdog_stops: Number of times the motors were stopped because the controlling loop was silent.
+        guardian_stops: Number of times they were stopped because this program was frozen, or because its guardian
+            ended.
     """
 
     retries: int = 0
@@ -101,15 +103,15 @@ class Faults:
 
 
 class Exchange(NamedTuple):
-    """One command and what came of it.
+    """One command and its result.
 
     Attributes:
-        time_s: When it was sent, by the port's clock [s].
-        took_s: Until its answer was complete, or given up [s].
-        name: Of the command.
+        time_s: Time of sending, by the port's clock [s].
+        took_s: Time until the answer was complete, or given up [s].
+        name: Name of the command.
         sent: Its bytes.
-        answered: The bytes that came.
-        outcome: "ok", or what went wrong.
+        answered: The bytes that arrived.
+        outcome: "ok", or the error.
     """
 
     time_s: float
@@ -121,7 +123,7 @@ class Exchange(NamedTuple):
 
 
 class _LostStep(Exception):  # noqa: N818
-    """The two sides could not be brought to agree, for this reason."""
+    """The two sides could not be synchronized, for this reason."""
 
     def __init__(self, fault: Fault | None) -> None:
         super().__init__(str(fault))
@@ -133,12 +135,12 @@ class _Locked(Exception):  # noqa: N818
 
 
 def open_port(name: str) -> Any:
-    """A port as pyserial opens it, with DTR low, as a cabled S2 needs it to speak.
+    """Open a port with pyserial, with DTR low, as a cabled S2 requires.
 
-    A port that the guardian of an ended program still has is waited for.
+    If the guardian of an ended program still holds the port, this waits for it.
 
     Raises:
-        RobotError: it cannot be opened; the text says what to do.
+        RobotError: The port cannot be opened. The message states the next step.
     """
     give_up_s = time.monotonic() + (GIVE_UP_S + 1.0 if LOCKS.exists() else UNKNOWN_HOLDER_S)
     while True:
@@ -175,14 +177,14 @@ def _open_once(name: str) -> Any:
 
 
 def is_serial_port(port: object) -> bool:
-    """Whether it is one of pyserial's, whose name says what is behind it."""
+    """Return whether a port is one of pyserial's, whose name identifies the device."""
     import serial
 
     return isinstance(port, serial.SerialBase)
 
 
 def serial_devices() -> list[Any]:
-    """The serial ports that the system knows of, as pyserial describes them."""
+    """Return the serial ports of the system, as pyserial describes them."""
     from serial.tools import list_ports
 
     return list(list_ports.comports())
@@ -200,21 +202,21 @@ def _advice(name: str, error: Exception) -> str:
 
 
 class Link:
-    """A port with a robot at its other end; every method may be called from any thread.
+    """A port with a robot at its other end. Every method may be called from any thread.
 
     Args:
-        port: As `open_port` gives it, or anything with the same methods; its attribute `clock` is the time.
-        name: Of the port, for messages.
+        port: A result of `open_port`, or any object with the same methods. Its attribute `clock` is the clock.
+        name: Name of the port, for messages.
 
     Attributes:
-        has_robot, fluke: Who is there, known after `greet`.
-        where: What the caller is at, for messages.
-        motors_off: Whether the motors are known to be off; None before anything is known.
+        has_robot, fluke: The hardware at the other end, set by `greet`.
+        where: Present activity of the caller, for messages.
+        motors_off: Whether the motors are known to be off. None if nothing is known.
         is_in_motion: Whether a motion of an S2 by distance may not have ended.
-        tell: Is given each exchange, as it is over.
-        watch: Is called before each command.
-        spoken_s: When the last command was carried out, by the clock [s].
-        lock: Held while a command is under way.
+        tell: Function that is called with each finished exchange.
+        watch: Function that is called before each command.
+        spoken_s: Time of the last command, by the clock [s].
+        lock: Held during a command.
     """
 
     def __init__(self, port: Port, name: str) -> None:
@@ -249,12 +251,12 @@ class Link:
 
     @property
     def guardian_id(self) -> int | None:
-        """Number of the process that stops the motors if this one is killed; None for a robot in this program."""
+        """Number of the process that stops the motors if this one is killed. None for a robot in this program."""
         return None if self._guardian is None else self._guardian.process_id
 
     @property
     def is_open(self) -> bool:
-        """Whether it may be used."""
+        """Whether the link can be used."""
         return self._is_open
 
     # one command
@@ -264,12 +266,13 @@ class Link:
 
         Args:
             request: The command.
-            decode: Makes a value of the bytes after the echo; raises `ProtocolError` where no robot sends them.
+            decode: Converts the bytes after the echo to a value. It raises `ProtocolError` for bytes that no robot
+                sends.
 
         Raises:
-            RobotTimeout: no answer came in time, also not to repeats where these are safe.
-            ProtocolError: the answer made no sense, likewise.
-            RobotError: the port is closed, or hung up and did not come back.
+            RobotTimeout: No answer arrived in time, also after repeats if these are safe.
+            ProtocolError: The answer was invalid, also after repeats if these are safe.
+            RobotError: The port is closed, or hung up and could not be opened again.
         """
         with self.lock:
             if not self._is_open:
@@ -298,7 +301,7 @@ class Link:
             raise self._failure(request, fault, n_sent, lost=lost) from fault
 
     def _exchange(self, request: Request, decode: Callable[[bytes], T]) -> T:
-        """Send a command once; where what is due does not come, raise `Fault`."""
+        """Send a command once. Raise `Fault` if the expected answer does not arrive."""
         port = self.port
         since = self.clock.now()
         # A signal may take us out of here at any point, and leave the link in doubt.
@@ -341,7 +344,7 @@ class Link:
         return value
 
     def _note_motors(self, request: Request) -> None:
-        """Keep what the motors were told last."""
+        """Store the last motor command."""
         standing = request.data[0] == Op.SET_MOTORS and request.data[1:3] == b"dd"  # 100, 100
         if request.data[0] == Op.SET_MOTORS_OFF or standing:
             self.motors_off, self._motors, self.is_in_motion = True, None, False
@@ -356,7 +359,7 @@ class Link:
             self.tell(Exchange(since, took, request.name, request.data, got, outcome))
 
     def _body(self, request: Request, got: bytes) -> bytes:
-        """The answer without its echo, or without its length."""
+        """Return the answer without its echo, or without its length."""
         if request.answer in (COUNTED, JPEG_HEADER):
             return got[2:]
         if not request.echoed:
@@ -367,7 +370,7 @@ class Link:
         return got[PACKET:]
 
     def _discard(self) -> int:
-        """Throw away what has come."""
+        """Discard the bytes that have arrived."""
         n_bytes = 0
         while (n := self.port.in_waiting) and n_bytes < CHATTER_BYTES:
             n_bytes += len(self.port.read(n))
@@ -377,7 +380,7 @@ class Link:
     # the guardian
 
     def _start_guardian(self) -> None:
-        """Have another process stop the motors if this one is killed or frozen.
+        """Start another process that stops the motors if this one is killed or frozen.
 
         Raises:
             RobotError: it cannot be started.
@@ -392,7 +395,7 @@ class Link:
             self._guardian = None
 
     def _expect_motion(self) -> None:
-        """Tell the guardian that the motors will run.
+        """Report to the guardian that the motors will run.
 
         Raises:
             RobotError: it cannot be started.
@@ -403,7 +406,10 @@ class Link:
             self._guardian.expect_motion()
 
     def _replace_guardian(self) -> None:
-        """Stop the motors, as nobody would now if this program were killed, and start another guardian."""
+        """Stop the motors and start another guardian.
+
+        Without a guardian, nothing would stop them if this program were killed.
+        """
         with self.lock:
             if not self._is_open:
                 return
@@ -416,10 +422,10 @@ class Link:
                 self._start_guardian()
 
     def stop_motors(self) -> None:
-        """Stop the motors in place of the caller, who still learns from the next command what had stopped them before.
+        """Stop the motors for the caller. The next command still reports what had stopped them before.
 
         Raises:
-            RobotError: they could not be stopped.
+            RobotError: The motors could not be stopped.
         """
         with self.lock:
             stopped = self._what_stopped()
@@ -429,7 +435,7 @@ class Link:
                 self._stopped = stopped
 
     def _what_stopped(self) -> str:
-        """Return once why the motors were stopped behind the caller's back; empty if they were not."""
+        """Return once why the motors were stopped without a command of the caller. Empty if they were not."""
         if self._guardian is not None and self._guardian.has_stopped_motors():
             self._stopped = f"This program was silent for {SILENT_S:g} s, so the motors were stopped"
             self._in_step, self._fault, self.motors_off = False, Fault(self._stopped, RobotError), None
@@ -437,10 +443,10 @@ class Link:
         return stopped
 
     def _refuse_if_stopped(self, request: Request) -> None:
-        """Refuse a command once after the motors were stopped behind the caller's back.
+        """Refuse a command once after the motors were stopped without a command of the caller.
 
         Raises:
-            RobotError: they were.
+            RobotError: The motors were stopped.
         """
         if stopped := self._what_stopped():
             self.faults.guardian_stops += 1
@@ -449,10 +455,10 @@ class Link:
     # finding the same step again
 
     def _find_step_for(self, request: Request) -> None:
-        """Make both sides agree before a command.
+        """Synchronize both sides before a command.
 
         Raises:
-            _LostStep: in vain, or a motion by distance was cut short by it, which nobody would notice.
+            _LostStep: It failed, or it cut a motion by distance short, which the caller could not notice.
         """
         was_in_motion = self.is_in_motion
         self._find_step()
@@ -461,7 +467,7 @@ class Link:
             raise _LostStep(Fault(text, RobotError))
 
     def _find_step(self) -> None:
-        """Make both sides count from the same byte again; the motors are off afterwards.
+        """Synchronize both sides, so that they count from the same byte. The motors are off afterwards.
 
         Raises:
             _LostStep: in vain.
@@ -487,7 +493,7 @@ class Link:
         raise _LostStep(fault)
 
     def _settle(self, fault: Fault | None) -> None:
-        """Silence, then commands whose answers prove that the two sides agree."""
+        """Wait for silence, then send commands whose answers prove that both sides are synchronized."""
         if fault is None:  # a signal came in between: what was sent was whole, and stopping is urgent
             self.port.write(codec.STOP.data)
         understood = fault is None or fault.understood
@@ -511,7 +517,7 @@ class Link:
             self._exchange(codec.STOP, codec.sensor_block)
 
     def _await_silence(self, seconds: float) -> bool:
-        """Read and discard until nothing has come for so long [s]; False if that does not happen."""
+        """Read and discard bytes until none arrived for a time [s]. Return False if that does not happen."""
         since, n_bytes = self.clock.now(), 0
         self.port.timeout = seconds
         try:
@@ -525,13 +531,13 @@ class Link:
             self.port.timeout = GAP_S
 
     def _release_counter(self, n_probes: int) -> None:
-        """Fill up the packet that a Fluke believes to be in the middle of.
+        """Complete the packet that a Fluke believes to be incomplete.
 
-        A Fluke 1 counts the bytes of a packet and never begins anew by itself; what comes is swallowed as part of it
-        until nine have come. Requests for the battery, one at a time, are swallowed until one is answered: then it is
-        free. The robot has forgotten its part by then (`FORGET_S`), and what it gets meanwhile is less than a packet,
-        so nothing is carried out. (Bytes 0 until an echo comes, as is sometimes advised, would complete the old
-        packet, and 0 is full speed back.)
+        A Fluke 1 counts the bytes of a packet and never restarts the count. Until it has nine bytes, it takes all bytes
+        as part of the packet. So this sends requests for the battery, one at a time, until one is answered. By then the
+        robot has discarded its part of the packet (`FORGET_S`), and it has received less than a packet, so it executes
+        nothing. (Sending bytes 0 until an echo arrives, as is sometimes advised, would complete the old packet, and 0
+        is full speed back.)
         """
         self.port.timeout = PROBE_S
         try:
@@ -544,7 +550,7 @@ class Link:
             self._await_silence(FORGET_S)
 
     def _is_heard(self) -> bool:
-        """Whether a Fluke answers a request for the battery."""
+        """Return whether a Fluke answers a request for the battery."""
         self.port.write(codec.BATTERY.data)
         got = self.port.read(2)
         return len(got) == 2 and got[0] <= 1
@@ -568,18 +574,18 @@ class Link:
         raise _LostStep(fault)
 
     def _move_on(self, request: Request) -> None:
-        """After the motors were stopped for safety, let them go on as they were told last."""
+        """Restore the last motor command after the motors were stopped for safety."""
         if self._motors is not None and self.motors_off and request.data[0] not in _STEERING:
             self._exchange(self._motors, codec.sensor_block)
 
     # beginning and end
 
     def greet(self) -> codec.InfoLine:
-        """Find out who is there, switch the echo mode off and stop the motors.
+        """Identify the robot, switch the echo mode off, and stop the motors.
 
         Raises:
-            RobotTimeout: nobody answers.
-            ProtocolError: who answers is no Scribbler.
+            RobotTimeout: No device answers.
+            ProtocolError: The device that answers is no Scribbler.
         """
         with self.lock:
             info = self._ask_who()
@@ -593,7 +599,7 @@ class Link:
             return info
 
     def _ask_who(self) -> codec.InfoLine:
-        """Who answers; a line that is not letter by letter as we know it has to come twice."""
+        """Return the info line of the robot. A line of unknown form has to arrive twice."""
         since, seen = self.clock.now(), None
         for greeting in range(GREETINGS):
             try:
@@ -623,12 +629,12 @@ class Link:
         ) from fault
 
     def forget(self, request: Request, seconds: float) -> None:
-        """Send a command that makes the robot forget all it was told, and leave it alone for so long [s].
+        """Send a command that resets the robot, and send nothing for some seconds.
 
-        What it still answers is thrown away; `greet` has to follow.
+        Its answers are discarded. Call `greet` next.
 
         Raises:
-            RobotError: the port hung up.
+            RobotError: The port hung up.
         """
         with self.lock:
             self._in_step, self._motors = False, None
@@ -642,7 +648,7 @@ class Link:
                 ) from error
 
     def close(self) -> None:
-        """Let go of the port; safe to call twice. The motors are the caller's business."""
+        """Close the port. This is safe if called twice. It does not stop the motors."""
         with self.lock:
             self._is_open = False
             self._end_guardian()
@@ -650,7 +656,7 @@ class Link:
                 self.port.close()
 
     def _failure(self, request: Request, fault: Fault | None, n_sent: int, *, lost: bool) -> RobotError:
-        """One message for a command that failed, after the motors were stopped as far as the wire allows."""
+        """Return the error for a command that failed, after the motors were stopped as far as the link allows."""
         if not lost:
             with contextlib.suppress(_LostStep):
                 self._find_step()

@@ -1,4 +1,4 @@
-"""The names of ports: which there are, and what is behind one."""
+"""Names of serial ports, and the devices behind them."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ _PSEUDO_TERMINAL = re.compile(
 
 
 class PortGuess(NamedTuple):
-    """A port and what it seems to be.
+    """A port and its probable device.
 
     Attributes:
-        port: Its name.
-        seems: What kind of thing is behind it, in words.
-        description: What the system says of it.
+        port: Name of the port.
+        seems: Probable device, in words.
+        description: Description by the system.
     """
 
     port: str
@@ -34,12 +34,12 @@ class PortGuess(NamedTuple):
 
 
 def port_name(name: str) -> str:
-    """A port without the platform's name before it."""
+    """Return a port without the platform's name before it."""
     return name.removeprefix("scribbler:")
 
 
 def label_of(name: str) -> Label:
-    """What figures say of a robot on this port: EMULATED where it cannot be one of flesh and wire."""
+    """Return the label of a robot on this port: EMULATED if the port cannot belong to a real robot, otherwise REAL."""
     name = port_name(name)
     scheme, _, inner = name.partition("://")
     if scheme in ("emulator", "loop"):
@@ -63,7 +63,7 @@ def _is_loopback(url: str) -> bool:
 
 
 def find_ports() -> list[PortGuess]:
-    """The serial ports of this machine, those that may well be a robot first."""
+    """Return the serial ports of this machine, probable robots first."""
     found = {device.device: (device.description or "", device.hwid or "") for device in serial_devices()}
     for path in sorted(Path("/dev").glob("rfcomm*")):
         found.setdefault(str(path), ("Bluetooth serial port", ""))

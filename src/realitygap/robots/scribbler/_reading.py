@@ -1,4 +1,4 @@
-"""Reading an answer from a port, byte for byte what is due, and saying what is missing."""
+"""Reading of an answer from a port, and errors for missing bytes."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from ._codec import Request
 from .opcodes import COUNTED, JPEG_SCAN, LINE, PACKET
 
 GAP_S = 0.5
-"""An answer that has begun and then is silent for so long has lost a byte [s]."""
+"""Silence after which an answer that has begun has lost a byte [s]."""
 LONGEST_LINE = 512
 LONGEST_SCAN = 1 << 20
 
 
 class Port(Protocol):
-    """What is needed of a port: what `serial.Serial` offers, in the same words."""
+    """The methods of a port that the driver uses, with the names of `serial.Serial`."""
 
     timeout: float | None
 
@@ -32,9 +32,9 @@ class Fault(Exception):  # noqa: N818  # none leaves the driver
     """A command that did not get its answer.
 
     Attributes:
-        kind: What to raise when it is not put right.
+        kind: Exception to raise if recovery fails.
         understood: Whether the robot has certainly read the whole command.
-        got: The bytes that came.
+        got: The bytes that arrived.
     """
 
     def __init__(
@@ -47,19 +47,19 @@ class Fault(Exception):  # noqa: N818  # none leaves the driver
 
 
 class HangUp(Fault):
-    """The port is gone."""
+    """The port has disappeared."""
 
 
 def read_answer(port: Port, request: Request, fluke: str) -> bytes:
-    """The bytes of an answer, with its echo.
+    """Read the bytes of an answer, with its echo.
 
     Args:
-        port: Where the command was written.
+        port: The port that the command was written to.
         request: The command.
-        fluke: Which one is there: "none", "1" or "2".
+        fluke: Present Fluke: "none", "1" or "2".
 
     Raises:
-        Fault: They do not come.
+        Fault: The bytes do not arrive.
     """
     kind = request.answer
     if kind >= 0:
@@ -83,7 +83,7 @@ def _read_counted(port: Port, request: Request, n_echo: int, fluke: str) -> byte
 
 
 def _read_exactly(port: Port, n: int, wait_s: float, n_echo: int = 0) -> bytes:
-    """So many bytes; `wait_s` of silence before the answer begins, or a gap within it, is a fault."""
+    """Read `n` bytes. Raise `Fault` after `wait_s` of silence before the answer, or after a gap within it."""
     got = port.read(n)
     if len(got) == n:
         return got
@@ -100,7 +100,7 @@ def _read_exactly(port: Port, n: int, wait_s: float, n_echo: int = 0) -> bytes:
 
 
 def _read_until(port: Port, end: bytes, wait_s: float, longest: int, more: int = 0) -> bytes:
-    """Bytes up to an end mark, and so many more after it."""
+    """Read bytes up to an end mark, and `more` bytes after it."""
     buffer = bytearray()
     silent, searched = 0.0, 0
     while (at := buffer.find(end, searched)) < 0:

@@ -32,7 +32,7 @@ T = TypeVar("T")
 COUNT_M = 0.00025
 """Distance of a wheel for one count of an S2's encoders [m]: half of its half millimeter."""
 FAR = 99
-"""What an S2's distance reads where nothing is seen."""
+"""Distance reading of an S2 if nothing is in range."""
 
 
 class Scribbler(Driving, Channels, SoundAndLight, Camera, Board):
@@ -49,22 +49,22 @@ class Scribbler(Driving, Channels, SoundAndLight, Camera, Board):
     | distance left, right | an S2 alone | nothing seen | touching | 99 to 0 |
     | infrared left, right | an S1 alone | free | an obstacle | 1, 0 |
 
-    The motors are off once it is open. They stop on every way out: `close`, the end of a `with` block, an exception,
-    Ctrl-C, SIGTERM, the end of the program; for trials, also where the program is silent (`watchdog_s`).
+    The motors are off after opening. `close`, the end of a `with` block, an exception, Ctrl-C, SIGTERM, and the end of
+    the program stop them. In trials, silence of the program also stops them (`watchdog_s`).
 
     Args:
-        port: Its name, as pyserial takes it, with or without `scribbler:` before it; or an open port.
-        step_s: How long a command of `drive` lasts [s].
-        reading_max: The obstacle reading that is as near as can be told.
-        record: A file in which all that is said is kept, command by command.
-        watchdog_s: Stop the motors when the program has not spoken to the robot for so long [s]; None for never.
+        port: Name of the port for pyserial, with or without `scribbler:` before it; or an open port.
+        step_s: Duration of a command of `drive` [s].
+        reading_max: Obstacle reading that counts as 1, the nearest.
+        record: A new file for the recording of all commands.
+        watchdog_s: Silence of the program after which the motors stop [s]. None: never.
 
     Raises:
         RobotError: The port cannot be opened, or no Scribbler answers.
     """
 
     least_battery_v = 6.15
-    """Below it the Fluke 1 blinks for new batteries (its firmware), and with weak cells Bluetooth drops out."""
+    """Below it, the firmware of the Fluke 1 blinks for new batteries, and with weak cells Bluetooth drops out."""
     blinded_advice = ", or lower ir_power"
 
     def __init__(
@@ -121,7 +121,7 @@ class Scribbler(Driving, Channels, SoundAndLight, Camera, Board):
         return recorder
 
     def _noted(self, name: str, work: Callable[[], T]) -> T:
-        """Do it; what goes wrong is recorded."""
+        """Call a function, and record an error that it raises."""
         try:
             return work()
         except RobotError as error:
@@ -131,28 +131,28 @@ class Scribbler(Driving, Channels, SoundAndLight, Camera, Board):
 
     @property
     def clock(self) -> Clock:
-        """The time that this robot lives in; whoever waits by it is watched, too."""
+        """The clock of this robot. Waiting by it also runs the watchdog."""
         return self.link.clock if self._watchdog is None else WatchedClock(self.link.clock, self._watchdog)
 
     @property
     def has_encoders(self) -> bool:
-        """Whether it is an S2 or S3, which count how far their wheels turn."""
+        """Whether the robot is an S2 or S3, which have wheel encoders."""
         return self.info.model == "s2"
 
     @property
     def is_turned(self) -> bool:
-        """Whether the end that is ahead is the Fluke's, so that its wheels are counted from behind."""
+        """Whether the end with the Fluke is ahead, so that wheel distances are reversed."""
         return self.info.fluke != "none" and self.forwardness == "fluke"
 
     def wheels(self) -> tuple[float, float]:
-        """Distance of the left and right wheel since it was switched on, seen by the end without the Fluke [m]."""
+        """Distance of the left and right wheel since power-on, as seen from the end without the Fluke [m]."""
         left, right = self.encoders()
         return left * COUNT_M, right * COUNT_M
 
     # the contract
 
     def reset(self, pose: Pose | None = None) -> None:
-        """Begin a trial: motors stopped, steps counted from 0; somebody has put the robot where it starts."""
+        """Begin a trial: stop the motors, and count steps from 0. The operator has placed the robot at its start."""
         self.need_robot("reset")
         if self._recorder is not None:
             self._recorder.call("reset")
@@ -162,7 +162,7 @@ class Scribbler(Driving, Channels, SoundAndLight, Camera, Board):
         self.link.where = ""
 
     def observe(self) -> Observation:
-        """Read the sensors that look ahead, those selected, and whether the robot is blocked."""
+        """Read the sensors that look ahead, the selected channels, and the stall."""
         if self._recorder is None:
             return self._observe_all()
         seen = self._noted("observe", self._observe_all)
@@ -188,7 +188,7 @@ class Scribbler(Driving, Channels, SoundAndLight, Camera, Board):
         return Observation((1.0 - ir[0], 1.0 - ir[1]), stall, tuple(map(float, ir)))
 
     def drive(self, command: Command) -> None:
-        """Carry out one command for `step_s`: left wheel move - turn, right wheel move + turn, limited to -1..1.
+        """Drive one command for `step_s`: left wheel move - turn, right wheel move + turn, limited to -1..1.
 
         The robot moves on until the next command.
         """
@@ -206,7 +206,7 @@ class Scribbler(Driving, Channels, SoundAndLight, Camera, Board):
         self.link.clock.sleep(self.step_s)
 
     def stop(self) -> None:
-        """Stop the motors; safe to call at any moment, and twice."""
+        """Stop the motors. This is safe at any moment, and if called twice."""
         try:
             if self._recorder is not None and self.link.is_open:
                 self._recorder.call("stop")
@@ -214,7 +214,7 @@ class Scribbler(Driving, Channels, SoundAndLight, Camera, Board):
             super().stop()
 
     def close(self) -> None:
-        """Stop the motors and let go of the port; safe to call twice.
+        """Stop the motors and close the port. This is safe if called twice.
 
         Raises:
             RobotError: The motors could not be stopped; the port is closed all the same.
@@ -251,7 +251,7 @@ def _within(wheel: float) -> float:
 
 
 def _let_go(link: Link) -> None:
-    """Stop the motors of a robot that nobody has closed, and close its port."""
+    """Stop the motors of a robot that was not closed, and close its port."""
     try:
         if link.has_robot and link.is_open:
             link.ask(codec.STOP, codec.sensor_block)

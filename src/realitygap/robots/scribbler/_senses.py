@@ -1,4 +1,4 @@
-"""What the robot and its Fluke sense, camera apart."""
+"""Sensors of the robot and its Fluke, without the camera."""
 
 from __future__ import annotations
 
@@ -30,75 +30,75 @@ _DISTANCES = tuple(
 
 
 class Senses(Device):
-    """Reading what is sensed; nothing here moves the robot or changes it."""
+    """Functions that read sensors. They neither move nor change the robot."""
 
     def sensors(self) -> SensorBlock:
-        """All senses of the robot without its Fluke, in one command."""
+        """Return all sensors of the robot without its Fluke, from one command."""
         self.need_robot("sensors")
         self.last_sensors = self._get(_ALL, codec.sensor_block)
         return self.last_sensors
 
     def ir(self) -> tuple[int, int]:
-        """Infrared left, right (1: free, 0: an obstacle within some 15 to 25 cm)."""
+        """Return infrared left, right (1: free, 0: an obstacle within some 15 to 25 cm)."""
         self.need_robot("ir")
         return self._get(_IR, codec.two_flags)
 
     def light(self) -> tuple[int, int, int]:
-        """Light left, center, right (0: bright, to 65535: dark; an S1 from about 5000 on)."""
+        """Return light left, center, right (0: bright, to 65535: dark; an S1 from about 5000 on)."""
         self.need_robot("light")
         return self._get(_LIGHT, codec.light_words)
 
     def line(self) -> tuple[int, int]:
-        """Line left, right (1: dark floor, 0: light)."""
+        """Return line left, right (1: dark floor, 0: light)."""
         self.need_robot("line")
         return self._get(_LINE, codec.two_flags)
 
     def stall(self) -> bool:
-        """Whether the wheels do not turn as they should."""
+        """Return whether the robot reports a stall."""
         self.need_robot("stall")
         return self._get(_STALL, codec.flag) == 1
 
     def obstacle(self) -> tuple[int, int, int]:
-        """Obstacle left, center, right by the Fluke (0: free, 6400: near; a Fluke 2 sees the same with all three)."""
+        """Return obstacle left, center, right by the Fluke (0: free, 6400: near; a Fluke 2 has one sensor for all)."""
         self.need_fluke("obstacle")
         left, center, right = (self._get(request, codec.obstacle) for request in _OBSTACLES)
         return left, center, right
 
     def battery(self) -> float:
-        """The battery [V]; about 9 when full, low below 6.15."""
+        """Return the battery voltage [V]: about 9 when full, low below 6.15."""
         self.need_fluke("battery")
         return self._get(codec.BATTERY, codec.volts)
 
     def volts(self) -> float:
-        """The battery by its Fluke [V]; nan without one."""
+        """Return the battery voltage by its Fluke [V], nan without a Fluke."""
         return math.nan if self.info.fluke == "none" else self.battery()
 
     def distance(self) -> tuple[int, int]:
-        """Distance left, right by an S2 (0: touching, to 99: nothing seen)."""
+        """Return distance left, right by an S2 (0: touching, to 99: nothing in range)."""
         self.need_s2("distance")
         left, right = (self._get(request, codec.distance) for request in _DISTANCES)
         return left, right
 
     def mic_envelope(self) -> int:
-        """How loud it is by an S2's microphone (0 upwards, no unit)."""
+        """Return the loudness by an S2's microphone (0 upwards, no unit)."""
         self.need_s2("mic_envelope")
         return self._get(robot_request("mic_envelope", Op.GET_MIC_ENVELOPE), codec.signed_long)
 
     def ir_ex(self, side: str, threshold: int = 0) -> int:
-        """Infrared of one side of an S2 (1: free) at a threshold of your own.
+        """Return the infrared of one side of an S2 (1: free) with a custom threshold.
 
         Args:
             side: "left" or "right".
-            threshold: 1 to 100, higher sees only what is nearer; 0 for the robot's own.
+            threshold: 1 to 100; a higher one has a shorter range. 0: the default of the robot.
         """
         return self._get_ex("ir_ex", Op.GET_IR_EX, side, threshold, 100)
 
     def line_ex(self, side: str, threshold: int = 0) -> int:
-        """Line of one side of an S2 (1: dark) at a threshold of your own.
+        """Return the line of one side of an S2 (1: dark) with a custom threshold.
 
         Args:
             side: "left" or "right".
-            threshold: 1 to 255; 0 for the robot's own.
+            threshold: 1 to 255. 0: the default of the robot.
         """
         return self._get_ex("line_ex", Op.GET_LINE_EX, side, threshold, 255)
 
@@ -111,5 +111,5 @@ class Senses(Device):
         return self._get(robot_request(name, op, arguments), codec.flag)
 
     def _flags(self) -> tuple[tuple[int, int], tuple[int, int], bool]:
-        """IR, line and stall of the robot in one byte: the quickest look there is."""
+        """Return IR, line, and stall of the robot from one byte, which is the fastest reading."""
         return self._get(robot_request("flags", Op.GET_ALL_BINARY), codec.binary_block)

@@ -9,7 +9,7 @@ from ._device import Device, limited
 from .opcodes import Op
 
 LONGEST_TONE_S = 8.191
-"""What an S2 plays at most [s]."""
+"""Longest tone of an S2 [s]."""
 _LEDS = {
     "left": (Op.SET_LED_LEFT_ON, Op.SET_LED_LEFT_OFF),
     "center": (Op.SET_LED_CENTER_ON, Op.SET_LED_CENTER_OFF),
@@ -19,17 +19,17 @@ _LEDS = {
 
 
 class SoundAndLight(Device):
-    """What people hear and see of the robot."""
+    """Speaker and lights of the robot."""
 
     def beep(self, seconds: float, hz: float, hz2: float | None = None) -> None:
-        """Play a tone, or two at once, and return when it has ended.
+        """Play a tone, or two in parallel, and return when it has ended.
 
-        It is not repeated where its answer is lost, which is then an error: it may have been heard.
+        A lost answer is an error, and the tone is not repeated, because it may have been played.
 
         Args:
             seconds: 0 to 8.191 s.
             hz: 0 to 10000 Hz; 0 is a rest.
-            hz2: Of the other tone, likewise.
+            hz2: Frequency of the second tone.
         """
         self.need_robot("beep")
         limited("seconds", seconds, 0.0, LONGEST_TONE_S)
@@ -44,7 +44,7 @@ class SoundAndLight(Device):
         )
 
     def set_loud(self, loud: bool) -> None:
-        """Switch the speaker on or off; the robot keeps that when it is switched off."""
+        """Switch the speaker on or off. The robot stores this while it is switched off."""
         self.need_robot("set_loud")
         self._set(robot_request("set_loud", Op.SET_LOUD if loud else Op.SET_QUIET))
 

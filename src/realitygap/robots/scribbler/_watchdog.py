@@ -1,4 +1,4 @@
-"""Stops a robot whose program has fallen silent: it would drive on for ever."""
+"""A watchdog that stops a robot whose program is silent. Otherwise the robot would drive on forever."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from realitygap.robots._clock import Clock, SystemClock
 from ._link import Link
 
 LOOK_S = 0.02
-"""How often the thread looks [s]."""
+"""Time between two checks of the thread [s]."""
 
 
 class Watchdog:
-    """Stops the motors when nobody has spoken to a robot for a while.
+    """Stops the motors if no command was sent to a robot for a while.
 
-    Where time passes by itself a thread of its own looks. Elsewhere it passes only where somebody lets it, so that
-    `WatchedClock` looks there, and results do not depend on threads.
+    If the clock advances automatically, a separate thread checks it. Otherwise time advances only in `sleep`, so
+    `WatchedClock` checks it there, and results do not depend on threads.
 
     Args:
-        link: To the robot.
-        silence_s: How long nobody may speak while motors may be running [s].
+        link: The link to the robot.
+        silence_s: Maximum time without a command while motors may be running [s].
     """
 
     def __init__(self, link: Link, silence_s: float) -> None:
@@ -40,16 +40,16 @@ class Watchdog:
             threading.Thread(target=_keep_looking, args=(weakref.ref(self), self._ended), daemon=True).start()
 
     def excuse(self, seconds: float) -> None:
-        """Nobody need speak for so long from now on [s]: a command lasts."""
+        """Allow silence for some seconds from now on, because a command lasts."""
         self._excused_until = self._link.clock.now() + seconds
 
     @property
     def due_s(self) -> float:
-        """When the motors will be stopped, if nobody speaks before [s]."""
+        """Time at which the motors will be stopped unless a command is sent before [s]."""
         return max(self._link.spoken_s, self._excused_until) + self.silence_s
 
     def look(self) -> None:
-        """Stop the motors if they may be running and it is time to."""
+        """Stop the motors if they may be running and the time is up."""
         link = self._link
         if link.motors_off or link.clock.now() <= self.due_s:
             return
@@ -68,7 +68,7 @@ class Watchdog:
                 self._is_stopping = False
 
     def _before_command(self) -> None:
-        """Look, and say that the recording failed while only the watchdog spoke."""
+        """Check the time, and raise an error if a recording by the watchdog failed."""
         if self._is_stopping:
             return
         self.look()
@@ -77,23 +77,23 @@ class Watchdog:
             raise unsaid
 
     def end(self) -> None:
-        """Look no more."""
+        """End the checks."""
         self._ended.set()
 
 
 class WatchedClock:
-    """A clock under whose sleep a silent robot is stopped in time."""
+    """A clock whose `sleep` also runs the watchdog."""
 
     def __init__(self, clock: Clock, watchdog: Watchdog) -> None:
         self._clock = clock
         self._watchdog = watchdog
 
     def now(self) -> float:
-        """The time [s]."""
+        """Return the time [s]."""
         return self._clock.now()
 
     def sleep(self, seconds: float) -> None:
-        """Let so much time pass [s]."""
+        """Wait for some seconds."""
         until = self._clock.now() + seconds
         due = self._watchdog.due_s
         if due < until:
@@ -104,7 +104,7 @@ class WatchedClock:
 
 
 def _passes_by_itself(clock: Clock) -> bool:
-    """Whether time passes on a clock while nobody lets it."""
+    """Return whether a clock advances without calls of `sleep`."""
     if isinstance(clock, SystemClock):
         return True
     before = clock.now()

@@ -370,8 +370,8 @@ class TwinModel(Settings):
     )
     engine: Literal["mujoco", "sim"] = Field(
         "mujoco",
-        description="Physics engine: mujoco, or sim, the platform `sim` with its defaults, used like a twin. Such a twin "
-        "has no gap to `sim`, and of this file only step_s and seed have an effect.",
+        description="Physics engine: mujoco, or sim, the platform `sim` with its defaults, used like a twin. Such a "
+        "twin has no gap to `sim`, and of this file only step_s and seed have an effect.",
     )
     step_s: Annotated[float, Field(ge=0.02, le=60)] = Field(0.5, description="Duration of a command [s].")
     body: TwinChassis = TwinChassis()

@@ -83,8 +83,9 @@ class _ManyRobots(VectorEnv[Array, Array, NDArray[Any]]):
         return tuple(self._robots.picture(k) for k in range(self.num_envs))
 
     def close_extras(self, **kwargs: Any) -> None:
-        """Let go of the robots."""
-        self._robots.close()
+        """Let go of the robots, if it got any: Gymnasium 1.1 closes one that was never made."""
+        if hasattr(self, "_robots"):
+            self._robots.close()
 
     def _info(self) -> dict[str, Any]:
         """Each array with another that says which robots it is of: all."""

@@ -54,7 +54,7 @@ def write_checkpoint(
     }
     buffer = io.BytesIO()
     text = np.frombuffer(json.dumps(header).encode("utf-8"), np.uint8)
-    np.savez(buffer, allow_pickle=False, **{_ABOUT: text, **arrays})
+    np.savez(buffer, **{_ABOUT: text, **arrays})
     write_whole(path, buffer.getvalue())
 
 

@@ -54,7 +54,8 @@ def write_checkpoint(
     }
     buffer = io.BytesIO()
     text = np.frombuffer(json.dumps(header).encode("utf-8"), np.uint8)
-    np.savez(buffer, **{_ABOUT: text, **arrays})
+    contents: dict[str, Any] = {_ABOUT: text, **arrays}
+    np.savez(buffer, **contents)
     write_whole(path, buffer.getvalue())
 
 

@@ -73,7 +73,24 @@ def _example_of(command: Any) -> str:
 
 
 class _GroupedCommand(TyperCommand):
-    """A command whose help lists the options of each mode together: those with the same `rich_help_panel`."""
+    """A command that refuses empty names of files, and whose help lists the options of each mode together.
+
+    Options of a mode have the same `rich_help_panel`.
+    """
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Parse the words of a command; the path of an empty name would be the current folder."""
+        paths = {
+            option
+            for parameter in self.get_params(ctx)
+            if (parameter.metavar or "").startswith(("DIR", "FILE", "PATH"))
+            for option in parameter.opts
+        }
+        for option, value in zip(args, [*args[1:], None], strict=True):
+            if (option in paths and value == "") or option in {f"{path}=" for path in paths}:
+                name = option.rstrip("=")
+                raise typer.BadParameter(f"{name} is empty. Name a file or folder, or leave {name} out.", ctx)
+        return super().parse_args(ctx, args)
 
     def format_options(self, ctx: Any, formatter: Any) -> None:
         groups: dict[str, list[tuple[str, str]]] = {"Arguments": [], "Options": []}

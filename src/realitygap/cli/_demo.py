@@ -19,7 +19,7 @@ _ROBOT = "scribbler:emulator://s2?fluke=2&speed=off"
 
 def demo(
     out: Annotated[
-        str | None,
+        Path | None,
         typer.Option(metavar="DIR", help="Folder for the results. [default: a new temporary folder]"),
     ] = None,
     open_page: Annotated[
@@ -60,20 +60,14 @@ def demo(
         show_page(folder / "paper" / "report.html")
 
 
-def _made(out: str | None) -> Path:
+def _made(folder: Path | None) -> Path:
     """Make the folder for the results and return it.
 
-    Args:
-        out: Name as given. A `Path` would not do: the path of an empty name is the current folder.
-
     Raises:
-        StudyError: The name is empty, or belongs to a file.
+        StudyError: The name belongs to a file.
     """
-    if out is None:
+    if folder is None:
         return Path(tempfile.mkdtemp(prefix="realitygap-demo-"))
-    if not out:
-        raise StudyError("--out is empty, expected a folder. Name one, or leave --out out.")
-    folder = Path(out)
     if folder.exists() and not folder.is_dir():
         raise StudyError(f"--out is the file {folder}, expected a folder. Name another one.")
     folder.mkdir(parents=True, exist_ok=True)

@@ -131,7 +131,7 @@ def transfer(
 
     All strategies have the same evolution in simulation: `runs` runs of the condition, every individual tried `repeats`
     times. Where the study does not say how long a command of `sim` lasts, it is as long as the target's. Every trial on
-    the target is kept as it comes; the same call goes on where an interrupted one stopped.
+    the target is saved when it ends; the same call resumes an interrupted one.
 
     Args:
         study: A study, its name or its file.

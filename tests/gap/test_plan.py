@@ -10,6 +10,7 @@ from realitygap.gap import (
     GapSide,
     attenuated,
     check_plan,
+    detectable_difference,
     measure_gap,
     plan_correlation,
     plan_effect,
@@ -26,6 +27,17 @@ def test_effect_needs_what_tables_say():
     found = plan_effect(0.05, spread=0.1, noise=0.0, trials=1)
     assert found.controllers == 34
     assert found.low < 0.807 < found.high
+
+
+def test_detectable_difference_is_the_effect_that_so_many_controllers_detect():
+    assert detectable_difference(34, spread=0.1, noise=0.0, trials=1) == pytest.approx(0.0496, abs=1e-4)
+    for trials in (1, 10):
+        spreads = {"spread": 0.05, "noise": 0.1, "trials": trials}
+        effect = detectable_difference(20, **spreads)
+        assert plan_effect(1.001 * effect, **spreads).controllers == 20
+        assert plan_effect(0.999 * effect, **spreads).controllers == 21
+    with pytest.raises(ValueError, match="n is 1"):
+        detectable_difference(1, spread=0.1, noise=0.0, trials=1)
 
 
 def test_more_trials_need_fewer_controllers_down_to_what_controllers_differ():

@@ -1,12 +1,13 @@
-"""A gap measured and planned at its page."""
+"""A gap measured at its page."""
 
 from __future__ import annotations
 
 import re
+import time
 
 import pytest
 
-from realitygap.lab._gap_work import rounds
+from realitygap.lab._gap_work import _Telling, rounds
 from realitygap.records import read_observations
 
 from .conftest import open_advanced
@@ -34,23 +35,44 @@ def test_gap_is_measured_with_its_progress_and_mistakes_are_shown_at_their_field
         page.locator(".lab-field .lab-problem", has_text=problem).wait_for()
         page.wait_for_function("() => document.activeElement.classList.contains('lab-summary')")
     assert list(lab.root.iterdir()) == []
-    measure(page, Trials_per_controller="3")
+    page.get_by_label("Trials per controller").fill("3")
+    page.get_by_text(
+        "Needs 30 trials on the target. With these, mean differences in coverage above"
+    ).wait_for()
+    page.get_by_role("button", name="Measure the gap").click()
+    page.get_by_text("sim → jyro · 10 controllers · 3 trials each").wait_for()
+    assert page.get_by_role("button", name="Measure the gap").all()[-1].is_disabled()
+    assert not page.get_by_label("Simulator").is_visible()
     page.get_by_text(re.compile(r"\d+ of 30 trials")).wait_for()
-    assert not page.get_by_role("button", name="Measure the gap").is_visible()
     page.get_by_text("Complete.", exact=True).wait_for(timeout=180_000)
     page.reload()
     page.get_by_text("Rank correlation", exact=True).wait_for()
+    for trials in (2, 3):  # one interval for each report
+        page.get_by_text(f"{trials} trials", exact=True).wait_for()
     page.frame_locator("iframe").get_by_text("jyro").first.wait_for()
     assert len(read_observations(lab.root / "gaps" / "first.jsonl").trials) == 30
     assert (lab.root / "gaps" / "first.html").is_file()
 
 
-def test_the_number_of_trials_is_planned(lab, visit):
-    page = visit("gap")
-    page.get_by_text("How many trials do I need?").click()
-    page.get_by_role("button", name="Plan", exact=True).click()
-    page.get_by_role("cell", name="50", exact=True).wait_for(timeout=180_000)
-    assert page.locator(".lab-plan tr").count() == 7
+class Told:
+    """A channel that keeps what it is told."""
+
+    def __init__(self):
+        self.done = []
+
+    def say(self, kind, *, name, done, total):
+        self.done.append((name, done))
+
+
+def test_last_of_several_trials_that_end_together_is_reported():
+    channel = Told()
+    telling = _Telling(channel)
+    for done in (1, 2, 3):
+        telling.show("robot", done, 10)
+    began = time.monotonic()
+    while ("robot", 3) not in channel.done:
+        assert time.monotonic() - began < 2
+        time.sleep(0.02)
 
 
 def test_reports_come_after_2_4_8_trials_and_at_the_end():

@@ -16,6 +16,7 @@ from ._measure import measure_gap
 from ._plan import (
     Needed,
     check_plan,
+    detectable_difference,
     plan_correlation,
     plan_effect,
     plan_margin,
@@ -71,6 +72,7 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     "fewest",
     "Needed",
     "check_plan",
+    "detectable_difference",
     "plan_effect",
     "plan_margin",
     "plan_correlation",

@@ -86,6 +86,32 @@ def plan_effect(
     return Needed(trials, n, *_share(found))
 
 
+def detectable_difference(n: int, *, spread: float, noise: float, trials: int, power: float = 0.8) -> float:
+    """Return the mean difference that a paired t test at 5 % detects with n controllers, in units of quality.
+
+    Args:
+        n: Number of controllers, 2 or more.
+        spread, noise, trials: As in `spread_of_differences`.
+        power: Probability of detecting it.
+
+    Raises:
+        ValueError: n is below 2, or a number is out of range.
+
+    Source: Cohen (1988), chapter 2, by the noncentral t distribution.
+    """
+    check_plan(power)
+    _check(noise=noise + spread)
+    if n < 2:
+        raise ValueError(f"n is {n}, expected 2 or more.")
+    low, high = 0.0, 1.0
+    while _t_power(high, n) < power:
+        low, high = high, 2 * high
+    for _ in range(40):  # far below the digits that anybody reads
+        middle = (low + high) / 2
+        low, high = (middle, high) if _t_power(middle, n) < power else (low, middle)
+    return high * spread_of_differences(spread, noise, trials)
+
+
 def plan_margin(
     margin: float, *, spread: float, noise: float, trials: int, power: float = 0.8, seed: int = 1
 ) -> Needed:

@@ -1,4 +1,4 @@
-"""A gap that is measured or planned, as the pages see it."""
+"""A gap that is measured, as the pages see it."""
 
 from __future__ import annotations
 
@@ -16,29 +16,30 @@ class GapJob(Job):
     """A gap at work.
 
     Attributes:
-        name: Of its files.
-        platform: The target; empty for a plan.
+        name: Name of its files.
+        values: Arguments of `gap_between`.
+        platform: The target.
         n_trials: Number of trials on each platform.
         trials: Number of trials that are done, by platform.
+        is_complete: Whether all trials are done.
         verdict: Verdict of the last report; empty before the first one.
         measures: Name and value of each measure of the last report.
+        intervals: Trials of each controller, and the RMS gap with its interval, of each report that has one.
         n_reports: Number of reports so far.
-        plan: Result of a plan; None before, or if none was asked for.
     """
-
-    STOPPED = "Stopped. The trials of the target are saved. Measure again under the same name to continue."
 
     def __init__(self, name: str, order: dict[str, Any], root: Path, changed: Callable[[], None]) -> None:
         self.name = name
-        self.platform = str(order.get("measure", {}).get("target", ""))
-        measure = order.get("measure", {})
-        self.n_trials = int(measure.get("n_controllers") or 0) * int(measure.get("trials") or 0)
+        self.values: dict[str, Any] = order["measure"]
+        self.platform = str(self.values["target"])
+        self.n_trials = int(self.values["n_controllers"]) * int(self.values["trials"])
         self.trials: dict[str, int] = {}
         self._pace = Pace()
+        self.is_complete = False
         self.verdict = ""
         self.measures: list[tuple[str, str]] = []
+        self.intervals: list[tuple[int, float, float, float]] = []
         self.n_reports = 0
-        self.plan: dict[str, Any] | None = None
         super().__init__({"work": "gap", **order}, root, changed)
 
     @property
@@ -65,10 +66,14 @@ class GapJob(Job):
 
     def _on_measured(self, message: dict[str, Any]) -> None:
         self.verdict, self.measures = message["verdict"], message["measures"]
+        if message["rms"] is not None:
+            estimate, low, high = message["rms"]
+            self.intervals = [*self.intervals, (message["trials"], estimate, low, high)]
         self.n_reports += 1
 
-    def _on_plan(self, message: dict[str, Any]) -> None:
-        self.plan = message
+    def _on_interrupted(self, message: dict[str, Any]) -> None:
+        n_done = next(iter(self.trials.values()), 0)  # the target is the first that is told of
+        self.outcome = f"Stopped after {n_done:,} of {self.n_trials:,} trials on the target. They are saved."
 
     def _on_done(self, message: dict[str, Any]) -> None:
-        self.outcome = "Complete."
+        self.outcome, self.is_complete = "Complete.", True

@@ -1,14 +1,14 @@
-"""A gap that is measured or planned in its own process; the report grows with each round of trials."""
+"""A gap that is measured in its own process; the report grows with each round of trials."""
 
 from __future__ import annotations
 
-import time
+import threading
 from pathlib import Path
 from typing import Any
 
 from realitygap.gap import Estimate
 from realitygap.report import write_gap_report
-from realitygap.study import gap_between, plan_gap
+from realitygap.study import gap_between
 
 from ._channel import Channel, Message
 
@@ -24,26 +24,15 @@ MEASURES = {
 
 
 def work(channel: Channel, order: Message) -> None:
-    """Measure, or plan.
+    """Measure a gap.
 
     Args:
         channel: To the server.
-        order: `plan`, the arguments of `plan_gap`; or `measure`, those of `gap_between`, with `page`, the file of the
-            report, and `kept`, that of the target's trials.
+        order: `measure`, the arguments of `gap_between`; `page`, the file of the report; and `kept`, that of the
+            target's trials.
     """
-    if order.get("plan"):
-        _plan(channel, dict(order["plan"]))
-    else:
-        _measure(channel, dict(order["measure"]), Path(order["page"]), Path(order["kept"]))
+    _measure(channel, dict(order["measure"]), Path(order["page"]), Path(order["kept"]))
     channel.say("done")
-
-
-def _plan(channel: Channel, values: dict[str, Any]) -> None:
-    found = plan_gap(**values)
-    rows = [{**vars(row), "on_target": row.on_target} for row in found.needed]
-    channel.say(
-        "plan", rows=rows, origin=found.spreads.origin, spread=found.spread, noise=found.spreads.noise
-    )
 
 
 def _measure(channel: Channel, values: dict[str, Any], page: Path, kept: Path) -> None:
@@ -54,7 +43,8 @@ def _measure(channel: Channel, values: dict[str, Any], page: Path, kept: Path) -
         write_gap_report(found, page)
         result = found.study.result
         measures = [(title, _words(getattr(result, name))) for name, title in MEASURES.items()]
-        channel.say("measured", trials=trials, verdict=result.verdict, measures=measures)
+        rms = None if result.rms.low is None else [result.rms.estimate, result.rms.low, result.rms.high]
+        channel.say("measured", trials=trials, verdict=result.verdict, measures=measures, rms=rms)
 
 
 def _words(estimate: Estimate) -> str:
@@ -72,15 +62,27 @@ def rounds(trials: int) -> list[int]:
 
 
 class _Telling:
-    """Tells how many trials are done, not too often."""
+    """Reports how many trials are done, not too often; the last number of several is never left out."""
 
     def __init__(self, channel: Channel) -> None:
         self._channel = channel
-        self._last = 0.0
+        self._lock = threading.Lock()
+        self._waiting: dict[str, tuple[int, int]] = {}
 
     def show(self, name: str, done: int, total: int) -> None:
         """Report the number of trials on a platform."""
-        now = time.monotonic()
-        if now - self._last > _TOLD_S or done == total:
-            self._last = now
+        with self._lock:
+            is_due = not self._waiting
+            self._waiting[name] = done, total
+        if is_due:
+            timer = threading.Timer(_TOLD_S, self._report)
+            timer.daemon = True
+            timer.start()
+        if done == total:
+            self._report()
+
+    def _report(self) -> None:
+        with self._lock:
+            waiting, self._waiting = self._waiting, {}
+        for name, (done, total) in waiting.items():
             self._channel.say("trials", name=name, done=done, total=total)

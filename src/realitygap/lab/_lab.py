@@ -86,7 +86,7 @@ class Lab:
         drawer: The process that draws the figures of all studies.
         watchers: The figures of studies that somebody has watched, by name.
         hand: The robot that is driven by hand, or was last; None before.
-        gap: The gap that is measured or planned, or was last; None before.
+        gap: The gap that is measured, or was last; None before.
         calibration: The calibration that goes on, or was last; None before.
         operator: Who has the robot: one visitor at a time, while others watch; None while nobody has.
         request: Last request to control the robot; None if there was none, or the robot was handed over since.
@@ -282,7 +282,7 @@ class Lab:
 
         Raises:
             FieldError: A name or a platform that cannot be used.
-            StudyError: A gap is being measured or planned, or the robot is in use.
+            StudyError: A gap is being measured, or the robot is in use.
         """
         page = self.gap_page(name)
         if page is None:
@@ -293,6 +293,8 @@ class Lab:
         with in_field("controllers"):
             refuse_outside(self.root, values["controllers"])
         with self._lock:
+            if self.gap is not None and not self.gap.is_over:
+                raise StudyError("A gap is being measured. Wait until it is complete, or stop it.")
             kept = page.with_suffix(".jsonl")
             refuse_links(self.root, page, kept)
             if names_a_port(values["target"]):
@@ -300,21 +302,7 @@ class Lab:
                 self.operator, self.request = visitor, None
             page.parent.mkdir(exist_ok=True)
             order = {"measure": values, "page": str(page), "kept": str(kept)}
-            self._begin_gap(name, order)
-
-    def plan_gap(self, question: str, value: float) -> None:
-        """Plan the number of controllers and trials that a question needs.
-
-        Raises:
-            StudyError: A gap is being measured or planned.
-        """
-        with self._lock:
-            self._begin_gap("", {"plan": {"question": question, "value": value}})
-
-    def _begin_gap(self, name: str, order: dict[str, Any]) -> None:
-        if self.gap is not None and not self.gap.is_over:
-            raise StudyError("A gap is being measured or planned. Wait until it is complete, or stop it.")
-        self.gap = GapJob(name, order, self.root, self.changed)
+            self.gap = GapJob(name, order, self.root, self.changed)
         self.changed()
 
     def gap_page(self, name: str) -> Path | None:

@@ -9,6 +9,7 @@ from nicegui import ui
 from starlette.requests import Request
 
 from realitygap.lab._calibration_job import CalibrationJob
+from realitygap.lab._gap_plan import PLACING_S
 from realitygap.lab._lab import Lab, Visitor
 from realitygap.platforms import class_of, emulated_robots
 from realitygap.world import load_arena
@@ -29,8 +30,6 @@ _KINDS = {
     "all": ("All", "Motion, sensors, and contact together.", 20, 15),
 }
 """Name, meaning, trials on a Scribbler, and their time [min] of each kind of calibration."""
-PLACING_S = 20.0
-"""Time to place a robot before a trial [s]."""
 _OF_ROBOT = ("platform", "name")
 """Fields of the first step."""
 _STEPS = ("Robot", "What", "Run", "Result")

@@ -173,7 +173,15 @@ class Form:
 
     def problems(self) -> dict[str, str]:
         """Return what is wrong in each field, by key; empty if nothing is."""
-        return {key: text for key in self._fields if (text := self._checked(key))}
+        return {key: text for key in self._fields if (text := self.problem_of(key))}
+
+    def problem_of(self, key: str) -> str:
+        """Return what is wrong in a field; empty if nothing is."""
+        try:
+            self._fields[key].check()
+        except ValueError as error:
+            return str(error)
+        return ""
 
     def is_wrong(self, key: str) -> bool:
         """Return whether a mistake is shown at this field."""
@@ -256,15 +264,7 @@ class Form:
         problem = ui.label("").classes("lab-problem")
         field = self._fields[key] = _Field(label, element, problem, note, check)
         self._mark(field, "")
-        element.on("blur", lambda: self._mark(field, self._checked(key) or self._refused_again(key)))
-
-    def _checked(self, key: str) -> str:
-        """The mistake in a field; empty if there is none."""
-        try:
-            self._fields[key].check()
-        except ValueError as error:
-            return str(error)
-        return ""
+        element.on("blur", lambda: self._mark(field, self.problem_of(key) or self._refused_again(key)))
 
     def _mark(self, field: _Field, text: str) -> None:
         field.problem.text = text

@@ -1,29 +1,27 @@
-"""Gap: the same controllers on two platforms, and the number of trials that detects a difference."""
+"""Gap: the same controllers on two platforms, and the differences that their trials can detect."""
 
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass
 from typing import Any
 
 from nicegui import app, run, ui
+from nicegui.elements.mixins.value_element import ValueElement
 from starlette.requests import Request
 from starlette.responses import FileResponse, PlainTextResponse, Response
 
 from realitygap.lab._access import FOREIGN_HEADERS
 from realitygap.lab._gap_job import GapJob
+from realitygap.lab._gap_plan import plan_words
 from realitygap.lab._lab import Lab, Visitor
 from realitygap.platforms import emulated_robots
 
 from ._fields import Form
-from ._frame import framed, hint, section, visitor_of
+from ._frame import framed, hint, section, text_of, visitor_of
 from ._new import CALIBRATED
+from ._notices import attempt
 from ._part import Part, watching
-
-_QUESTIONS = {
-    "effect": "Detect a mean difference",
-    "margin": "Show equivalence within a margin",
-    "correlation": "Show a correlation above 0.5",
-}
 
 
 def add_gap(lab: Lab) -> None:
@@ -45,6 +43,17 @@ def add_gap(lab: Lab) -> None:
         return FileResponse(path, media_type="text/html", headers=headers)
 
 
+@dataclass(frozen=True)
+class _Work:
+    """A gap that is measured, or was last, at one moment."""
+
+    job: GapJob
+    progress: str
+    is_over: bool
+    is_failed: bool
+    share: float
+
+
 class _Page:
     def __init__(self, lab: Lab, visitor: Visitor, reports: list[str], sim: str) -> None:
         self._lab, self._visitor, self._reports, self._sim = lab, visitor, reports, sim
@@ -54,22 +63,16 @@ class _Page:
             "Runs the same controllers on a simulator and on a target, and measures how much the two differ. "
             "The trials of the target are saved: measure again under the same name to continue."
         )
-        self._form_box = ui.element("div").classes("lab-form")
-        parts: list[Part[Any]] = [
-            Part(self._work_state, self._show_work),
-            Part(self._result_state, self._show_result),
-            Part(self._plan_state, self._show_plan),
-        ]
-        with self._form_box:
+        with ui.element("div").classes("lab-form") as self._form_box:
             self._show_form()
-        with ui.column().classes("lab-cards"):
-            parts[0].show()
-        with ui.column().classes("lab-cards"):
-            parts[1].show()
-        with ui.expansion("How many trials do I need?").classes("lab-expansion"):
-            with ui.element("div").classes("lab-form"):
-                self._show_plan_form()
-            parts[2].show()
+        parts: list[Part[Any]] = [
+            Part(self._order, self._show_order),
+            Part(self._work, self._show_work),
+            Part(self._result, self._show_result),
+        ]
+        for part in parts:
+            with ui.column().classes("lab-cards"):
+                part.show()
         if self._reports:
             section("Saved reports")
         for name in self._reports:
@@ -81,7 +84,7 @@ class _Page:
 
         watching(self._lab, look)
 
-    # measure
+    # form
 
     def _show_form(self) -> None:
         self._form = form = Form()
@@ -90,7 +93,7 @@ class _Page:
         form.text(
             "sim", "Simulator", self._sim, options=sim, is_needed=True, explanation="sim, sim:FILE, or jyro."
         )
-        form.text(
+        self._target = form.text(
             "target",
             "Target",
             "jyro",
@@ -98,18 +101,11 @@ class _Page:
             explanation="jyro, twin:FILE, scribbler:PORT, or thymio:PORT. Emulated robots: "
             f"{', '.join(emulated_robots())}.",
         )
-        n = form.number("n_controllers", "Controllers", 10, 2, 1024)
-        trials = form.number("trials", "Trials per controller", 10, 1, 4096)
-        needed = hint("")
-
-        def count() -> None:
-            numbers = [each.value for each in (n, trials)]
-            if all(isinstance(each, int | float) for each in numbers):
-                needed.text = f"Needs {numbers[0] * numbers[1]:,.0f} trials on the target."
-
-        for each in (n, trials):
-            each.on_value_change(count)
-        count()
+        with ui.element("div").classes("lab-fields"):
+            self._numbers = {
+                "n_controllers": form.number("n_controllers", "Controllers", 10, 2, 1024),
+                "trials": form.number("trials", "Trials per controller", 10, 1, 4096),
+            }
         with ui.expansion("Advanced").classes("lab-expansion"):
             form.text(
                 "name", "Name", "gap", is_needed=True, explanation="Name of the report and the saved trials."
@@ -120,7 +116,7 @@ class _Page:
                 "random",
                 explanation="random, or a study whose best controllers to use.",
             )
-            form.number(
+            self._margin = form.number(
                 "margin",
                 "Margin of equivalence",
                 None,
@@ -135,51 +131,96 @@ class _Page:
                 "Witness",
                 explanation="HOST:PORT of the witness of an emulator in another program.",
             )
-        ui.button("Measure the gap", on_click=lambda: form.submit(self._measure)).props("unelevated no-caps")
+        self._plan = ui.label("").classes("lab-plan").props('role="status"')
+        hint(
+            "Detectable: 80 of 100 measurements find the difference, if controllers vary as in simulation. The command "
+            "realitygap plan also plans correlations."
+        )
+        fields: list[ValueElement[Any]] = [*self._numbers.values(), self._target, self._margin]
+        for field in fields:
+            field.on_value_change(self._show_plan)
+        self._show_plan()
+        self._button = ui.button("Measure the gap", on_click=self._submit).props("unelevated no-caps")
+
+    def _show_plan(self) -> None:
+        """State what the entered numbers need; nothing while one of them cannot be used."""
+        if any(self._form.problem_of(key) for key in (*self._numbers, "margin")):
+            self._plan.text = ""
+            return
+        n, trials = (int(field.value) for field in self._numbers.values())
+        margin = self._margin.value
+        self._plan.text = plan_words(n, trials, text_of(self._target), float(margin) if margin else None)
+
+    async def _submit(self) -> None:
+        self._button.disable()  # a second press would only find that the first one has begun
+        await self._form.submit(self._measure)
+        self._button.enable()
 
     def _measure(self, entered: dict[str, Any]) -> None:
         values = {key: value for key, value in entered.items() if key != "name" and value not in (None, "")}
         self._lab.measure_gap(entered["name"], {"controllers": "random", **values}, self._visitor)
 
-    def _job(self) -> GapJob | None:
-        """The gap that is measured, or was last."""
+    def _order(self) -> str:
+        """Settings of the gap that is being measured, in one line; empty if none is."""
         job = self._lab.gap
-        return job if job is not None and job.name else None
+        if job is None or job.is_over:
+            return ""
+        values = job.values
+        return (
+            f"{values['sim']} → {values['target']} · {values['n_controllers']:,} controllers · {values['trials']:,} "
+            "trials each"
+        )
 
-    def _work_state(self) -> tuple[str, str, bool, bool, float] | None:
-        job = self._job()
+    def _show_order(self, order: str) -> None:
+        """Show the form as one line while a gap is measured."""
+        self._form_box.set_visibility(not order)
+        if order:
+            with ui.row().classes("lab-row"):
+                ui.label(order)
+                ui.button("Measure the gap").props("unelevated no-caps disable")
+
+    # work and result
+
+    def _work(self) -> _Work | None:
+        job = self._lab.gap
         if job is None:
             return None
         share = sum(job.trials.values()) / max(2 * job.n_trials, 1)
-        return job.name, job.progress, job.is_over, job.is_failed, share
+        return _Work(job, job.progress, job.is_over, job.is_failed, share)
 
-    def _show_work(self, state: tuple[str, str, bool, bool, float] | None) -> None:
-        self._form_box.set_visibility(state is None or state[2])
-        if state is None:
+    def _show_work(self, work: _Work | None) -> None:
+        if work is None:
             if not self._reports:
                 ui.label("No gaps measured yet.")
             return
-        name, progress, is_over, is_failed, share = state
-        job = self._job()
+        job = work.job
         with ui.row().classes("lab-row"):
-            ui.label(f"Gap {name}").classes("lab-section")
-            ui.label(progress).classes("lab-problem lab-lines" if is_failed else "").props('role="status"')
-            if not is_over and job is not None:
+            ui.label(f"Gap {job.name}").classes("lab-section")
+            ui.label(work.progress).classes("lab-problem lab-lines" if work.is_failed else "").props(
+                'role="status"'
+            )
+            if not work.is_over:
                 ui.button("Stop", on_click=job.ask_to_end).props("outline no-caps")
-        if not is_over:
-            ui.linear_progress(share, show_value=False).props(
-                f'aria-label="{100 * share:.0f} % of the trials"'
+            elif not job.is_complete:
+                ui.button("Resume", on_click=lambda: attempt(lambda: self._resume(job))).props(
+                    "outline no-caps"
+                )
+        if not work.is_over:
+            ui.linear_progress(work.share, show_value=False).props(
+                f'aria-label="{100 * work.share:.0f} % of the trials"'
             )
 
-    def _result_state(self) -> tuple[str, int] | None:
-        job = self._job()
-        return None if job is None or not job.verdict else (job.name, job.n_reports)
+    def _resume(self, job: GapJob) -> None:
+        self._lab.measure_gap(job.name, job.values, self._visitor)
 
-    def _show_result(self, state: tuple[str, int] | None) -> None:
-        job = self._job()
-        if state is None or job is None:
+    def _result(self) -> tuple[GapJob, int] | None:
+        job = self._lab.gap
+        return None if job is None or not job.verdict else (job, job.n_reports)
+
+    def _show_result(self, result: tuple[GapJob, int] | None) -> None:
+        if result is None:
             return
-        name, n_reports = state
+        job, n_reports = result
         ui.label(job.verdict).classes("lab-finding").props('role="status"')
         with ui.element("dl").classes("lab-facts"):
             for title, words in job.measures:
@@ -187,62 +228,32 @@ class _Page:
                     ui.label(title)
                 with ui.element("dd"):
                     ui.label(words)
-        address = f"/gaps/{name}?v={n_reports}"
+        if len(job.intervals) > 1:
+            _show_intervals(job.intervals)
+        address = f"/gaps/{job.name}?v={n_reports}"
         ui.link("Open report", address, new_tab=True)
         ui.element("iframe").props(f'src="{address}" title="Report of the gap"').classes("lab-report")
 
-    # plan
 
-    def _show_plan_form(self) -> None:
-        form = Form()
-        form.summary()
-        form.choice("question", "Goal", _QUESTIONS, "effect")
-        form.number(
-            "value",
-            "Difference in coverage",
-            0.05,
-            0.001,
-            1.0,
-            is_whole=False,
-            explanation="Difference, margin, or correlation from 0.001 to 1.",
-        )
-
-        def plan(values: dict[str, Any]) -> None:
-            self._lab.plan_gap(values["question"] or "effect", values["value"])
-
-        ui.button("Plan", on_click=lambda: form.submit(plan)).props("outline no-caps")
-
-    def _plan_state(self) -> tuple[str, bool, Any] | None:
-        job = self._lab.gap
-        return None if job is None or job.name else (job.progress, job.is_failed, job.plan)
-
-    def _show_plan(self, state: tuple[str, bool, Any] | None) -> None:
-        if state is None:
-            return
-        progress, is_failed, plan = state
-        if plan is None:
-            ui.label(progress).classes("lab-problem lab-lines" if is_failed else "").props('role="status"')
-            return
-        hint(
-            f"The standard deviation of trials of one controller is {plan['noise']:.3f} ({plan['origin']}). With each "
-            "row, 80 of 100 studies reach the goal."
-        )
-        columns = [
-            {"name": name, "label": label, "field": name, "align": "right"}
-            for name, label in (
-                ("trials", "Trials per controller"),
-                ("controllers", "Controllers"),
-                ("on_target", "Trials on the target"),
-            )
-        ]
-        rows = [
-            {
-                "trials": f"{row['trials']:,}",
-                "controllers": "over 100,000" if row["controllers"] is None else f"{row['controllers']:,}",
-                "on_target": "" if row["controllers"] is None else f"{row['on_target']:,}",
-            }
-            for row in plan["rows"]
-        ]
-        ui.table(rows=rows, columns=columns, row_key="trials").classes("lab-plan").props(
-            "flat bordered dense"
-        )
+def _show_intervals(intervals: list[tuple[int, float, float, float]]) -> None:
+    """Show how the interval of the RMS gap narrows with the trials, as bars with their numbers."""
+    section("RMS gap by trials per controller")
+    widest = max(high for *_, high in intervals)
+    with ui.element("dl").classes("lab-facts"):
+        for trials, estimate, low, high in intervals:
+            with ui.element("dt"):
+                ui.label(f"{trials:,} trials")
+            with ui.element("dd").classes("lab-row lab-interval"):
+                left, middle, right = (100 * value / widest for value in (low, estimate, high))
+                width = max(right - left, 1.0)
+                ui.html(
+                    '<svg viewBox="0 0 100 12" height="14" aria-hidden="true" preserveAspectRatio="none">'
+                    '<rect x="0" y="5" width="100" height="2" class="lab-bar-prior"/>'
+                    f'<rect x="{left:.1f}" y="3" width="{width:.1f}" height="6" class="lab-bar-interval"/>'
+                    f'<rect x="{middle - 0.4:.1f}" y="0" width="0.8" height="12" class="lab-bar-estimate"/></svg>',
+                    sanitize=False,
+                )
+                ui.label(f"{estimate:.3f} [{low:.3f}, {high:.3f}], width {high - low:.3f}").classes(
+                    "lab-value"
+                )
+    hint("Bars are 95 % intervals; the mark is the estimate. The last row uses all trials so far.")

@@ -145,7 +145,7 @@ class _Page:
         """Title, progress, and address of what is measured, or was last."""
         found = []
         gap, calibration = self._lab.gap, self._lab.calibration
-        if gap is not None and gap.name:
+        if gap is not None:
             found.append((f"Gap {gap.name}", gap.progress, "/gap"))
         if calibration is not None:
             found.append((f"Calibration {calibration.name}", calibration.progress, "/calibrate"))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -18,7 +19,11 @@ class Hand(Job):
         port: Its name.
         label: REAL or EMULATED; empty before it answers.
         about: What it says of itself.
+        n_sensors: Number of its range sensors.
+        more: Other sensors that its senses have: light, line.
+        has_camera, has_battery: Whether it has a camera, and reports the voltage of its battery.
         senses: The last ones; None before.
+        sensed_s: When the last ones came, on the monotonic clock [s].
         battery_v: [V]; None before it was told.
         preflight: What the last one found; None before.
         picture: PNG in base64; empty before.
@@ -41,7 +46,11 @@ class Hand(Job):
         self.port = str(order["port"])
         self.label = ""
         self.about: dict[str, str] = {}
+        self.n_sensors = 0
+        self.more: list[str] = []
+        self.has_camera = self.has_battery = False
         self.senses: dict[str, Any] | None = None
+        self.sensed_s = 0.0
         self.battery_v: float | None = None
         self.preflight: dict[str, Any] | None = None
         self.picture = ""
@@ -51,6 +60,18 @@ class Hand(Job):
         self.n_live = 0
         self.n_stops = 0
         super().__init__({"work": "robot", **order}, root, changed)
+
+    @property
+    def is_lost(self) -> bool:
+        """Whether it was connected, and its link has failed."""
+        return self.is_failed and self.senses is not None
+
+    @property
+    def reply(self) -> str:
+        """Reply on its port, in words; empty as long as it is unknown."""
+        if self.label:
+            return f"{self.about['name']} answered ({self.label})."
+        return "No robot answered." if self.is_failed else ""
 
     def drive(self, move: float, turn: float, stops: int) -> None:
         """Drive so for the next moment; said again and again, or it stops.
@@ -78,7 +99,8 @@ class Hand(Job):
         self._child.tell({"do": "want", "what": what})
 
     def _on_met(self, message: dict[str, Any]) -> None:
-        self.label = message["label"]
+        self.n_sensors, self.more = message["n_sensors"], message["more"]
+        self.has_camera, self.has_battery = message["has_camera"], message["has_battery"]
         self.about = {
             "name": str(message["name"]),
             **{key: str(value) for key, value in message["info"].items()},
@@ -86,9 +108,10 @@ class Hand(Job):
         if "grid" in message:
             walls = tuple(tuple(wall) for wall in message["walls"])
             self.arena = Arena("emulated", walls, Grid(**message["grid"]), Pose(*message["start"]))
+        self.label = message["label"]  # last: a page shows the robot from then on
 
     def _on_senses(self, message: dict[str, Any]) -> None:
-        self.senses = message
+        self.senses, self.sensed_s = message, time.monotonic()
         self.n_live += 1
         pose = message.get("pose")
         if pose is not None and (not self.line or self.line[-1] != pose[:2]):

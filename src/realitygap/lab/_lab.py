@@ -105,6 +105,7 @@ class Lab:
         self.operator: Visitor | None = None
         self.request: RobotRequest | None = None
         self.hand: Hand | None = None
+        self._hands: dict[str, Hand] = {}
         self.gap: GapJob | None = None
         self.calibration: CalibrationJob | None = None
         self.drawer = Drawer(root)
@@ -377,9 +378,14 @@ class Lab:
             refuse_port(self.root, port)
         with self._lock:
             self.refuse_second_robot()
-            self.hand = Hand({"port": port, "witness": witness}, self.root, self.changed)
+            self.hand = self._hands[port] = Hand({"port": port, "witness": witness}, self.root, self.changed)
             self.operator, self.request = visitor, None
         self.changed()
+
+    def reply_on(self, port: str) -> str:
+        """Return what answered on a port when it was last connected; empty if it was not."""
+        hand = self._hands.get(port)
+        return "" if hand is None else hand.reply
 
     def take_robot(self, visitor: Visitor) -> None:
         """Have the visitor who began to use a robot be its operator."""

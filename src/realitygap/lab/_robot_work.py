@@ -68,6 +68,7 @@ class _Hand:
         self._lock = threading.Lock()
         self._wanted: queue.Queue[Message] = queue.Queue()
         self._battery_s = -BATTERY_S
+        self._more = [name for name in _MORE if hasattr(robot, name)]
         channel.at_once("drive", self._drive)
         channel.at_once("release", self._stop)
         channel.at_once("stop", self._stop)
@@ -76,7 +77,17 @@ class _Hand:
     def carry_on(self) -> None:
         """Until the process is interrupted, or the robot fails."""
         robot = self._robot
-        self._channel.say("met", label=robot.label, info=asdict(robot.info), name=robot.name, **self._place())
+        self._channel.say(
+            "met",
+            label=robot.label,
+            info=asdict(robot.info),
+            name=robot.name,
+            n_sensors=robot.n_sensors,
+            more=self._more,
+            has_camera=hasattr(robot, "picture"),
+            has_battery=hasattr(robot, "volts"),
+            **self._place(),
+        )
         while True:
             began = time.monotonic()
             self._keep_moving()
@@ -131,7 +142,7 @@ class _Hand:
             "raw": list(seen.raw),
             "readings": list(seen.readings),
             "stalled": seen.stalled,
-            **{name: list(getattr(robot, name)()) for name in _MORE if hasattr(robot, name)},
+            **{name: list(getattr(robot, name)()) for name in self._more},
             "moves": self._moves,
         }
         if self._witness is not None:

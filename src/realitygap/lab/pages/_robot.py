@@ -11,6 +11,7 @@ from starlette.requests import Request
 
 from realitygap.lab._hand import Hand
 from realitygap.lab._lab import Lab, Visitor
+from realitygap.lab._pace import duration
 from realitygap.platforms import emulated_robots
 from realitygap.robots import list_ports
 from realitygap.robots.scribbler import PortGuess
@@ -27,12 +28,23 @@ LIVE_S = 0.05
 STALE_S = 1.0
 """Age from which readings are shown as old [s]."""
 EMULATED = "emulator://s2?fluke=2"
-_OBSTACLES = {
-    3: (("Left obstacle", "0 to 6400"), ("Center obstacle", "0 to 6400"), ("Right obstacle", "0 to 6400")),
-    2: (("Left infrared", "0 or 1"), ("Right infrared", "0 or 1")),
-    7: tuple((f"Infrared {k}", "0 to 4505") for k in range(7)),
+THYMIO = "thymio:emulator://playground"
+_Sensor = tuple[str, str, float]
+"""Name of a sensor, its range in words, and its largest reading."""
+_RANGE: dict[int, tuple[_Sensor, ...]] = {
+    3: tuple((f"{place} obstacle", "0 to 6400", 6400.0) for place in ("Left", "Center", "Right")),
+    2: tuple((f"{place} infrared", "0 or 1", 1.0) for place in ("Left", "Right")),
+    7: tuple(
+        (f"{place} infrared", "0 to 4505", 4505.0)
+        for place in ("Left", "Center left", "Center", "Center right", "Right", "Rear left", "Rear right")
+    ),
 }
-"""Names and ranges of the obstacle sensors, by their number."""
+"""Range sensors of a robot by their number: a Scribbler with a Fluke, one without, and a Thymio."""
+_LIGHT = tuple(
+    (f"{place} light", "0 bright to 65,535 dark", 65_535.0) for place in ("Left", "Center", "Right")
+)
+_LINE = tuple((f"{place} line", "1 on dark floor", 1.0) for place in ("Left", "Right"))
+_GROUND = tuple((f"{place} ground", "0 dark to 1023 bright", 1023.0) for place in ("Left", "Right"))
 
 
 class DrivePad(Element, component="drive_pad.js"):
@@ -42,10 +54,10 @@ class DrivePad(Element, component="drive_pad.js"):
         super().__init__()
         self._props |= {"name": name, "disabled": is_off, "stops": stops}
 
-    def know(self, stops: int) -> None:
-        """Set the number of stops so far: the pad drives only if it is pressed after all of them."""
-        if self._props["stops"] != stops:
-            self._props["stops"] = stops
+    def know(self, stops: int, *, is_off: bool) -> None:
+        """Set the number of stops so far, and whether the pad is off; it drives only if pressed after all stops."""
+        if (self._props["stops"], self._props["disabled"]) != (stops, is_off):
+            self._props["stops"], self._props["disabled"] = stops, is_off
             self.update()
 
 
@@ -55,20 +67,28 @@ def add_robot(lab: Lab) -> None:
     @ui.page("/robot", response_timeout=30)
     async def robot(request: Request) -> None:
         ports = await run.io_bound(list_ports)
-        with framed(lab, "Robot", "/robot"):
-            _Page(lab, visitor_of(request), ports or []).show()
+        has_playground = await run.io_bound(_has_playground)
+        with framed(lab, "Robot", "/robot", is_wide=True):
+            _Page(lab, visitor_of(request), ports or [], has_playground=bool(has_playground)).show()
+
+
+def _has_playground() -> bool:
+    """Return whether an emulated Thymio can be started here."""
+    from realitygap.emulator import why_not  # takes a moment, and only this page needs it
+
+    return not why_not()
 
 
 class _Page:
-    def __init__(self, lab: Lab, visitor: Visitor, ports: list[PortGuess]) -> None:
+    def __init__(self, lab: Lab, visitor: Visitor, ports: list[PortGuess], *, has_playground: bool) -> None:
         self._lab = lab
         self._visitor = visitor
         self._ports = ports
+        self._has_playground = has_playground
         self._n_shown = -1
         self._n_points = 0
         self._pad: DrivePad | None = None
-        self._gauges: list[_Gauge] = []
-        self._last_s = time.monotonic()
+        self._gauges: dict[str, list[_Gauge]] = {}
 
     def show(self) -> None:
         self._seen = self._state()
@@ -82,15 +102,8 @@ class _Page:
         hand = self._lab.hand
         shown = None
         if hand is not None:
-            shown = (
-                id(hand),
-                hand.label,
-                hand.outcome,
-                hand.preflight,
-                hand.said,
-                len(hand.picture),
-                hand.battery_v,
-            )
+            facts = (hand.preflight, hand.said, len(hand.picture), hand.battery_v)
+            shown = (id(hand), hand.label, hand.outcome, *facts)
         return shown, self._lab.operator, self._lab.robot_job
 
     async def _look(self) -> None:
@@ -110,7 +123,7 @@ class _Page:
         return old is not None and new is not None and old[:3] == new[:3] and before[1:] == now[1:]
 
     def _show(self) -> None:
-        self._pad, self._gauges = None, []
+        self._pad, self._gauges, self._n_shown = None, {}, -1
         hand, job = self._lab.hand, self._lab.robot_job
         if job is not None:
             ui.label(f"The study {job.name!r} uses the robot.").props('role="status"')
@@ -120,6 +133,9 @@ class _Page:
             return
         if hand is None or hand.is_over:
             self._show_connecting(hand)
+            if hand is not None and hand.is_lost:
+                section("Last readings")
+                self._show_panels(hand)
             return
         if not hand.label:
             ui.label(f"Connecting to {hand.port}…").props('role="status"')
@@ -141,16 +157,21 @@ class _Page:
             ui.button(
                 "Use an emulated robot", on_click=lambda: attempt(lambda: self._connect(EMULATED))
             ).props(f"{'outline' if is_failed else 'unelevated'} no-caps")
-        hint("The emulated robot drives in a simulated arena. It needs no hardware.")
-        if self._ports:
-            section("Ports of this computer")
+            if self._has_playground:
+                ui.button(
+                    "Use an emulated Thymio", on_click=lambda: attempt(lambda: self._connect(THYMIO))
+                ).props("outline no-caps")
+        hint("The emulated robot is a Scribbler in a simulated arena. It needs no hardware.")
+        section("Ports of this computer")
+        if not self._ports:
+            hint("No serial ports found. Plug in or pair the robot, then reload the page.")
         for guess in self._ports:
             with ui.row().classes("lab-row"):
                 ui.button(
                     f"Connect {guess.port}",
                     on_click=lambda port=guess.port: attempt(lambda: self._connect(port)),
                 ).props("outline no-caps")
-                ui.label(guess.seems)
+                ui.label(" · ".join(filter(None, (guess.seems, self._lab.reply_on(guess.port)))))
         with ui.expansion("Another port").classes("lab-expansion"), ui.element("div").classes("lab-form"):
             form = Form()
             form.summary()
@@ -184,34 +205,56 @@ class _Page:
             ui.label(f"Connected to {hand.port}").props('role="status"')
         if not may:
             show_holder(self._lab, self._visitor)
-        with ui.element("div").classes("lab-two"):
-            with ui.column().classes("lab-cards"):
-                section("Drive")
-                self._pad = DrivePad(
-                    name="Drive: hold and pull, or the arrow keys", is_off=not may, stops=hand.n_stops
-                )
-                self._pad.on("drive", self._drive)
-                self._pad.on("release", self._release)
-                hint("Hold and pull the pad, or use the arrow keys. The robot stops when you let go.")
-            with ui.column().classes("lab-cards lab-senses") as self._senses:
-                section("Sensors")
-                n_obstacles = len(hand.senses["raw"]) if hand.senses else 3
-                self._gauges = [_Gauge(name, unit) for name, unit in _OBSTACLES.get(n_obstacles, ())]
-                self._light, self._line = ui.label("Light"), ui.label("Line")
-                self._motion = ui.label("Standing").props('role="status"')
-        self._grid = None
-        if hand.arena is not None:
-            section("Position")
-            self._grid = CellGrid(hand.arena, ink="red", name="Position of the emulated robot").classes(
-                "lab-sketch"
-            )
-            self._n_points = 0
+        self._show_panels(hand)
         self._facts = ui.refreshable(lambda: self._show_facts(hand))
         self._facts()
+
+    def _show_panels(self, hand: Hand) -> None:
+        """Show the pad and the actions on the left, the position and the readings on the right."""
+        self._grid: CellGrid | None = None
+        self._n_points = 0
+        with ui.element("div").classes("lab-drive"):
+            with ui.column().classes("lab-cards"):
+                section("Drive")
+                self._show_pad(hand)
+                if not hand.is_over:
+                    self._show_actions(hand)
+            with ui.column().classes("lab-cards lab-senses") as self._senses:
+                if hand.arena is not None:
+                    section("Position")
+                    self._grid = CellGrid(
+                        hand.arena, ink="red", name="Position of the emulated robot"
+                    ).classes("lab-sketch")
+                section("Sensors")
+                self._motion = ui.label("Standing").props('role="status"')
+                line = _GROUND if hand.n_sensors == 7 else _LINE
+                kinds = {"raw": _RANGE.get(hand.n_sensors, ()), "light": _LIGHT, "line": line}
+                for kind, sensors in kinds.items():
+                    if kind == "raw" or kind in hand.more:
+                        with ui.element("div").classes("lab-gauges"):
+                            self._gauges[kind] = [_Gauge(*sensor) for sensor in sensors]
+
+    def _show_pad(self, hand: Hand) -> None:
+        self._pad = DrivePad(
+            name="Drive: hold and pull, or the arrow keys", is_off=self._is_off(hand), stops=hand.n_stops
+        )
+        self._pad.on("drive", self._drive)
+        self._pad.on("release", self._release)
+        if hand.is_over:
+            return
+        ui.button("Stop", on_click=self._lab.stop_robot, color=None).classes("lab-pad-stop").props(
+            "unelevated no-caps"
+        )
+        hint("Hold and pull the pad, or use the arrow keys. The robot stops when you let go.")
+
+    def _show_actions(self, hand: Hand) -> None:
+        may = self._lab.may_operate(self._visitor)
+        actions = [("Run pre-flight", "preflight")]
+        if hand.has_camera:
+            actions.append(("Take picture", "picture"))
+        if hand.arena is not None:
+            actions.append(("Put at start", "place"))
         with ui.row().classes("lab-row"):
-            actions = [("Run pre-flight", "preflight"), ("Take picture", "picture")]
-            if hand.arena is not None:
-                actions.append(("Put at start", "place"))
             for text, what in actions:
                 ui.button(text, on_click=lambda what=what: hand.want(what)).props(
                     "outline no-caps"
@@ -221,15 +264,10 @@ class _Page:
 
     def _show_facts(self, hand: Hand) -> None:
         section("Robot")
-        battery = "unknown" if hand.battery_v is None else f"{hand.battery_v:.2f} V"
-        facts = {"battery": battery, **hand.about}
-        with ui.element("dl").classes("lab-facts"):
-            for key, value in facts.items():
-                if value not in ("", "None"):
-                    with ui.element("dt"):
-                        ui.label(key.replace("_", " ").capitalize())
-                    with ui.element("dd"):
-                        ui.label(value)
+        facts = dict(hand.about)
+        if hand.has_battery:
+            facts["battery"] = "unknown" if hand.battery_v is None else f"{hand.battery_v:.2f} V"
+        _show_list(facts)
         if hand.said:
             ui.label(hand.said).classes("lab-problem")
         if hand.preflight is not None:
@@ -238,34 +276,40 @@ class _Page:
                 ui.label(problem).classes("lab-problem")
             if not hand.preflight["problems"]:
                 ui.label("Pre-flight check passed.").classes("lab-ok")
-            with ui.element("dl").classes("lab-facts"):
-                for name, value in hand.preflight["facts"].items():
-                    with ui.element("dt"):
-                        ui.label(name)
-                    with ui.element("dd"):
-                        ui.label(str(value))
+            _show_list(hand.preflight["facts"])
         if hand.picture:
             ui.element("img").props(
                 f'src="data:image/png;base64,{hand.picture}" alt="Picture of the robot\'s camera"'
             ).classes("lab-picture")
 
+    def _age(self, hand: Hand) -> float:
+        """Age of the last reading [s]; 0 before the first one."""
+        return 0.0 if hand.senses is None else time.monotonic() - hand.sensed_s
+
+    def _is_off(self, hand: Hand) -> bool:
+        """Whether the pad is off: the robot is lost, does not answer, or is another visitor's."""
+        return hand.is_over or self._age(hand) > STALE_S or not self._lab.may_operate(self._visitor)
+
     def _live(self) -> None:
         hand = self._lab.hand
         if hand is None or self._pad is None:
             return
-        self._pad.know(hand.n_stops)
+        self._pad.know(hand.n_stops, is_off=self._is_off(hand))
         if hand.senses is None:
             return
-        if hand.n_live == self._n_shown:
-            self._show_age()
-            return
-        self._n_shown, self._last_s = hand.n_live, time.monotonic()
-        self._senses.classes(remove="lab-stale")
-        senses = hand.senses
-        for gauge, reading, raw in zip(self._gauges, senses["readings"], senses["raw"], strict=False):
-            gauge.put(reading, raw)
-        for name, label in (("light", self._light), ("line", self._line)):
-            label.text = f"{name.capitalize()}: {', '.join(map(str, senses[name]))}" if name in senses else ""
+        age = self._age(hand)
+        is_old = hand.is_over or age > STALE_S
+        self._senses.classes(**{"add" if is_old else "remove": "lab-stale"})
+        if hand.n_live != self._n_shown:
+            self._n_shown = hand.n_live
+            self._show_senses(hand, hand.senses)
+        if is_old:
+            self._motion.text = f"Last reading {duration(age)} ago"
+
+    def _show_senses(self, hand: Hand, senses: dict[str, Any]) -> None:
+        for kind, gauges in self._gauges.items():
+            for gauge, value in zip(gauges, senses.get(kind, ()), strict=False):
+                gauge.put(value)
         self._motion.text = ("Driving" if senses["moves"] else "Standing") + (
             ", blocked" if senses["stalled"] else ""
         )
@@ -274,13 +318,6 @@ class _Page:
             anew = len(line) < self._n_points or self._n_points == 0
             self._grid.follow(senses["pose"], line if anew else line[self._n_points :], anew=anew)
             self._n_points = len(line)
-
-    def _show_age(self) -> None:
-        """Gray out readings that are old."""
-        age = time.monotonic() - self._last_s
-        if age > STALE_S:
-            self._senses.classes(add="lab-stale")
-            self._motion.text = f"No reading for {age:.0f} s"
 
     def _drive(self, event: events.GenericEventArguments) -> None:
         hand = self._lab.hand
@@ -297,13 +334,26 @@ class _Page:
 class _Gauge:
     """A reading with its name, its range, and a bar."""
 
-    def __init__(self, name: str, unit: str) -> None:
-        with ui.row().classes("lab-gauge"):
-            ui.label(f"{name} ({unit})")
-            self._text = ui.label("").classes("lab-value")
-        self._bar = ui.linear_progress(0, show_value=False, size="14px").props(f'aria-label="{name}"')
+    def __init__(self, name: str, unit: str, most: float) -> None:
+        self._most = most
+        with ui.element("div"):
+            with ui.row().classes("lab-gauge"):
+                ui.label(f"{name} ({unit})")
+                self._text = ui.label("").classes("lab-value")
+            self._bar = ui.linear_progress(0, show_value=False, size="14px").props(f'aria-label="{name}"')
 
-    def put(self, reading: float, raw: float) -> None:
-        """Show a reading, 0 to 1, and its raw value."""
-        self._bar.value = round(reading, 3)
-        self._text.text = f"{raw:.0f}"
+    def put(self, reading: float) -> None:
+        """Show a raw reading."""
+        self._bar.value = round(min(max(reading / self._most, 0.0), 1.0), 3)
+        self._text.text = f"{reading:,.0f}"
+
+
+def _show_list(facts: dict[str, Any]) -> None:
+    """Show names and values as a definition list; empty values are left out."""
+    with ui.element("dl").classes("lab-facts"):
+        for name, value in facts.items():
+            if str(value) not in ("", "None"):
+                with ui.element("dt"):
+                    ui.label(name.replace("_", " ").capitalize())
+                with ui.element("dd"):
+                    ui.label(str(value))

@@ -25,6 +25,7 @@ export default {
     document.removeEventListener("visibilitychange", this.away);
     window.removeEventListener("pagehide", this.away);
   },
+  watch: { disabled(now) { if (now) this.release(); } },
   methods: {
     hold(ahead, turn) {
       this.ahead = ahead;

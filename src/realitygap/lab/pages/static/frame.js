@@ -4,7 +4,7 @@
   const setLost = (isLost) => document.body.classList.toggle("lab-lost", isLost);
   const stop = () =>
     fetch("/stop", { method: "POST", keepalive: true }).then((answer) => setLost(!answer.ok), () => setLost(true));
-  const isStop = (event) => event.target instanceof Element && event.target.closest(".lab-stop");
+  const isStop = (event) => event.target instanceof Element && event.target.closest(".lab-stop, .lab-pad-stop");
   addEventListener("pointerdown", (event) => { if (isStop(event)) stop(); }, true);
   addEventListener("keydown", (event) => {
     const isPressed = event.key === "Escape" || (isStop(event) && [" ", "Enter"].includes(event.key));

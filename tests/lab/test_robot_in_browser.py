@@ -6,6 +6,8 @@ import re
 
 import pytest
 
+from realitygap.emulator import Emulator, serve_tcp, why_not
+
 from .conftest import PHONE
 
 pytestmark = pytest.mark.slow
@@ -16,6 +18,24 @@ PORT = "emulator://s2?fluke=2"
 def connect(page) -> None:
     page.get_by_role("button", name="Use an emulated robot").click()
     page.get_by_text(f"Connected to {PORT}").wait_for()
+
+
+STOPPED = """() => new Promise((done) => addEventListener("keyup", () => {
+  const began = performance.now(), status = document.querySelector(".lab-senses [role=status]");
+  const look = () => status.textContent === "Standing" ? done(performance.now() - began) : setTimeout(look, 5);
+  look();
+}, { once: true, capture: true }))"""
+"""Time from the release of a key until the page shows that the robot stands [ms]."""
+
+
+def time_to_stop(page) -> float:
+    """Drive by a key; return the time from its release until the robot stands [s]."""
+    page.locator(".lab-pad").focus()
+    page.keyboard.down("ArrowUp")
+    page.get_by_text("Driving", exact=True).wait_for()
+    page.evaluate(f"() => {{ window.stopped = ({STOPPED})() }}")
+    page.keyboard.up("ArrowUp")
+    return page.evaluate("() => window.stopped") / 1000
 
 
 def hold(page) -> None:
@@ -102,6 +122,41 @@ def test_its_preflight_and_its_picture_are_shown(visit):
     page.get_by_role("button", name="Take picture").click()
     page.get_by_alt_text("Picture of the robot's camera").wait_for()
     page.get_by_text(re.compile(r"^\d\.\d\d V$")).first.wait_for()
+
+
+def test_robot_stops_within_half_a_second_of_a_key_release_and_sensors_have_names(visit):
+    page = visit("robot")
+    connect(page)
+    assert min(time_to_stop(page) for _ in range(3)) < 0.5  # of three, as other tests use the processors
+    for name in ("Left obstacle", "Center light", "Right line"):
+        page.get_by_role("progressbar", name=name).wait_for()
+    page.get_by_text("Left obstacle (0 to 6400)").wait_for()
+
+
+@pytest.mark.skipif(bool(why_not()), reason=why_not() or "-")
+def test_thymio_in_playground_is_driven_with_its_own_sensors(visit):
+    page = visit("robot")
+    page.get_by_role("button", name="Use an emulated Thymio").click()
+    page.get_by_text("Connected to thymio:emulator://playground").wait_for()
+    page.get_by_role("progressbar", name="Rear right infrared").wait_for()
+    assert page.get_by_role("progressbar").count() == 9  # and two ground sensors
+    assert min(time_to_stop(page) for _ in range(3)) < 0.5
+    page.get_by_role("button", name="Run pre-flight").click()
+    page.get_by_text("Pre-flight check passed.").wait_for()
+    assert not page.get_by_role("button", name="Take picture").is_visible()
+
+
+def test_lost_link_disables_the_pad_and_keeps_the_last_readings_with_their_age(visit):
+    page = visit("robot")
+    with serve_tcp(Emulator("s2"), speed=20) as server:
+        page.get_by_text("Another port").click()
+        page.get_by_label("Port", exact=True).fill(server.name)
+        page.get_by_role("button", name="Connect", exact=True).click()
+        page.get_by_text("Standing", exact=True).wait_for()
+    page.get_by_role("button", name="Retry").wait_for()
+    page.get_by_text(re.compile(r"Last reading \d+ s ago")).wait_for()
+    page.locator('.lab-pad[aria-disabled="true"]').wait_for()
+    page.locator(".lab-stale").wait_for()
 
 
 def test_a_port_without_a_robot_is_told_in_words(visit):

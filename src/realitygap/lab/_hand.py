@@ -39,7 +39,7 @@ class Hand(Job):
     """
 
     QUIET = frozenset({"senses"})
-    STOPPED = "The robot was stopped and let go."
+    STOPPED = "The robot was stopped and disconnected."
     LOST = "The robot's process ended (status {status})."
 
     def __init__(self, order: dict[str, Any], root: Path, changed: Callable[[], None]) -> None:

@@ -53,7 +53,7 @@ class Window:
 
 
 class Camera:
-    """What the camera of a Fluke sees.
+    """The pictures of a Fluke's camera.
 
     Args:
         robot: What carries it.
@@ -122,7 +122,7 @@ class Camera:
         return int(self.window(number).sum(dtype=np.int64)) & 0xFFFFFF
 
     def _in_colors(self) -> NDArray[np.bool_]:
-        """Which groups of four columns lie inside the limits, (rows, groups)."""
+        """Return whether each group of four columns lies inside the limits, (rows, groups)."""
         picture = self.raw()
         picture = picture[:, : picture.shape[1] // 4 * 4].reshape(len(picture), -1, 4)
         y_low, y_high, u_low, u_high, v_low, v_high = self._colors
@@ -153,7 +153,7 @@ class Camera:
         return [*runs, len(inside) - begun]
 
     def blob(self, window: int | None) -> tuple[int, int, int]:
-        """How many groups are inside the limits, and the mean column and row of their first bytes."""
+        """Return the number of groups inside the limits, and the mean column and row of their first bytes."""
         inside = self._in_colors().copy()
         if window is not None:
             part = self._windows[window if window < N_WINDOWS else 0]
@@ -218,7 +218,7 @@ class Camera:
 
 
 def _draw(robot: SimulatedRobot, scene: Scene, walls: Walls, columns: int, rows: int) -> Floats:
-    """What the camera sees, (rows, columns, 3) Y, U and V, 0 to 255."""
+    """Draw the camera's view as (rows, columns, 3) Y, U and V, 0 to 255."""
     x, y, heading = robot.pose
     heading += math.pi  # it looks to the end with the caster
     x, y = x + FORWARD * math.cos(heading), y + FORWARD * math.sin(heading)
@@ -275,7 +275,7 @@ def _draw_floor(
 
 
 def _is_marked(scene: Scene, x: Floats, y: Floats) -> NDArray[np.bool_]:
-    """Where the floor has a mark between cells."""
+    """Return whether the floor has a mark between cells at each point."""
     grid = scene.arena.grid
     u, v = (x - grid.x) / grid.cell, (y - grid.y) / grid.cell
     half = MARK / 2 / grid.cell
@@ -284,7 +284,7 @@ def _is_marked(scene: Scene, x: Floats, y: Floats) -> NDArray[np.bool_]:
 
 
 def _brightness(image: FloorImage, x: Floats, y: Floats) -> Floats:
-    """How bright the floor's image is at points, or at its edge: 0 black, 1 white."""
+    """Return the brightness of the floor's image at points, or that of its edge beyond it: 0 black, 1 white."""
     scale = image.columns / image.width
     columns = np.clip(((x - image.x) * scale).astype(int), 0, image.columns - 1)
     rows = np.clip(((y - image.y) * scale).astype(int), 0, image.rows - 1)

@@ -134,7 +134,7 @@ class Emulator:
         self.place(arena.start, seed)
 
     def _identity(self, body: SimulatedRobot) -> str:
-        """What is emulated, in words that are equal where it is the same."""
+        """Return a description of what is emulated, equal for equal robots."""
         moves = getattr(body, "identity", type(body).__name__)
         goes_wrong = [f"{name}={value:g}" for name, value in vars(self.faults).items() if value]
         own = [f"{self.model}, Fluke {self.fluke_model}", moves, *goes_wrong]
@@ -155,7 +155,10 @@ class Emulator:
     def schedule(
         self, when: int, act: Callable[[int], None], is_due: Callable[[], bool] | None = None
     ) -> None:
-        """Call `act` at a time [ns]; at once if that is past; not where `is_due` has come to say no."""
+        """Call `act` at a time [ns], or immediately if that is past.
+
+        `next_event` drops the call if `is_due` returns False.
+        """
         if when <= self._now:
             act(self._now)
             return
@@ -258,12 +261,12 @@ class Emulator:
             self.link.hang_up(self._now, SAG_HANG_UP_S)
 
     def reset_line(self) -> None:
-        """What DTR going low does on a cable: an S2 restarts. Behind a Fluke it has no meaning."""
+        """Apply DTR going low on a cable: an S2 restarts. Behind a Fluke this has no effect."""
         if self.model == "s2" and self.fluke is None:
             self.robot.reset(self._now)
 
     def overload(self) -> None:
-        """Somebody holds the wheels: too much current stops an S2 until it is reset; it answers nothing."""
+        """Block the wheels: too much current stops an S2 until a reset, and it answers nothing."""
         motors = self.table.motors
         self.table.advance_to(self._now)
         if isinstance(motors, S2Motors):
@@ -288,13 +291,13 @@ class Emulator:
 
     @property
     def pose(self) -> Pose:
-        """Where the pen is, and where the end looks that is ahead at present."""
+        """Pose of the pen; its heading is that of the end that is ahead at present."""
         self.table.advance_to(self._now)
         x, y, heading = self.table.robot.pose
         return Pose(x, y, heading + self._turn)
 
     def place(self, pose: Pose, seed: int) -> None:
-        """Put the robot somewhere, motors off; the pen's path and the sensors' noise begin anew.
+        """Place the robot at a pose with its motors off; the pen's path and the sensors' noise restart.
 
         Args:
             pose: Of the pen; the heading is that of the end that is ahead.
@@ -311,7 +314,7 @@ class Emulator:
         self.senses.restart(seed)
 
     def wheel_speeds(self) -> tuple[float, float]:
-        """How fast the wheels turn, left and right as seen by the end that is ahead [m/s]."""
+        """Return the wheel speeds, left and right as seen by the end that is ahead [m/s]."""
         self.table.advance_to(self._now)
         motors = self.table.motors
         left, right = motors.speeds() if motors.turning else (0.0, 0.0)

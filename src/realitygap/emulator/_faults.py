@@ -1,4 +1,4 @@
-"""What goes wrong on a real link: lost and late bytes, hang-ups, a supply that sags."""
+"""The faults of a real link: lost and late bytes, hang-ups, and a supply that sags."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ SAG_HANG_UP_S = 3.0  # after the supply dropped out
 
 @dataclass(frozen=True)
 class Faults:
-    """How often and how badly a link fails.
+    """The rates and sizes of a link's faults.
 
     Attributes:
         drop: Share of the bytes that are lost, either way, 0 to 1.
@@ -68,7 +68,7 @@ class Faults:
 
 
 class FaultyLink:
-    """The same faults for the same seed and the same bytes.
+    """A link with faults, which are equal for equal seeds and bytes.
 
     Args:
         faults: What goes wrong.
@@ -100,7 +100,7 @@ class FaultyLink:
         self.away_until = max(self.away_until, now + nanoseconds(seconds))
 
     def spoil(self, data: bytes) -> bytes:
-        """What arrives of some bytes."""
+        """Return the bytes that arrive when some are sent."""
         faults = self._faults
         if not (faults.drop or faults.extra or faults.flip):
             return data
@@ -117,5 +117,5 @@ class FaultyLink:
         return bytes(out)
 
     def lateness(self) -> int:
-        """How late a piece of data comes [ns]."""
+        """Return the delay of a piece of data [ns]."""
         return int(self._random.random() * self._faults.delay * SECOND) if self._faults.delay else 0

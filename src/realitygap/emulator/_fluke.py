@@ -1,4 +1,4 @@
-"""The firmware of the Fluke: commands of its own, and everything else passed on to the robot.
+"""The firmware of the Fluke: it runs its own commands and passes all others on to the robot.
 
 Source: main.c and server-helper.c of Myro's repository (Fluke 1, 2.9.1); for the Fluke 2 headers of its server (3.0.5)
 and what its clients expect.
@@ -156,7 +156,7 @@ class Fluke:
                 self._take_packet_byte(byte, at)
 
     def _take_packet_byte(self, byte: int, at: int) -> None:
-        """A byte for the robot; wheels are swapped and turned round when the Fluke is ahead."""
+        """Take a byte for the robot. When the Fluke is ahead, wheels are swapped and reversed."""
         self._relays = True
         self._packet[self._index] = byte
         self._index = (self._index + 1) % PACKET
@@ -243,7 +243,7 @@ class Fluke:
         self._schedule(at + duration, lambda now: self._carry_out_later(job, op, arguments, now))
 
     def _n_arguments(self, op: Op) -> int:
-        """How many bytes belong to a command, as far as can be told from those that are there."""
+        """Return the number of argument bytes of a command, as far as the bytes received so far determine it."""
         n = self._commands[op].arguments
         given = self._arguments
         if op == Op.SET_UART0:
@@ -274,7 +274,10 @@ class Fluke:
             self._answer(data, now, self._link_byte_ns)
 
     def _all_acts(self) -> dict[Op, Callable[[bytes, int], bytes]]:
-        """What each command does and answers; those that are missing answer nothing and do nothing."""
+        """Return the action of each command; an action returns the answer.
+
+        Commands without an action have no effect and no answer.
+        """
         acts: dict[Op, Callable[[bytes, int], bytes]] = {
             Op.GET_BATTERY: self._get_battery,
             Op.SET_FRONT_LED_ON: lambda _, __: self._set(front_led=True),

@@ -19,7 +19,7 @@ class _Chunk:
 
 
 class Line:
-    """What has been sent and not yet taken by the client."""
+    """A queue of the bytes that were sent and that the client has not taken yet."""
 
     def __init__(self) -> None:
         self._chunks: deque[_Chunk] = deque()

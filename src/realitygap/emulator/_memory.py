@@ -1,4 +1,4 @@
-"""What a robot and its Fluke keep while they are switched off."""
+"""The memory of a robot and its Fluke that lasts while they are switched off."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class Memory:
         self._write()  # a file that cannot be kept is better known now than when a client sets something
 
     def read_page(self, page: int, offset: int) -> int:
-        """A byte of the serial memory; addresses beyond its end begin anew."""
+        """Return a byte of the serial memory; addresses beyond its end wrap around."""
         return self.pages.get(page % PAGES, bytes([BLANK]) * PAGE_BYTES)[offset % PAGE_BYTES]
 
     def write_page(self, page: int, offset: int, value: int) -> None:

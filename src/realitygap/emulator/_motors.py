@@ -1,4 +1,4 @@
-"""How the Scribblers' motors follow commands: the S1 open loop, the S2 in regulated steps of speed.
+"""The response of the Scribblers' motors to commands: the S1 open loop, the S2 in regulated steps of speed.
 
 Source: scribbler_server.bs2 and ipre_s2_port.spin of Myro's repository, and what is known of s2.spin.
 """
@@ -29,14 +29,14 @@ STATISTICS_NS = 100 * MILLISECOND
 
 
 class Motors(Protocol):
-    """What turns the wheels."""
+    """The motors that turn the wheels."""
 
     def drive(self, right: int, left: int) -> None:
         """Take the two bytes of SET_MOTORS, 100 for standing still."""
         ...
 
     def stop(self) -> None:
-        """Stop at once and forget what was to come."""
+        """Stop immediately and drop all pending motions."""
         ...
 
     @property
@@ -54,7 +54,7 @@ class Motors(Protocol):
 
     @property
     def load(self) -> float:
-        """How hard the motors work, 0 to 1."""
+        """Load of the motors, 0 to 1."""
         ...
 
 
@@ -88,7 +88,7 @@ class S1Motors:
         return math.copysign(max(0.0, abs(speed) - max(0.0, slower)), speed)
 
     def stop(self) -> None:
-        """Stop at once."""
+        """Stop immediately."""
         self._bytes = (100, 100)
         self._speeds = (0.0, 0.0)
 
@@ -106,7 +106,7 @@ class S1Motors:
 
     @property
     def load(self) -> float:
-        """How hard the motors work, 0 to 1."""
+        """Load of the motors, 0 to 1."""
         return max(map(abs, self._speeds)) / S1_TOP_SPEED
 
 
@@ -163,7 +163,7 @@ class S2Motors:
         self._step = min(self._step, step)
 
     def stop(self) -> None:
-        """Stop at once and forget what was to come."""
+        """Stop immediately and drop all pending motions."""
         self._shares = (0.0, 0.0)
         self._target = self._step = self._phase = 0
         self._left, self._rolls_on, self._next = None, False, None
@@ -190,7 +190,7 @@ class S2Motors:
 
     @property
     def ready(self) -> bool:
-        """Whether a motion would be accepted at once and nothing is under way."""
+        """Whether no motion by distance is under way, so that the next one is accepted immediately."""
         return self._left is None
 
     @property
@@ -269,5 +269,5 @@ class S2Motors:
 
     @property
     def load(self) -> float:
-        """How hard the motors work, 0 to 1."""
+        """Load of the motors, 0 to 1."""
         return min(1.0, self._step / 12)

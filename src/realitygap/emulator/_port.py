@@ -48,7 +48,7 @@ class EmulatorClock:
         return self._port.time()
 
     def sleep(self, seconds: float) -> None:
-        """Let time pass; with `speed=off` at once, and exactly this much."""
+        """Let time pass. With `speed=off` exactly this much passes, and it takes no real time."""
         self._port.wait(seconds)
 
 
@@ -113,7 +113,7 @@ class EmulatedPort(SerialBase):  # type: ignore[misc]  # pyserial has no types
         return self.emulator
 
     def close(self) -> None:
-        """Close the port; the robot goes on with what it was told."""
+        """Close the port; the robot continues to follow its last command."""
         self.is_open = False
 
     def _reconfigure_port(self) -> None:
@@ -151,7 +151,7 @@ class EmulatedPort(SerialBase):  # type: ignore[misc]  # pyserial has no types
 
     @property
     def in_waiting(self) -> int:
-        """How many bytes can be read at once."""
+        """Number of bytes that can be read without waiting."""
         self._check()
         with self._lock:
             self._fetch()
@@ -162,7 +162,7 @@ class EmulatedPort(SerialBase):  # type: ignore[misc]  # pyserial has no types
             raise PortNotOpenError
 
     def read(self, size: int = 1) -> bytes:
-        """As many bytes, or as many as come before the timeout."""
+        """Return `size` bytes, or those that arrive before the timeout."""
         self._check()
         give_up = Timeout(None if self._timeout is None else self._timeout / (self._speed or 1.0))
         with self._lock:
@@ -183,7 +183,7 @@ class EmulatedPort(SerialBase):  # type: ignore[misc]  # pyserial has no types
                 time.sleep(pause)
 
     def _pass_time(self, missing: int, until: int | None) -> float:
-        """Let simulated time pass up to what comes next; of real time, how long to sleep."""
+        """Let simulated time pass up to the next event; return the real time to sleep."""
         now, due = self._robot.now_ns, self._robot.next_event(missing)
         if due is None and until is None and self._speed is None:
             raise SerialException(

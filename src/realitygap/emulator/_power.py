@@ -14,7 +14,7 @@ DROP_OUT_VOLTS = 5.5  # below it Bluetooth drops out; chosen
 
 
 class Battery:
-    """What is left, and the voltage under load.
+    """The remaining charge, and the voltage under load.
 
     Args:
         sag: Share of the voltage lost under full load, of weak cells.

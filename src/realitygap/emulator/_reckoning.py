@@ -1,4 +1,4 @@
-"""The S2's commands by distance: what its wheels are to drive, and where it then believes itself.
+"""The S2's commands by distance: the motions of its wheels, and the robot's estimate of the pose.
 
 Positions are dead reckoning of the commands: they take the target's value at once. Lengths are in the S2's unit of
 half a millimeter, angles in its unit of 955 a full circle, counter-clockwise positive.
@@ -18,7 +18,7 @@ SPACING = CIRCLE / math.pi  # of the wheels
 
 
 class Reckoning:
-    """Where an S2 believes itself, and the motions that its commands ask for."""
+    """The pose that an S2 estimates, and the motions for its commands."""
 
     def __init__(self) -> None:
         self.x = self.y = 0.0
@@ -33,7 +33,7 @@ class Reckoning:
         self._speed = max(0, min(TOP_STEP, speed))
 
     def end_path(self) -> list[Segment]:
-        """What was held back."""
+        """End the path and return the motions that were held back."""
         self._in_path = False
         held, self._held = self._held, []
         return held
@@ -95,7 +95,7 @@ class Reckoning:
         return self._in_turn(self._turn_by(_shorter(units - (self.angle if kind == TO else 0.0))))
 
     def _in_turn(self, segments: list[Segment]) -> list[Segment]:
-        """Of motions that come next, those to be begun: in a path the last is held back."""
+        """Return the motions that can begin now. Within a path, the last one is held back."""
         if not self._in_path or not segments:
             return segments
         ready = [*self._held, *segments[:-1]]

@@ -1,4 +1,4 @@
-"""What stands around an emulated robot, as its sensors see it."""
+"""The surroundings of an emulated robot, as its sensors see them."""
 
 from __future__ import annotations
 

@@ -143,7 +143,7 @@ class Scribbler:
 
     @property
     def busy(self) -> bool:
-        """Whether a command is being carried out."""
+        """Whether a command is being executed."""
         return self._busy
 
     # receiving
@@ -167,7 +167,7 @@ class Scribbler:
             self._take_next(at)
 
     def _take_next(self, now: int) -> None:
-        """Carry out the packets that wait, one after another, as far as they take no time."""
+        """Execute the waiting packets one after another until one of them takes time."""
         if self._is_taking:
             return  # called from within the loop below, which goes on
         self._is_taking = True
@@ -180,7 +180,7 @@ class Scribbler:
             self._is_taking = False
 
     def _execute(self, packet: bytes, now: int) -> None:
-        """Carry out a command; the answer comes when it is done."""
+        """Execute a command and send the answer when it is done."""
         self._table.advance_to(now)
         if getattr(self._table.motors, "tripped", False):
             self._busy = False
@@ -253,7 +253,7 @@ class Scribbler:
     # reading
 
     def _all_readers(self) -> dict[int, tuple[int, Callable[[bytes], bytes]]]:
-        """How long each reading takes, and what answers."""
+        """Return, for each reading, the time that it takes and the function that answers it."""
         ir, light = IR_NS[self.model], LIGHT_NS[self.model]
         memory = self._memory
         readers: dict[int, tuple[int, Callable[[bytes], bytes]]] = {
@@ -354,7 +354,10 @@ class Scribbler:
     # setting
 
     def _all_setters(self) -> dict[int, Callable[[bytes, int], int | list[Segment]]]:
-        """What each command does; it returns how long that takes [ns], or motions to be handed on."""
+        """Return the action of each setting command.
+
+        An action returns its duration [ns], or motions for the motors.
+        """
         memory = self._memory
         setters: dict[int, Callable[[bytes, int], int | list[Segment]]] = {
             Op.SET_PASS1: lambda packet, _: self._keep(memory.password, 0, packet[1:]),

@@ -1,4 +1,4 @@
-"""What the sensors of the Scribbler and the Fluke read at the robot's pose, with noise.
+"""The readings of the Scribbler's and the Fluke's sensors at the robot's pose, with noise.
 
 Mounts are forward, left [m] and direction [rad] in the Scribbler's frame; the Fluke looks to the other end. Where a
 number is not known from a source it is said so.
@@ -71,11 +71,11 @@ class Senses:
         self.restart(seed)
 
     def restart(self, seed: int) -> None:
-        """Begin the noise anew."""
+        """Restart the noise with a seed."""
         self._random = random.Random(seed)
 
     def ir_distances(self) -> tuple[float, float]:
-        """How far the robot's own IR looks before it meets something, left and right [m]."""
+        """Return the distances at which the robot's own IR meets something, left and right [m]."""
         ranges = self._robot.ranges(_IR_RAYS, 1.0)
         return float(ranges[:3].min()), float(ranges[3:].min())
 
@@ -120,7 +120,7 @@ class Senses:
         return left, right
 
     def obstacle(self, emitter: str, power: int, *, in_pulses: bool) -> int:
-        """What a Fluke counts, 0 (free) to 6400 (near).
+        """Return the reading of a Fluke's infrared sensor, 0 (free) to 6400 (near).
 
         Args:
             emitter: "left", "center" or "right".
@@ -140,12 +140,12 @@ class Senses:
         return max(0, min(OBSTACLE_TOP, round(value)))
 
     def loudness(self) -> int:
-        """What the microphone hears: a quiet room."""
+        """Return the reading of the microphone in a quiet room."""
         return max(0, round(self._random.gauss(400, 100)))
 
 
 def _ir_reach(threshold: int) -> float:
-    """How far the robot's own IR reaches at a threshold [m]."""
+    """Return the reach of the robot's own IR at a threshold [m]."""
     return IR_REACH * max(0, 100 - threshold) / (100 - IR_THRESHOLD)
 
 
@@ -158,7 +158,7 @@ def _returned(far: float, power: int, *, in_pulses: bool) -> float:
 
 
 def _stronger(power: int, *, in_pulses: bool) -> float:
-    """By how much farther light goes than with the usual power."""
+    """Return the ratio of the light's reach to its reach at the usual power."""
     if not power:
         return 0.0
     return power / IR_POWER if in_pulses else float(2.0 ** ((power - IR_POWER) / POWER_DOUBLES))

@@ -30,7 +30,7 @@ IDLE_S = 0.5  # while the wheels turn, physics are computed at least so often
 
 
 class Channel(Protocol):
-    """Where a client connects.
+    """A place to which a client connects.
 
     Attributes:
         name: What a client opens.
@@ -39,19 +39,19 @@ class Channel(Protocol):
     name: str
 
     def watch(self, selector: selectors.BaseSelector) -> None:
-        """Let the selector know what may bring bytes."""
+        """Register with the selector everything that may bring bytes."""
         ...
 
     def read(self, ready: object) -> bytes:
-        """What a client sent; nothing where there is none."""
+        """Return the bytes that a client sent, or none."""
         ...
 
     def write(self, data: bytes) -> int:
-        """How many of these bytes could be handed on."""
+        """Hand bytes on and return the number that was accepted."""
         ...
 
     def want_write(self, selector: selectors.BaseSelector, *, wanted: bool) -> None:
-        """Whether to be woken when bytes can be handed on again."""
+        """Choose whether the selector wakes when bytes can be handed on again."""
         ...
 
     def hang_up(self) -> None:
@@ -108,7 +108,7 @@ class PtyChannel:
         selector.register(self._master, selectors.EVENT_READ, self)
 
     def read(self, ready: object) -> bytes:
-        """What a client sent."""
+        """Return the bytes that a client sent."""
         try:
             return os.read(self._master, PIECE)
         except BlockingIOError:
@@ -119,14 +119,14 @@ class PtyChannel:
             raise
 
     def write(self, data: bytes) -> int:
-        """How many bytes the terminal took; it holds a few thousand for a client who does not read."""
+        """Write bytes and return how many the terminal took. It holds a few thousand if no client reads."""
         try:
             return os.write(self._master, data)
         except BlockingIOError:
             return 0
 
     def want_write(self, selector: selectors.BaseSelector, *, wanted: bool) -> None:
-        """Whether to be woken when it takes more."""
+        """Choose whether the selector wakes when the terminal takes more."""
         selector.modify(self._master, selectors.EVENT_READ | (selectors.EVENT_WRITE if wanted else 0), self)
 
     def hang_up(self) -> None:
@@ -170,7 +170,7 @@ class TcpChannel:
         selector.register(self._listening, selectors.EVENT_READ, self)
 
     def read(self, ready: object) -> bytes:
-        """What the client sent; a second client is turned away while there is one."""
+        """Return the bytes that the client sent. A second client is refused while there is a first."""
         if ready is self._listening:
             self._accept()
             return b""
@@ -200,7 +200,7 @@ class TcpChannel:
                 self._selector.register(client, selectors.EVENT_READ, self)
 
     def write(self, data: bytes) -> int:
-        """How many bytes the client took; without one, all are lost."""
+        """Send bytes and return how many the client took. Without a client, all bytes are lost."""
         if self._client is None:
             return len(data)
         try:
@@ -212,7 +212,7 @@ class TcpChannel:
             return len(data)
 
     def want_write(self, selector: selectors.BaseSelector, *, wanted: bool) -> None:
-        """Whether to be woken when it takes more."""
+        """Choose whether the selector wakes when the client takes more."""
         if self._client is not None:
             events = selectors.EVENT_READ | (selectors.EVENT_WRITE if wanted else 0)
             selector.modify(self._client, events, self)
@@ -383,7 +383,7 @@ class Server:
         return self.witness.waits
 
     def start(self) -> Server:
-        """Serve in a thread of its own until `close`."""
+        """Serve in a separate thread until `close`."""
         self._thread = Thread(target=self.run, daemon=True)
         self._thread.start()
         return self
@@ -426,7 +426,7 @@ class Server:
         self.close()
 
     def _pause(self) -> float | None:
-        """How long nothing needs to be done [s]; None while only a client can change anything."""
+        """Return the time until there is work again [s], or None while only a client can change anything."""
         with self._lock:
             due = self.emulator.next_event()
             turning = self.emulator.table.motors.turning
@@ -445,7 +445,7 @@ class Server:
         return max(0.0, min(times)) if times else None
 
     def _behind(self) -> float:
-        """How far the emulator's time is behind [real s]."""
+        """Return the delay of the emulator's time [s of real time]."""
         return (
             0.0 if self._begun is None else time.monotonic() - self._begun - self.emulator.now / self._speed
         )

@@ -1,4 +1,4 @@
-"""What stands behind the emulator: any simulated robot on two wheels, and the one there is."""
+"""The simulated robots behind the emulator: the interface of a robot on two wheels, and the built-in box on wheels."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ SCRIBBLER_BODY = Body(((0.089, 0.0795), (0.089, -0.0795), (-0.089, -0.0795), (-0
 
 
 class SimulatedRobot(Protocol):
-    """A robot on two wheels in a world of its own.
+    """A robot on two wheels in its own world.
 
     One that has an `identity`, a text that no other robot has, is told by it from others; else its class is.
 
@@ -53,7 +53,7 @@ class SimulatedRobot(Protocol):
 
 @runtime_checkable
 class RobotOfItsOwn(SimulatedRobot, Protocol):
-    """A simulated robot that has more of its own than motion: noise, a Fluke's infrared, a battery.
+    """A simulated robot that also models noise, a Fluke's infrared, and a battery.
 
     Attributes:
         rolls: Whether it still moves, or will, though its motors are off.
@@ -66,7 +66,7 @@ class RobotOfItsOwn(SimulatedRobot, Protocol):
         ...
 
     def obstacle(self, emitter: str, stronger: float) -> int:
-        """What a Fluke counts, 0 (free) to 6400 (near).
+        """Return the reading of a Fluke's infrared sensor, 0 (free) to 6400 (near).
 
         Args:
             emitter: "left", "center" or "right".
@@ -75,7 +75,7 @@ class RobotOfItsOwn(SimulatedRobot, Protocol):
         ...
 
     def volts(self, load: float) -> float:
-        """Of its battery, with the motors at a load of 0 to 1 [V]."""
+        """Return the battery's voltage [V] with the motors at a load of 0 to 1."""
         ...
 
 

@@ -31,7 +31,7 @@ class Table:
         self._begin_path()
 
     def place(self, pose: Pose, now: int) -> None:
-        """Put the robot somewhere at a time, motors off, and begin path and steps of time anew."""
+        """Place the robot at a time with its motors off; the path and the steps of time restart."""
         self.motors.stop()
         self.robot.place(pose)
         self.time = now
@@ -52,7 +52,7 @@ class Table:
         return self.motors.turning or (self._own is not None and self._own.rolls)
 
     def _stand(self, now: int) -> None:
-        """Nothing moves: as many steps as there are at once."""
+        """Pass the whole steps up to a time without motion, in one computation."""
         whole = (now - self.time) // STEP_NS * STEP_NS
         self.battery.drain(0.0, whole)
         self.time += whole

@@ -1,4 +1,4 @@
-"""A live view in the terminal: arena, robot, path, lights and the last command."""
+"""A live view in the terminal: arena, robot, path, lights, and the last command."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class LiveView:
         self._live = Live(auto_refresh=False, transient=True)
 
     def show(self, emulator: Emulator) -> None:
-        """Draw it anew."""
+        """Draw the current picture."""
         self._live.update(self._panel(emulator), refresh=True)
 
     def _panel(self, emulator: Emulator) -> RenderableType:
@@ -60,7 +60,10 @@ class LiveView:
 
 
 def picture(emulator: Emulator, width: int = WIDTH, height: int = HEIGHT) -> list[str]:
-    """The arena from above in at most so many characters: walls, obstacles #, the pen's path ·, the robot an arrow."""
+    """Draw the arena from above in at most `width` x `height` characters.
+
+    It shows walls, obstacles #, the pen's path ·, and an arrow for the robot.
+    """
     width, height = max(10, width), max(5, height)
     arena = emulator.scene.arena
     path = emulator.path()
@@ -97,7 +100,7 @@ def picture(emulator: Emulator, width: int = WIDTH, height: int = HEIGHT) -> lis
 
 
 def status(emulator: Emulator) -> list[str]:
-    """What it is doing, in a few lines."""
+    """Describe the robot's present state in a few lines."""
     pose = emulator.pose
     left, right = emulator.wheel_speeds()
     lights = emulator.robot.leds(emulator.now_ns)

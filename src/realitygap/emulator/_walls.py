@@ -42,7 +42,7 @@ class Walls:
         return cls(arena.segments, discs)
 
     def nearest(self, x: float, y: float) -> float:
-        """Distance from a point to the nearest of them [m]; inf where there is none, below 0 within a disc."""
+        """Return the distance [m] from a point to the nearest wall or disc: inf if there is none, below 0 in a disc."""
         far = np.hypot(x - self._discs[:, 0], y - self._discs[:, 1]) - self._discs[:, 2]
         to_disc = float(far.min()) if len(far) else float("inf")
         if not self.n:

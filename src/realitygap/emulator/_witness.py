@@ -19,7 +19,7 @@ from ._emulator import Emulator
 
 
 class Witness(Protocol):
-    """Puts an emulated robot somewhere and sees where it drives.
+    """An observer that places an emulated robot and records where it drives.
 
     Headings are those of the end that is ahead at present: the Fluke's with "Fluke ahead", else the Scribbler's.
     """
@@ -29,23 +29,23 @@ class Witness(Protocol):
         ...
 
     def place(self, pose: Pose, seed: int) -> None:
-        """Put the robot somewhere, motors off; pen path and sensor noise begin anew."""
+        """Place the robot at a pose with its motors off; the pen path and the sensor noise restart."""
         ...
 
     def arena(self) -> Arena:
-        """Where it drives, and whose cells are counted."""
+        """Return the arena in which the robot drives and whose cells are counted."""
         ...
 
     def identity(self) -> str:
-        """What is emulated, in words that are equal where it is the same, whatever its port."""
+        """Return a description of what is emulated. It is equal for equal robots, whatever their ports."""
         ...
 
     def pose(self) -> Pose:
-        """Where it is."""
+        """Return the present pose."""
         ...
 
     def motors(self) -> tuple[float, float]:
-        """How fast its wheels turn, left and right [m/s]."""
+        """Return the speeds of the left and the right wheel [m/s]."""
         ...
 
     def path(self) -> NDArray[np.float64]:
@@ -66,7 +66,7 @@ class ServedWitness(Witness, Protocol):
 
     @property
     def waits(self) -> bool:
-        """Whether the emulator's time passes only when somebody lets it."""
+        """Whether the emulator's time passes only when a program advances it."""
         ...
 
     def release(self) -> None:
@@ -126,20 +126,20 @@ class DirectWitness:
             self._emulator.place(Pose(*pose), seed)
 
     def arena(self) -> Arena:
-        """Where it drives."""
+        """Return the arena in which the robot drives."""
         return self._emulator.scene.arena
 
     def identity(self) -> str:
-        """What is emulated."""
+        """Return a description of what is emulated."""
         return self._emulator.identity
 
     def pose(self) -> Pose:
-        """Where it is."""
+        """Return the present pose."""
         with self._lock:
             return self._emulator.pose
 
     def motors(self) -> tuple[float, float]:
-        """How fast its wheels turn [m/s]."""
+        """Return the speeds of the left and the right wheel [m/s]."""
         with self._lock:
             return self._emulator.wheel_speeds()
 
@@ -244,7 +244,7 @@ class RemoteWitness:
 
     @property
     def waits(self) -> bool:
-        """Whether the emulator's time passes only when somebody lets it."""
+        """Whether the emulator's time passes only when a program advances it."""
         return bool(self._ask("waits"))
 
     def hold(self) -> float | None:
@@ -265,19 +265,19 @@ class RemoteWitness:
         self._ask("place", pose=list(pose), seed=seed)
 
     def arena(self) -> Arena:
-        """Where it drives."""
+        """Return the arena in which the robot drives."""
         return Arena.from_dict(self._ask("arena"))
 
     def identity(self) -> str:
-        """What is emulated."""
+        """Return a description of what is emulated."""
         return str(self._ask("identity"))
 
     def pose(self) -> Pose:
-        """Where it is."""
+        """Return the present pose."""
         return Pose(*self._ask("pose"))
 
     def motors(self) -> tuple[float, float]:
-        """How fast its wheels turn [m/s]."""
+        """Return the speeds of the left and the right wheel [m/s]."""
         left, right = self._ask("motors")
         return left, right
 

@@ -1,4 +1,4 @@
-"""What pyserial looks for when it is asked to open emulator://."""
+"""The module that pyserial loads to open emulator://."""
 
 from urllib.parse import urlsplit
 

@@ -1,4 +1,4 @@
-"""How much each sign counts for a trace crossing a cell.
+"""The weight of each sign that a trace crosses a cell.
 
 As `benchmarks/vision.py fit --sheets 48` finds them; it judges by other sheets.
 """

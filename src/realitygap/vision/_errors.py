@@ -1,4 +1,4 @@
-"""What goes wrong with photographs."""
+"""Errors in reading photographs."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ OUTLIER = 0.0008  # further from its neighbors than this it is a pen's line [m]
 
 @dataclass(frozen=True)
 class GridOffsets:
-    """Where stretches of grid lines were seen.
+    """The places at which stretches of grid lines were found.
 
     Attributes:
         points: (n, 2) middles of the stretches, as printed [m].
@@ -121,7 +121,7 @@ def _normals(view: View, points: Floats, along: int) -> Floats:
 def _offsets(
     image: NDArray[np.uint8], view: View, middles: Floats, axis: int, reach: float, length: float
 ) -> Floats:
-    """How far a dark line lies from each middle along an axis [m]; nan where none stands out."""
+    """Return the distance of a dark line from each middle along an axis [m]; nan if no line stands out."""
     cv2 = from_extra("cv2", "vision")
     across = np.arange(-reach - 4 * STEP, reach + 4.5 * STEP, STEP)
     along = np.linspace(-0.42, 0.42, ALONG) * length
@@ -138,7 +138,7 @@ def _offsets(
 
 
 def _peak(profile: NDArray[np.float32], across: Floats, reach: float) -> float:
-    """Where a profile is darkest, between samples; nan where that does not stand out."""
+    """Return the place at which a profile is darkest, between samples; nan if it does not stand out."""
     inside = np.flatnonzero(np.abs(across) <= reach)
     best = int(inside[np.argmax(profile[inside])])
     level = float(np.median(profile))

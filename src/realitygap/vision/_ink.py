@@ -1,4 +1,4 @@
-"""How dark a sheet is where ink is: light, shadows and what is printed taken out."""
+"""The ink density of a sheet, corrected for light, shadows, and printed marks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is printed on a sheet for pen traces, and where: in the arena's coordinates, at true scale."""
+"""The marks that are printed on a sheet for pen traces, in the arena's coordinates and at true scale."""
 
 from __future__ import annotations
 
@@ -153,7 +153,7 @@ class SheetLayout:
         return [*upright, *level]  # type: ignore[list-item]  # the first is a literal
 
     def thin_marks(self) -> list[Mark]:
-        """What is printed in gray where pens may draw: the grid, and an arrow at the start."""
+        """Return the marks printed in gray where pens may draw: the grid, and an arrow at the start."""
         marks = []
         for which, at, low, high in self.grid_lines():
             ends = (at, low, at, high) if which == "x" else (low, at, high, at)
@@ -161,7 +161,7 @@ class SheetLayout:
         return marks + self._start_marks()
 
     def outer_marks(self) -> list[Mark]:
-        """What is printed where no pen comes: the walls, the tags, the boxes."""
+        """Return the marks printed where no pen comes: the walls, the tags, and the boxes."""
         left, lower, right, upper = self.walls
         marks = [*_outline((left, lower, right, upper), 0.3, 0.0008)]
         for box in self.key_boxes():

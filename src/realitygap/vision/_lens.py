@@ -1,4 +1,4 @@
-"""Where points of a flat sheet appear on a photograph: a homography, then the bending of a lens."""
+"""The mapping of points on a flat sheet to a photograph: a homography, then the distortion of a lens."""
 
 from __future__ import annotations
 

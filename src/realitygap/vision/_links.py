@@ -233,7 +233,7 @@ def _goes_on(way: NDArray[np.int64], outward: NDArray[np.float64]) -> bool:
 
 
 def _ends(trace: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """(k, 2) rows and columns of the ends of lines, and where each would go on: unit vectors (k, 2).
+    """Return the ends of lines, (k, 2) rows and columns, and the unit vectors along which lines would continue, (k, 2).
 
     A circle around an end meets the line once.
     """
@@ -257,7 +257,7 @@ def _ends(trace: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.float
 
 
 def _times_met(trace: NDArray[np.bool_], middle: tuple[int, int]) -> int:
-    """How often a circle around a point meets a line."""
+    """Return the number of times that a circle around a point meets a line."""
     angle = np.linspace(0, 2 * np.pi, 60, endpoint=False)
     rows = np.round(middle[0] + END_RADIUS * np.sin(angle)).astype(int)
     columns = np.round(middle[1] + END_RADIUS * np.cos(angle)).astype(int)

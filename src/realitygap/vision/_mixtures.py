@@ -1,4 +1,4 @@
-"""What a mixture of inks on paper looks like, and which mixtures a color may be."""
+"""The colors of mixtures of inks on paper, and the mixtures that may explain a color."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def ink_sets(n_pens: int) -> tuple[tuple[int, ...], ...]:
 
 @dataclass(frozen=True)
 class Mixtures:
-    """What the color of each inked place may be made of.
+    """The mixtures that may explain the color of each inked place.
 
     Attributes:
         likely: (k, s) how likely each color is under each set of inks.
@@ -54,7 +54,7 @@ class Mixtures:
 
     @classmethod
     def of(cls, density: Floats, inks: Floats) -> Mixtures:
-        """Of places with these densities.
+        """Return the mixtures that may explain the densities of places.
 
         Args:
             density: (n, 3) of each place.

@@ -40,7 +40,7 @@ STRAY = 0.02  # probability of a pen where its trace does not pass
 
 @dataclass(frozen=True)
 class PenMaps:
-    """Where on a rectified sheet each pen's ink may be.
+    """Maps of where each pen's ink may be on a rectified sheet.
 
     Attributes:
         box: Left, lower, right and upper end of what they show: the cells and a little around them [m].
@@ -73,7 +73,10 @@ class PenMaps:
 
     @cached_property
     def weight(self) -> Floats:
-        """(h, w) how much each pixel tells: more in the middle of a line, whose edges have a color of their own."""
+        """Weight of each pixel as evidence, (h, w).
+
+        It is higher in the middle of a line, because its edges have a different color.
+        """
         return np.asarray(np.minimum(self.strength, 3.0) ** 2 + np.float32(1e-3))
 
     @cached_property
@@ -143,7 +146,7 @@ def _around_cells(layout: SheetLayout) -> Box:
 
 
 def _part(picture: Floats, whole: Box, box: Box, px_per_m: float) -> Floats:
-    """What a picture of a box shows of a smaller one within it."""
+    """Return the part of a box's picture that shows a smaller box within it."""
     top, left = round((whole[3] - box[3]) * px_per_m), round((box[0] - whole[0]) * px_per_m)
     rows, columns = shape_of(box, px_per_m)
     return picture[max(top, 0) : top + rows, max(left, 0) : left + columns]

@@ -97,7 +97,7 @@ def _is_large(picture: Image.Image) -> bool:
 
 
 def _hint(data: bytes) -> str:
-    """What to do about a kind of file that phones make, and others."""
+    """Return advice for a HEIC or PDF file; empty for other files."""
     if data[4:8] == b"ftyp":
         return (
             " It looks like HEIC: export it as JPEG, or set the phone's camera to the most compatible format."
@@ -118,7 +118,7 @@ GRAY_SPREAD = 3
 
 
 def photo_bytes(photo: str | Path | bytes) -> bytes:
-    """What is in the file of a photograph.
+    """Return the bytes of a photograph's file.
 
     Raises:
         SheetError: It cannot be read, or is too large.

@@ -152,7 +152,7 @@ def _draw(axes: Axes, marks: list[Mark], labels: list[Label], box: Box | None) -
 
 
 def _crop_marks(box: Box) -> Iterator[Mark]:
-    """Where a page is cut: short lines outside its corners."""
+    """Yield the marks for cutting a page: short lines outside its corners."""
     left, lower, right, upper = box
     for x, out_x in ((left, -1), (right, 1)):
         for y, out_y in ((lower, -1), (upper, 1)):

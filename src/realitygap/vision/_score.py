@@ -1,4 +1,4 @@
-"""A photograph of a sheet, scored: of each pen the cells that its trace crosses."""
+"""The score of a photograph of a sheet: for each pen, the cells that its trace crosses."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ SURE = 0.9
 
 @dataclass(frozen=True)
 class TraceScore:
-    """What a pen drew.
+    """The score of a pen's trace.
 
     Attributes:
         pen: Its number among the layout's pens.
@@ -47,7 +47,7 @@ class TraceScore:
 
     @property
     def cells(self) -> tuple[int, ...]:
-        """Cells that it crosses as far as can be said, ascending, columns * row + column."""
+        """Cells that the trace crosses with a probability of at least 0.5, ascending, columns * row + column."""
         return tuple(np.flatnonzero(self.probability >= 0.5).tolist())
 
     @property

@@ -38,7 +38,7 @@ def dictionary(family: str) -> Any:
 
 
 def n_tags(family: str) -> int:
-    """How many tags a family has, numbered from 0."""
+    """Return the number of tags in a family; they are numbered from 0."""
     return len(dictionary(family).bytesList)
 
 

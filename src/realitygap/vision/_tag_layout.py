@@ -1,4 +1,4 @@
-"""Where tags are: four at the corners of an arena, flat on its floor, and one on top of the robot."""
+"""The places of the tags: four at the corners of an arena, flat on its floor, and one on top of the robot."""
 
 from __future__ import annotations
 

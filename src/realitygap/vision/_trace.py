@@ -38,7 +38,7 @@ COSTS = {"own": 0.02, "hidden": 0.4, "other": 1.6, "paper": 1.1}  # a millimeter
 
 @dataclass(frozen=True)
 class Trace:
-    """What was found of a pen, at points a millimeter apart, row 0 uppermost.
+    """The trace of a pen, at points a millimeter apart, row 0 uppermost.
 
     Attributes:
         pen: Its name.
@@ -193,7 +193,7 @@ POINTS_ACROSS = 2.2
 
 
 def _costs(presence: Floats, hidden: Floats, strength: Floats) -> Floats:
-    """What it costs a trace to go through each point, a millimeter; inf where it cannot."""
+    """Return the cost of a trace through each point, per millimeter; inf where it cannot pass."""
     from scipy import ndimage
 
     ink = strength > 0.5

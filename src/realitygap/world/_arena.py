@@ -22,7 +22,7 @@ PREFIX = "arena."
 
 
 class Pose(NamedTuple):
-    """Where a robot is: x [m], y [m], heading [rad, counter-clockwise from +x]."""
+    """The pose of a robot: x [m], y [m], heading [rad, counter-clockwise from +x]."""
 
     x: float
     y: float
@@ -55,7 +55,7 @@ class Grid:
 
     @property
     def n_cells(self) -> int:
-        """How many cells there are."""
+        """Number of cells."""
         return self.columns * self.rows
 
     def cell_at(self, x: float, y: float) -> int | None:
@@ -115,7 +115,7 @@ class Arena:
         return (*self.walls, *(edge for obstacle in self.obstacles for edge in obstacle.edges()))
 
     def straight_walls(self) -> tuple[Segment, ...]:
-        """(w, 4) all that stands in it as straight walls [m], which is all that Jyro knows.
+        """Return all walls and the sides of obstacles as straight walls, the only ones in Jyro, (w, 4) [m].
 
         Raises:
             ValueError: An obstacle is round, or a number is drawn anew.

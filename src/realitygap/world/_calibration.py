@@ -1,4 +1,4 @@
-"""A calibration: what was fitted to a robot, from what, and how sure it is."""
+"""A calibration: the parameters fitted to a robot, their origin, and their uncertainty."""
 
 from __future__ import annotations
 
@@ -72,12 +72,12 @@ class Fitted(Settings):
 
     @property
     def is_bound(self) -> bool:
-        """Whether its interval begins at an end of the prior that may cut something off."""
+        """Whether the interval begins at an end of the prior that may cut something off."""
         return _is_bound(self.model_dump())
 
     @property
     def is_at_end(self) -> bool:
-        """Whether it is told, and lies at or beyond an end of what was thought possible that is not 0."""
+        """Whether the parameter is identified, and its estimate is at or beyond an end of the prior other than 0."""
         ways = [self.estimate - self.prior_low if self.prior_low else math.inf]
         ways += [self.prior_high - self.estimate if self.prior_high else math.inf]
         return self.identified and min(ways) < NEAR_END * (self.prior_high - self.prior_low)
@@ -102,7 +102,7 @@ def _is_bound(values: Mapping[str, Any], lower: str = "low", upper: str = "high"
 
 
 class Calibration(Settings):
-    """What was fitted to a robot: parameters, the robot's numbers, and draws from the posterior."""
+    """A calibration of a robot: the fitted parameters, the robot's numbers, and draws from the posterior."""
 
     format: Literal["realitygap calibration 1"] = "realitygap calibration 1"
     kind: Literal["path", "sensors", "motion", "contact", "all"] = Field(description="What was calibrated.")
@@ -165,12 +165,12 @@ class Calibration(Settings):
 
     @property
     def step(self) -> dict[str, float]:
-        """How long commands last, where it was measured, as a setting of the robot [s]."""
+        """Measured duration of a command as a setting of the robot [s]; empty if it was not measured."""
         return {"step_s": self.step_s} if self.step_s else {}
 
     @property
     def n_draws(self) -> int:
-        """Draws from the posterior; 0 where there is only the estimate."""
+        """Number of draws from the posterior; 0 if there is only the estimate."""
         return max((len(values) for values in self.draws.values()), default=0)
 
     def to_toml(self) -> str:

@@ -103,7 +103,7 @@ class _Part(BaseModel):
 
 
 class CaseWorld(_Part):
-    """What stands still: boxes, walls, lights."""
+    """The fixed parts of a case's world: boxes, walls, and lights."""
 
     boxes: list[Row4] = []
     walls: list[Row4] = []
@@ -127,7 +127,7 @@ class CaseWorld(_Part):
 
 
 class CaseStart(_Part):
-    """Where a robot begins: x, y [m], heading [rad, 0 faces +y, counter-clockwise]."""
+    """The pose at which a robot begins: x, y [m], heading [rad, 0 faces +y, counter-clockwise]."""
 
     x: float
     y: float

@@ -67,7 +67,7 @@ def place_of(loc: tuple[int | str, ...]) -> str:
 
 
 def explained(error: Any) -> str:
-    """What pydantic found wrong with one value, in our words."""
+    """Describe a value that pydantic refused, in the project's words."""
     loc = error["loc"]
     if error["type"] == "value_error":
         return str(error["ctx"]["error"])

@@ -1,4 +1,4 @@
-"""Where trials may begin, and what may stand there, where an arena's numbers are drawn."""
+"""Checks that the robot fits at the start of trials in an arena whose numbers are drawn."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is on the floor: dark tape, or an image."""
+"""The floor of an arena: dark tape, or an image."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ MOST_PIXELS = 512  # across or up: a larger image is more than line sensors see,
 
 @dataclass(frozen=True)
 class FloorImage:
-    """How bright the floor is, pixel by pixel; beyond the image it goes on as at its edge.
+    """The brightness of the floor, pixel by pixel. Beyond the image it is that of the nearest edge.
 
     Attributes:
         x, y: Lower left corner [m].
@@ -50,7 +50,7 @@ class FloorImage:
 
     @property
     def height(self) -> float:
-        """How high it lies there [m]."""
+        """Height on the floor [m]."""
         return self.width * self.rows / self.columns
 
     @property
@@ -59,7 +59,7 @@ class FloorImage:
         return np.asarray(self.gray[::-1] / np.float32(255), dtype=np.float32)
 
     def at(self, x: float, y: float) -> float:
-        """How bright the pixel at a point [m] is, or the nearest one: 0 black, 1 white."""
+        """Return the brightness of the pixel nearest to a point [m]: 0 black, 1 white."""
         scale = self.columns / self.width
         column = min(self.columns - 1, max(0, int((x - self.x) * scale)))
         row = min(self.rows - 1, max(0, int((y - self.y) * scale)))
@@ -81,7 +81,7 @@ class Floor:
     image: FloorImage | None = None
 
     def brightness(self, x: float, y: float) -> float:
-        """How bright the floor is at a point [m]: 0 black, as tape is, to 1 white."""
+        """Return the brightness of the floor at a point [m]: 0 black, as tape is, to 1 white."""
         if any(distance_to_segment(x, y, strip) <= self.tape_width / 2 for strip in self.tape):
             return 0.0
         return 1.0 if self.image is None else self.image.at(x, y)

@@ -77,7 +77,7 @@ def _robot_values(robot: str | Path, chain: list[str]) -> tuple[dict[str, Any], 
 
 
 def load_calibration(path: str | Path) -> Calibration:
-    """What `realitygap calibrate` wrote.
+    """Read the file that `realitygap calibrate` wrote.
 
     Raises:
         DescriptionError: There is no such file, or it is no calibration: every mistake with its place.
@@ -109,7 +109,7 @@ def read_calibration(robot: str | Path) -> Calibration | None:
 
 
 def _as_calibration(values: Mapping[str, Any], origin: str) -> Calibration:
-    """The robot's file that it names, beside it, is named as it is found from here."""
+    """Return the calibration in a file's values. A robot file in the same folder gets that folder in its path."""
     made = _checked(origin, lambda: Calibration(**values))
     return made.model_copy(update={"robot": str(_beside(made.robot, origin))})
 
@@ -140,7 +140,7 @@ def _with_base(values: dict[str, Any], origin: str, chain: list[str]) -> dict[st
 
 
 def _beside(robot: str, origin: str) -> str | Path:
-    """The file of a robot, looked for beside the file that names it first, or the robot's name."""
+    """Return the robot's file in the folder of `origin` if it is there, otherwise the robot's name."""
     beside = Path(origin).parent / robot
     return beside if is_file(origin) and is_file(beside) else robot
 
@@ -350,7 +350,7 @@ _WHOLE = ("RobotModel: ", "ArenaFile: ", "Calibration: ")
 
 
 def _checked(origin: str, make: Callable[[], T]) -> T:
-    """What is made, or every mistake that was found in doing so, said of a file."""
+    """Return what `make` returns, or raise an error that lists every mistake in the file `origin`."""
     try:
         return make()
     except DescriptionError:

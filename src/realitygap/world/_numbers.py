@@ -60,7 +60,7 @@ Share = Annotated[float, Field(ge=0, le=1), NUMBER]
 
 @dataclass(frozen=True)
 class Limits:
-    """What a number may be: from `least` to `most`, where `open_least` says that it is more than `least`."""
+    """The range of a number: from `least` to `most`. With `open_least`, the number must be larger than `least`."""
 
     least: float = -math.inf
     most: float = math.inf
@@ -117,7 +117,7 @@ class Described(Settings):
         return {name: self.vary.get(name, value) for name, (value, _) in _walk(self)}
 
     def limits(self) -> dict[str, Limits]:
-        """What every number may be."""
+        """Return the range of every number, by dotted name."""
         return {name: limits for name, (_, limits) in _walk(self)}
 
     def with_numbers(self, values: Mapping[str, float | Distribution | Mapping[str, Any]]) -> Self:
@@ -174,7 +174,7 @@ class Described(Settings):
 
 
 def _distribution(place: str, values: Mapping[str, Any]) -> Distribution:
-    """A distribution whose mistakes are told with its place."""
+    """Make a distribution, or raise an error that names its place in the file."""
     try:
         return Distribution(**values)
     except ValueError as error:

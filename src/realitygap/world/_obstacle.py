@@ -1,4 +1,4 @@
-"""What stands in an arena besides its walls: obstacles, lights, a goal, and what is on the floor."""
+"""The contents of an arena besides its walls: obstacles, lights, a goal, and marks on the floor."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class Obstacle:
                 yield x1 + out_x, y1 + out_y, x2 + out_x, y2 + out_y
 
     def distance(self, x: float, y: float) -> float:
-        """From a point to it [m]; negative inside."""
+        """Return the distance from a point to the obstacle [m]; negative inside."""
         corners = self.placed
         ends = list(zip(corners, (*corners[1:], corners[0]), strict=True))
         inside = len(corners) > 2 and all(
@@ -91,7 +91,7 @@ class Goal:
 
 
 def distance_to_segment(x: float, y: float, segment: Segment) -> float:
-    """From a point to a straight line with two ends [m]."""
+    """Return the distance from a point to a straight line with two ends [m]."""
     x1, y1, x2, y2 = segment
     along_x, along_y = x2 - x1, y2 - y1
     squared = along_x**2 + along_y**2

@@ -95,7 +95,7 @@ def box_as_corners(values: Any) -> Any:
 
 
 def why_no_part(corners: Sequence[tuple[float, float]], radius: float) -> str:
-    """What is wrong with an outline; nothing where it is a convex one, counter-clockwise and of some size."""
+    """Describe the mistake in an outline; return an empty text if it is convex, counter-clockwise, and of some size."""
     n = len(corners)
     if n < 3:
         if radius > 0 and (n == 1 or corners[0] != corners[1]):

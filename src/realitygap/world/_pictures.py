@@ -1,4 +1,4 @@
-"""What an arena and a robot look like, to scale and with their dimensions, as plain shapes."""
+"""Pictures of an arena and a robot as plain shapes, to scale and with dimensions."""
 
 from __future__ import annotations
 
@@ -179,7 +179,7 @@ def goal_shapes(goal: Goal) -> list[Shape]:
 
 
 def floor_shapes(floor: Floor) -> list[Shape]:
-    """What is on the floor: an image in coarse pixels, and tape as wide as it is."""
+    """Return the shapes on the floor: an image in coarse pixels, and tape at its true width."""
     shapes: list[Shape] = _image_shapes(floor.image) if floor.image is not None else []
     for x1, y1, x2, y2 in floor.tape:
         length = math.hypot(x2 - x1, y2 - y1) or 1.0

@@ -23,7 +23,7 @@ TOUCHING = 1e-9  # outlines that overlap by less [m] touch, which is allowed at 
 
 
 def check_start(arena: Arena, robot: Body | RobotModel) -> None:
-    """Refuse a start at which the body would not lie within the walls and beside all obstacles.
+    """Refuse a start at which the body would not lie within the walls and clear of all obstacles.
 
     Raises:
         ValueError: a corner of it lies beyond a wall, or it overlaps a wall or an obstacle.
@@ -114,7 +114,7 @@ def _outlines(robot: Body | RobotModel, pose: Pose) -> Iterator[tuple[Point, ...
 
 
 def _solids(arena: Arena) -> Iterator[tuple[str, tuple[Point, ...]]]:
-    """What a body cannot overlap, in words and as convex outlines."""
+    """Yield each wall and obstacle that a body cannot overlap: its name and its convex outline."""
     for k, (x1, y1, x2, y2) in enumerate(arena.walls):
         yield f"wall {k}", ((x1, y1), (x2, y2))
     for k, obstacle in enumerate(arena.obstacles):

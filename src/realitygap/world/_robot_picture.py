@@ -1,4 +1,4 @@
-"""What a robot of a file looks like: outline, wheels, sensors with what they see, dimensions and sources."""
+"""The picture of a robot from a file: outline, wheels, sensors with their reach, dimensions, and sources."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def _with_words(
 
 
 def _legend(model: RobotModel) -> list[tuple[str, str, str]]:
-    """What each kind of mark means: text, its color, and the mark's."""
+    """Return the text, the color of the text, and the color of the mark for each kind of mark."""
     found: list[tuple[str, str, str]] = []
     if model.range:
         first = model.range[0]
@@ -129,7 +129,7 @@ def _count(n: int, what: str) -> str:
 
 
 def _cone(sensor: RangeSensor, cut: float) -> list[Shape]:
-    """What a range sensor sees, cut off where it reaches far."""
+    """Return the area that a range sensor covers, cut off if its reach is long."""
     reach = min(sensor.reach, cut)
     end = _polar(sensor.x, sensor.y, sensor.direction, reach)
     shapes: list[Shape] = []
@@ -149,7 +149,7 @@ def _cone(sensor: RangeSensor, cut: float) -> list[Shape]:
 
 
 def _light_lobe(sensor: LightSensor, size: float) -> Shape:
-    """Where a light sensor looks: a short piece of its lobe."""
+    """Return a short piece of a light sensor's lobe, in the direction that it faces."""
     lobe = _sector(sensor.x, sensor.y, sensor.direction, sensor.width, 0.16 * size)
     return Line(lobe, None, closed=True, fill=LIGHT_CONE)
 
@@ -184,7 +184,7 @@ def _wheels(model: RobotModel) -> list[Shape]:
 
 
 def _marks(model: RobotModel) -> list[Shape]:
-    """Where sensors, pen and center are, and which way move = 1 goes."""
+    """Return the marks of the sensors, the pen, and the center, and an arrow in the direction of move = 1."""
     forwards, _ = zip(*(point for part in model.body for point in part.outline()), strict=True)
     tip = 0.5 * max(forwards) * model.drive.ahead
     head = 0.12 * max(forwards) * model.drive.ahead

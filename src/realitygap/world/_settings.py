@@ -1,4 +1,4 @@
-"""Which arena, and where trials begin, as a study names them."""
+"""The settings for the arena of a study and for the start of trials."""
 
 from __future__ import annotations
 
@@ -155,7 +155,7 @@ class ArenaSettings(Settings):
         return {key: value for key, value in values.items() if key not in unused or value != unused[key]}
 
     def pose(self) -> Pose:
-        """Where trials begin."""
+        """Return the pose at which trials begin."""
         return (
             NAMED_STARTS[self.start]
             if isinstance(self.start, str)

@@ -36,7 +36,7 @@ _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 
 @dataclass(frozen=True)
 class Affine:
-    """What becomes of a point: x' = a x + c y + e, y' = b x + d y + f."""
+    """An affine map of a point: x' = a x + c y + e, y' = b x + d y + f."""
 
     a: float = 1.0
     b: float = 0.0
@@ -49,7 +49,7 @@ class Affine:
         return self.a * x + self.c * y + self.e, self.b * x + self.d * y + self.f
 
     def after(self, first: Affine) -> Affine:
-        """This one, of what another makes of a point."""
+        """Return the map that applies `first` and then this one."""
         e, f = self(first.e, first.f)
         return Affine(
             self.a * first.a + self.c * first.b,
@@ -62,7 +62,7 @@ class Affine:
 
     @property
     def scale(self) -> float:
-        """By how much it makes everything larger; nan where not everything by the same."""
+        """Factor by which the map enlarges everything; nan if it differs between directions."""
         one, other = math.hypot(self.a, self.b), math.hypot(self.c, self.d)
         is_square = abs(self.a * self.c + self.b * self.d) <= 1e-6 * one * other
         return one if is_square and abs(one - other) <= 1e-6 * one else math.nan
@@ -70,7 +70,7 @@ class Affine:
 
 @dataclass(frozen=True)
 class Ink:
-    """How an element is drawn.
+    """The style of an element.
 
     Attributes:
         place: The way to meters.
@@ -209,7 +209,7 @@ def _name(element: ElementTree.Element) -> str:
 
 
 def _elements(parent: ElementTree.Element, ink: Ink, depth: int) -> Iterator[tuple[ElementTree.Element, Ink]]:
-    """What draws something, and how."""
+    """Yield the elements that draw something, each with its style."""
     if depth > DEEPEST:
         raise ValueError(f"groups lie more than {DEEPEST} deep in each other")
     for element in parent:

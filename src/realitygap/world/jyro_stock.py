@@ -1,4 +1,4 @@
-"""What Jyro's robots and devices know of themselves: bodies, mounts, ranges.
+"""The bodies, mounts, and ranges of Jyro's robots and devices.
 
 Lengths are in meters, angles in radians; body-fixed numbers are forward, then left. Source: Jyro 0.3.2.
 """

@@ -63,7 +63,7 @@ class TwinBody:
         self._number = seed
 
     def place(self, pose: Pose) -> None:
-        """Put it somewhere else, at rest; its battery is as at the start, and its noise begins anew."""
+        """Place the twin at a pose, at rest; its battery is as at the start, and its noise restarts."""
         model, number = self.model, self._number
         ours = Pose(pose.x, pose.y, pose.heading + math.pi)
         self._physics.place(ours)
@@ -108,13 +108,13 @@ class TwinBody:
         return self._encoders.turn(*turned)
 
     def _follow_heading(self, here: Pose) -> None:
-        """The Scribbler's pose; its heading goes on without a jump."""
+        """Update the Scribbler's pose; its heading continues without a jump."""
         was = self.pose.heading
         turned = (here.heading - math.pi - was + math.pi) % math.tau - math.pi
         self.pose = Pose(here.x, here.y, was + turned)
 
     def _after_delay(self, left: float, right: float) -> tuple[float, float]:
-        """What the wheels hear now of what they were told."""
+        """Return the speeds that reach the wheels now, after the delay."""
         motors = self.model.motors
         if self._steps % JITTER_STEPS == 0:
             late = motors.delay + motors.delay_jitter * float(self._delays.uniform(-1.0, 1.0))
@@ -128,7 +128,7 @@ class TwinBody:
         return self._heard
 
     def obstacle(self, emitter: str, stronger: float) -> int:
-        """What the Fluke counts, 0 (free) to 6400 (near).
+        """Return the reading of the Fluke's infrared sensor, 0 (free) to 6400 (near).
 
         Args:
             emitter: "left", "center" or "right".
@@ -143,7 +143,7 @@ class TwinBody:
         return round(FULL_SCALE * float(self._counts[which]))
 
     def volts(self, load: float) -> float:
-        """Of its battery, with the motors at a load of 0 to 1 [V]."""
+        """Return the battery's voltage [V] with the motors at a load of 0 to 1."""
         return self._servo.volts_at(load)
 
     def ranges(self, mounts: Floats, reach: float) -> Floats:

@@ -1,4 +1,4 @@
-"""What a twin's encoders tell of its wheels."""
+"""The encoders of a twin's wheels."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Encoders:
         self._ways = [0.0, 0.0]
 
     def turn(self, left: float, right: float) -> tuple[float, float]:
-        """What is counted while the wheels turn by so much, in meters."""
+        """Turn the wheels by these distances and return the distances that are counted [m]."""
         encoders = self._encoders
         counted = []
         for wheel, (way, gain) in enumerate(((left, encoders.gain_left), (right, encoders.gain_right))):

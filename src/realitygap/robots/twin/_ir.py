@@ -15,7 +15,7 @@ DARK = 1e-12  # light below which no pulse is seen
 
 
 def places_of(model: TwinModel) -> list[tuple[float, float]]:
-    """Where each sensor is, x and y [m]: with the shell its place is scaled."""
+    """Return the place of each sensor, x and y [m], scaled with the shell."""
     body = model.body
     return [(mount.x * body.length_scale, mount.y * body.width_scale) for mount in model.ir.mount]
 

@@ -1,4 +1,4 @@
-"""From commands to the speeds that a twin's motors are told: an S2's steps, delay, lag, gains and what is odd."""
+"""From commands to the speeds of a twin's motors: an S2's steps, delay, lag, gains, and oddities."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class SpeedSteps:
 
 
 class PlainSpeeds:
-    """Speeds as they were commanded, at once."""
+    """A regulator that passes on commanded speeds immediately."""
 
     is_steady = True
 
@@ -79,7 +79,7 @@ def _softened(share: float, dead_band: float) -> float:
 
 
 class Servo:
-    """What becomes of the speeds that a twin's wheels should have.
+    """A model of the motors that turns wanted speeds into the speeds that the wheels get.
 
     Attributes:
         volts: Of the battery now [V].
@@ -151,7 +151,7 @@ class Servo:
         return max(0.0, 1 - battery.slows * (1 - self.volts / battery.full))
 
     def volts_at(self, load: float) -> float:
-        """Of the battery with the motors at a load of 0 to 1 [V]."""
+        """Return the battery's voltage [V] with the motors at a load of 0 to 1."""
         return self._battery.volts - self._used - self._battery.sag * load
 
     def _stray(self, seconds: float) -> None:

@@ -96,24 +96,24 @@ class Physics:
 
     @property
     def pose(self) -> Pose:
-        """Of the pen; the heading is that of the body's x, within -pi..pi."""
+        """Pose of the pen; its heading is that of the body's x, within -pi..pi."""
         x, y, _, a, b, c, d = self._place[:7].tolist()
         return Pose(x, y, math.atan2(2 * (a * d + b * c), 1 - 2 * (c * c + d * d)))
 
     @property
     def wheels(self) -> tuple[float, float]:
-        """How far the wheels have turned since it was placed, left and right [m]."""
+        """Distance that the left and the right wheel have turned since the twin was placed [m]."""
         left, right = self._place[7:9].tolist()
         return left * self.radius, right * self.radius
 
     @property
     def wheel_speeds(self) -> tuple[float, float]:
-        """How fast they turn [m/s]."""
+        """Speeds of the left and the right wheel [m/s]."""
         left, right = self._speed[6:8].tolist()
         return left * self.radius, right * self.radius
 
     def look(self, x: float, y: float, directions: Floats, reach: float) -> tuple[Floats, Floats]:
-        """What rays from a point of the body meet.
+        """Return distances and angles of incidence at which rays from a point of the body meet something.
 
         Args:
             x, y: Ahead of the pen and to the left of it [m].

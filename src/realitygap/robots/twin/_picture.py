@@ -1,4 +1,4 @@
-"""What a twin looks like: from above, to scale, as plain shapes."""
+"""The picture of a twin from above, to scale, as plain shapes."""
 
 from __future__ import annotations
 

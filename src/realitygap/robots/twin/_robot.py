@@ -78,7 +78,7 @@ class TwinRobot(ProgramRobot):
 
     @property
     def number(self) -> int:
-        """Of the trial that the next `reset` begins."""
+        """Number of the trial that the next `reset` begins."""
         return self._number
 
     @number.setter
@@ -135,7 +135,7 @@ class TwinRobot(ProgramRobot):
         return [min(max((now - before) / full, -1.0), 1.0) for now, before in counted]
 
     def drive(self, command: Command) -> None:
-        """Carry out one command for `step_s`: left wheel move - turn, right wheel move + turn, limited to -1..1."""
+        """Drive one command for `step_s`: left wheel move - turn, right wheel move + turn, limited to -1..1."""
         self._check_open()
         move, turn = check_command(command)
         self.order(_within(move - turn), _within(move + turn))
@@ -145,14 +145,17 @@ class TwinRobot(ProgramRobot):
         self._seen = None
 
     def order(self, left: float, right: float) -> None:
-        """Tell the wheels, each -1 to 1; they hear it after the delay, and go on until they hear something else."""
+        """Set the speeds of the wheels, each -1 to 1.
+
+        They take effect after the delay and last until the next ones take effect.
+        """
         motors = self.model.motors
         late = motors.delay + motors.delay_jitter * float(self._delays.uniform(-1.0, 1.0))
         due = self._steps + max(0, round(late / STEP_S))
         self._heard.append((max(due, self._heard[-1][0]) if self._heard else due, left, right))
 
     def wait(self, seconds: float) -> None:
-        """Let time pass; the robot goes on with what it was told."""
+        """Let time pass while the robot continues with its last command."""
         self._check_open()
         self._advance(round(seconds / STEP_S))
 
@@ -196,7 +199,7 @@ class TwinRobot(ProgramRobot):
 
     @property
     def pose(self) -> Pose:
-        """Where it is: of the pen, the heading of the body's x [rad, 0 to 2 pi]."""
+        """Pose of the pen, with the heading of the body's x [rad, 0 to 2 pi]."""
         x, y, heading = self._points[-1]
         return Pose(x, y, heading % math.tau)
 
@@ -212,7 +215,7 @@ class TwinRobot(ProgramRobot):
 
     @property
     def battery_v(self) -> float:
-        """Of its battery now [V]."""
+        """Battery voltage now [V]."""
         return self._servo.volts
 
     def path(self) -> NDArray[np.float64]:

@@ -115,7 +115,10 @@ def _wheels(model: TwinModel) -> Iterator[str]:
 
 
 def _geared_inertia(model: TwinModel) -> float:
-    """Of a motor behind its gears, about the wheel [kg m2]: so much that no step of full torque overshoots."""
+    """Return the inertia of a motor behind its gears about the wheel [kg m2].
+
+    It is so large that no step of full torque overshoots.
+    """
     return max(LEAST_INERTIA, 1.2 * model.motors.stiffness * STEP_S)
 
 
@@ -150,7 +153,7 @@ def _thickness(arena: Arena, wall: Segment) -> tuple[float, float]:
 
 
 def _is_inside_beside(arena: Arena, wall: Segment, to_left: float) -> bool:
-    """Whether the arena goes on beside a wall, so far to the left of it."""
+    """Return whether the arena continues next to a wall, this far to the left of it."""
     x1, y1, x2, y2 = wall
     length = math.hypot(x2 - x1, y2 - y1)
     left_x, left_y = -(y2 - y1) / length * to_left, (x2 - x1) / length * to_left
@@ -161,7 +164,7 @@ def _is_inside_beside(arena: Arena, wall: Segment, to_left: float) -> bool:
 
 
 def _box_along(wall: Segment, half: float, to_left: float, look: str) -> str:
-    """A box along a wall whose middle lies beside it."""
+    """Return a box along a wall, with its middle next to the wall."""
     x1, y1, x2, y2 = wall
     length = math.hypot(x2 - x1, y2 - y1)
     sine, cosine = (y2 - y1) / length, (x2 - x1) / length

@@ -1,4 +1,4 @@
-"""Where a camera stands, from tags on the floor; with its lens, where nobody calibrated that."""
+"""The pose of a camera, from tags on the floor, and its lens if that was not calibrated."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def fit_camera(
     robot: Floats | None = None,
     tag: RobotTag | None = None,
 ) -> Camera:
-    """Where a camera stands, from the tags at the arena's corners.
+    """Fit the pose of a camera to the tags at the arena's corners.
 
     Without a lens its focal length and distortion are fitted, too, by the corner tags and by the tag on the robot,
     which looks the larger the nearer the camera is.
@@ -162,7 +162,7 @@ def _lens(size: tuple[int, int], focal: float, k1: float, k2: float, rms: float 
 def _fit_from(
     guess: Lens, points: Floats, pixels: Floats, views: Floats, tag: RobotTag
 ) -> tuple[float, Camera]:
-    """How bad the best fit is that is found from a guess, and that fit.
+    """Return the error of the best fit that starts from a guess, and that fit.
 
     Of the robot's tag in each view, where it is follows from the camera: only the camera's own numbers are fitted, and
     by how much the corners of all tags are found too far inside (a blurred corner is round).

@@ -1,4 +1,4 @@
-"""A robot followed while it drives, in a thread of its own."""
+"""Tracking of a robot while it drives, in a separate thread."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class LiveTrack(ClosedOnExit):
             self._tracker.forget()
 
     def tracked(self, until_s: float | None = None) -> Tracked:
-        """What was seen since `begin`.
+        """Return the result of tracking since `begin`.
 
         Args:
             until_s: Wait for a picture of this time or later [s].

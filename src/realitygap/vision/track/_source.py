@@ -24,7 +24,7 @@ CAMERA_SIZE = (1280, 720)  # asked for [px]; a camera gives what it has
 
 
 class Source(Protocol):
-    """Where pictures come from.
+    """A source of pictures.
 
     Attributes:
         name: For people.
@@ -46,7 +46,7 @@ class Source(Protocol):
 
 
 def _capture(what: str | int) -> Any:
-    """OpenCV's capture, which says nothing by itself: what is wrong is told by us."""
+    """Open OpenCV's capture with its own messages off, because this module reports the errors."""
     cv2 = from_extra("cv2", "vision")
     os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # AV_LOG_QUIET
     if hasattr(cv2, "setLogLevel"):  # OpenCV 4

@@ -1,4 +1,4 @@
-"""A robot's way as a camera saw it."""
+"""The path of a robot as a camera recorded it."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Track:
 
     @property
     def longest_gap_s(self) -> float:
-        """The longest time in which the robot was not seen [s]."""
+        """Longest time between two successive sightings of the robot [s]."""
         there = self.times[self.seen]
         return float(np.max(np.diff(there), initial=0.0))
 

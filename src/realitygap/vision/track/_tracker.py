@@ -59,7 +59,7 @@ def gray_of(image: Image) -> Image:
 
 @dataclass(frozen=True)
 class Sightings:
-    """What was seen in t pictures.
+    """The tags found in t pictures.
 
     Attributes:
         times: (t,) [s].
@@ -121,7 +121,7 @@ class Tracker:
 
     @property
     def family(self) -> str:
-        """Of the robot's tag, as far as it is known: that which was seen most."""
+        """Family of the robot's tag, as far as it is known: the one found most often."""
         best = max(self._seen_of, key=lambda name: self._seen_of[name])
         return best if self._seen_of[best] or self.tag.family else ""
 
@@ -158,7 +158,10 @@ class Tracker:
                 self._corners.setdefault(number, []).append(corners)
 
     def _look_nearby(self, gray: Image, last: Floats, n_pictures: int) -> Floats | None:
-        """Where it can be by now; the longer it was not seen, the farther away."""
+        """Look for the robot's tag near its expected place.
+
+        The searched area grows with the number of pictures without the tag.
+        """
         expected = last + self._moved
         side = float(np.hypot(*(last - np.roll(last, 1, axis=0)).T).max())
         room = MARGIN * side / 2 + n_pictures * (FASTEST * side + float(np.hypot(*self._moved))) / 2
@@ -181,7 +184,7 @@ class Tracker:
         return seen[best] if self._seen_of[best] >= FAMILY_AFTER or len(self._detectors) == 1 else None
 
     def forget(self) -> None:
-        """Begin anew with the robot, as with a trial; the corner tags and its tag's family are remembered."""
+        """Forget the robot's sightings, as for a new trial; the corner tags and the tag's family are remembered."""
         self._times, self._robot = [], []
 
     def sightings(self) -> Sightings:

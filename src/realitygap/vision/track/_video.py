@@ -23,7 +23,7 @@ MOST_MOVED_PX = 3.0
 
 @dataclass(frozen=True)
 class Tracked:
-    """What a camera saw of a robot.
+    """The result of tracking a robot in pictures.
 
     Attributes:
         track: Its way.
@@ -42,7 +42,7 @@ class Tracked:
 
 @dataclass(frozen=True)
 class Marks:
-    """What is known of tags and lens before a camera looks.
+    """The tags and the lens, as known before a camera records.
 
     Attributes:
         arena: At whose corners tags lie.
@@ -59,7 +59,7 @@ class Marks:
     corner_inset: float | None = None
 
     def tracked(self, found: Sightings) -> Tracked:
-        """What sightings tell.
+        """Compute the track and the camera from sightings.
 
         Raises:
             VisionError: The robot's tag or too many corner tags were not seen, or they are not where they should be.

@@ -53,11 +53,11 @@ class Window:
 
 
 class Camera:
-    """The pictures of a Fluke's camera.
+    """The camera of a Fluke, which draws the scene from the robot.
 
     Args:
-        robot: What carries it.
-        scene: What there is to see.
+        robot: The robot that carries the camera.
+        scene: The scene to draw.
         model: "1" (256 x 192) or "2" (1280 x 800, or 427 x 266).
     """
 

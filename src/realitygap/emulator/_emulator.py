@@ -300,8 +300,8 @@ class Emulator:
         """Place the robot at a pose with its motors off; the pen's path and the sensors' noise restart.
 
         Args:
-            pose: Of the pen; the heading is that of the end that is ahead.
-            seed: Of the sensors' noise.
+            pose: Pose of the pen; the heading is that of the end that is ahead.
+            seed: Seed of the sensors' noise.
         """
         x, y, heading = map(float, pose)
         if not all(map(math.isfinite, (x, y, heading))):

@@ -71,8 +71,8 @@ class FaultyLink:
     """A link with faults, which are equal for equal seeds and bytes.
 
     Args:
-        faults: What goes wrong.
-        seed: Of when.
+        faults: Rates and sizes of the faults.
+        seed: Seed of their times.
     """
 
     def __init__(self, faults: Faults, seed: int) -> None:
@@ -100,7 +100,7 @@ class FaultyLink:
         self.away_until = max(self.away_until, now + nanoseconds(seconds))
 
     def spoil(self, data: bytes) -> bytes:
-        """Return the bytes that arrive when some are sent."""
+        """Return the bytes that arrive when `data` is sent."""
         faults = self._faults
         if not (faults.drop or faults.extra or faults.flip):
             return data

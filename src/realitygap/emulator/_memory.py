@@ -29,7 +29,7 @@ class Memory:
         echo: Whether every answer ends with its opcode.
         broadcast: Whether the name is sent once a second after switching on.
         quiet: Whether the speaker is off.
-        volume: Of an S2's speaker, 0 to 100.
+        volume: Volume of an S2's speaker, 0 to 100.
         pages: Of the Fluke's serial memory, those ever written.
 
     Args:

@@ -14,7 +14,7 @@ DROP_OUT_VOLTS = 5.5  # below it Bluetooth drops out; chosen
 
 
 class Battery:
-    """The remaining charge, and the voltage under load.
+    """A battery with its remaining charge and its voltage under load.
 
     Args:
         sag: Share of the voltage lost under full load, of weak cells.

@@ -124,7 +124,7 @@ class Senses:
 
         Args:
             emitter: "left", "center" or "right".
-            power: Of its emitters, 0 to 255.
+            power: Power of the emitters, 0 to 255.
             in_pulses: Whether it is a Fluke 2, which sends ten pulses from its only emitter.
         """
         if self._own is not None:

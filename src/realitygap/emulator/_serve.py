@@ -33,7 +33,7 @@ class Channel(Protocol):
     """A place to which a client connects.
 
     Attributes:
-        name: What a client opens.
+        name: Name that a client opens.
     """
 
     name: str

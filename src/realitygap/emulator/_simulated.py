@@ -70,7 +70,7 @@ class RobotOfItsOwn(SimulatedRobot, Protocol):
 
         Args:
             emitter: "left", "center" or "right".
-            stronger: By how much farther its light goes than with the usual power; 0 for no light.
+            stronger: Ratio of the light's reach to its reach at the usual power; 0 for no light.
         """
         ...
 

@@ -35,7 +35,7 @@ class GridOffsets:
         normals: (n, 2) of the lines there, on the photograph, over pixels a meter: a distance's meters.
         upright: (rows, lines) offsets of upright lines along x [m], lowest stretch first.
         level: (lines, columns) offsets of level lines along y [m].
-        grid_x, grid_y, cell: Of the grid [m].
+        grid_x, grid_y, cell: Lower left corner and cell size of the grid [m].
     """
 
     points: Floats

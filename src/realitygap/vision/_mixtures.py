@@ -45,7 +45,7 @@ class Mixtures:
     Attributes:
         likely: (k, s) how likely each color is under each set of inks.
         color: (n,) which of these colors each place has.
-        n_pens: How many pens there are.
+        n_pens: Number of pens.
     """
 
     likely: Floats
@@ -57,8 +57,8 @@ class Mixtures:
         """Return the mixtures that may explain the densities of places.
 
         Args:
-            density: (n, 3) of each place.
-            inks: (p, 3) of full strokes.
+            density: (n, 3) optical density of each place.
+            inks: (p, 3) optical density of full strokes.
         """
         base = round(DARKEST / CELL)
         cells = np.minimum((density / CELL).astype(np.int32), base - 1)

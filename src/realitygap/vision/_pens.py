@@ -44,14 +44,14 @@ class PenMaps:
 
     Attributes:
         box: Left, lower, right and upper end of what they show: the cells and a little around them [m].
-        px_per_m: Of the maps.
+        px_per_m: Resolution of the maps [px/m].
         pens: Their names.
         inks: (p, 3) optical density of a full stroke of each.
         is_tried: (p,) whether that was seen in the pen's box, and is not a guess from its name.
         strength: (h, w) optical density of all ink.
         presence: (p, h, w) probability that a pixel has this pen's ink, 0 on bare paper.
         hidden: (p, h, w) how likely the pixel's color is at best if it has, relative to the best explanation, 0 to 1.
-        mixtures: Of what the inked pixels may be made.
+        mixtures: Mixtures that may explain the inked pixels.
         place: Rows and columns of the inked pixels.
     """
 

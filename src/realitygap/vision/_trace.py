@@ -42,7 +42,7 @@ class Trace:
 
     Attributes:
         pen: Its name.
-        box: Of the arrays [m].
+        box: Area of the arrays [m].
         own: (h, w) bool, where its color is seen and belongs to the trace.
         links: (h, w) bool, where it must have gone, under other ink or across a gap.
         doubt: (h, w) what a link costs there, a millimeter; 0 elsewhere.

@@ -22,8 +22,8 @@ class FloorImage:
 
     Attributes:
         x, y: Lower left corner [m].
-        width: How wide it lies there [m]; pixels are square.
-        columns, rows: Of its pixels.
+        width: Width on the floor [m]; pixels are square.
+        columns, rows: Numbers of pixels.
         pixels: (rows * columns) bytes, 0 black to 255 white, the top row first, compressed and in letters.
     """
 

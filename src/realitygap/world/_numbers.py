@@ -174,7 +174,7 @@ class Described(Settings):
 
 
 def _distribution(place: str, values: Mapping[str, Any]) -> Distribution:
-    """Make a distribution, or raise an error that names its place in the file."""
+    """Make a distribution, or raise an error that names `place` in each mistake."""
     try:
         return Distribution(**values)
     except ValueError as error:

@@ -73,9 +73,9 @@ class Ink:
     """The style of an element.
 
     Attributes:
-        place: The way to meters.
-        is_filled: Whether closed shapes are, as far as groups say.
-        kind: What a group says that it is.
+        place: Map from the drawing's unit to meters.
+        is_filled: Whether closed shapes are filled, as far as groups set it.
+        kind: Kind of shape that a group sets.
     """
 
     place: Affine

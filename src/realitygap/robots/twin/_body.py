@@ -132,7 +132,7 @@ class TwinBody:
 
         Args:
             emitter: "left", "center" or "right".
-            stronger: By how much farther its light goes than with the usual power.
+            stronger: Ratio of the light's reach to its reach at the usual power.
         """
         which = min(EMITTERS.index(emitter), len(self.model.ir.mount) - 1)
         if emitter in self._asked:

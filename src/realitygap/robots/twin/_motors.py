@@ -82,8 +82,8 @@ class Servo:
     """A model of the motors that turns wanted speeds into the speeds that the wheels get.
 
     Attributes:
-        volts: Of the battery now [V].
-        time: Since the trial began [s].
+        volts: Battery voltage now [V].
+        time: Time since the trial began [s].
         is_steady: Whether the lag had caught up when speeds were last asked for.
     """
 

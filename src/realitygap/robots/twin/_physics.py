@@ -113,12 +113,12 @@ class Physics:
         return left * self.radius, right * self.radius
 
     def look(self, x: float, y: float, directions: Floats, reach: float) -> tuple[Floats, Floats]:
-        """Return distances and angles of incidence at which rays from a point of the body meet something.
+        """Return the distance and the cosine of incidence at which each ray from a point of the body meets something.
 
         Args:
             x, y: Ahead of the pen and to the left of it [m].
             directions: (r,) of the rays, positive to the left of the body's x [rad].
-            reach: How far they go [m].
+            reach: Length of the rays [m].
 
         Returns:
             (r,) distances [m], `reach` where nothing is met; (r,) cosines between ray and the normal of what is met.

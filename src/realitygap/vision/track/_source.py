@@ -27,9 +27,9 @@ class Source(Protocol):
     """A source of pictures.
 
     Attributes:
-        name: For people.
+        name: Name to show.
         size: Width and height [px].
-        rate: Pictures a second, about.
+        rate: Approximate number of pictures per second.
     """
 
     name: str

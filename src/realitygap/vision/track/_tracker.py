@@ -67,7 +67,7 @@ class Sightings:
         corners: (4, 2) pixels of the corners of each corner tag, by number: the median over pictures.
         moved: How far a corner tag was from that median in the worst picture [px]: above a pixel or two, the
             camera or the tag moved.
-        family: Of the robot's tag; empty where it was never found.
+        family: Family of the robot's tag; empty if it was never found.
         size: Width and height of the pictures [px].
     """
 

@@ -26,11 +26,11 @@ class Tracked:
     """The result of tracking a robot in pictures.
 
     Attributes:
-        track: Its way.
-        camera: Where the camera stands, with its lens.
-        tag: The robot's, with its family.
-        sightings: In pixels.
-        warnings: What is not as it should be, in words.
+        track: The robot's path.
+        camera: Pose and lens of the camera.
+        tag: The robot's tag, with its family.
+        sightings: The tags found, in pixels.
+        warnings: Descriptions of problems.
     """
 
     track: Track
@@ -45,11 +45,11 @@ class Marks:
     """The tags and the lens, as known before a camera records.
 
     Attributes:
-        arena: At whose corners tags lie.
-        tag: The robot's.
-        lens: The camera's; None where it is to be fitted to the tags.
+        arena: Arena with tags at its corners.
+        tag: The robot's tag.
+        lens: The camera's lens; None to fit it to the tags.
         corner_size: As in `corner_tags`.
-        corner_inset: Likewise.
+        corner_inset: As in `corner_tags`.
     """
 
     arena: Arena

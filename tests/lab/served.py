@@ -15,7 +15,7 @@ from typing import Any
 
 import uvicorn  # noqa: F401  # imported once, for all that are forked
 from fastapi import FastAPI  # noqa: F401
-from nicegui import app
+from nicegui import app, ui
 
 import realitygap.lab.pages  # noqa: F401
 from realitygap.lab import open_lab
@@ -47,6 +47,12 @@ async def lag() -> float:
     most = max(_lags)
     _lags[:] = [0.0]
     return most
+
+
+@ui.page("/broken")
+def broken() -> None:
+    """A page with a mistake."""
+    raise RuntimeError("a mistake for a test")
 
 
 @app.get("/slow-counts")

@@ -50,7 +50,7 @@ PROGRESS = {"n_done": 6, "n_runs": 8, "n_computed": 4, "seconds": 2.0}
         (state(4), job(), "Paused", "4/8 runs"),
         (state(4), job(is_failed=True), "Failed", "4/8 runs"),
         (state(8), job(is_failed=True), "Complete", "8 runs"),
-        (state(8, n_driven_runs=1), job(), "Waiting for robot", "8 runs · 0/1 robot runs"),
+        (state(8, n_driven_runs=1), job(), "Waiting for robot", "8 runs · 0/1 robot run"),
         (StudyState("mine", problem="damaged"), None, "Failed", ""),
     ],
 )

@@ -52,15 +52,23 @@ def test_a_study_made_with_the_form_is_carried_out_on_a_phone(lab, visit):
 
 
 @pytest.mark.slow
-def test_a_study_from_a_file_is_carried_out_and_survives_the_lab(lab, visit):
+def test_a_study_from_a_file_is_carried_out_and_extended_and_survives_the_lab(lab, visit):
     page = visit("new", forgive=OUTAGE)
     start(page, TINY)
     page.wait_for_url("**/study/tiny")
     page.locator(".lab-state", has_text="Complete").wait_for(timeout=120_000)
+    page.get_by_role("button", name="Run more replicates").click()
+    page.get_by_label("Runs per condition").fill("4")
+    page.get_by_role("button", name="Run", exact=True).click()
+    page.locator(".lab-field .lab-problem", has_text="Enter a whole number from 5 to 1000000000.").wait_for()
+    page.get_by_label("Runs per condition").fill("6")
+    page.get_by_role("button", name="Run", exact=True).click()
+    page.get_by_text("6 runs", exact=True).wait_for(timeout=120_000)
+    assert ResultsFolder.open(lab.root / "tiny").description["replicates"] == 6
     lab.stop()
     lab.start()
     again = visit("")
-    again.locator('[data-study="tiny"]').get_by_text("4 runs", exact=True).wait_for()
+    again.locator('[data-study="tiny"]').get_by_text("6 runs", exact=True).wait_for()
 
 
 def test_mistakes_are_told_and_nothing_is_begun(lab, visit):

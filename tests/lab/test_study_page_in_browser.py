@@ -96,7 +96,7 @@ def test_addresses_without_a_page_lead_to_the_studies(lab, visit):
     folder = lab.root / "paper"
     folder.mkdir()
     (folder / "study.json").write_text("{}")
-    page = visit("gap", forgive=["404"])
+    page = visit("gap", forgive=["404", "500"])
     for path, text in (
         ("nonsense", "There is no page here."),
         ("study/papre", "There is no study named 'papre' in this folder."),
@@ -107,3 +107,7 @@ def test_addresses_without_a_page_lead_to_the_studies(lab, visit):
         page.get_by_role("link", name="Robot").wait_for()
         assert page.get_by_role("link", name="paper", exact=True).count() == path.count("papre")
         assert str(lab.root) not in page.locator("body").inner_text()
+    assert page.goto(lab.address + "broken").status == 500
+    page.get_by_role("alert").get_by_text("This page cannot be shown: ").wait_for()
+    page.get_by_role("button", name="Retry").wait_for()
+    page.get_by_role("link", name="Robot").wait_for()

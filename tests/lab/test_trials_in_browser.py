@@ -104,7 +104,7 @@ def test_cells_are_marked_and_saved_with_the_keyboard(lab, visit):
     assert page.evaluate("document.activeElement.dataset.cell") == "14"
     page.get_by_text("1 of 72 cells").wait_for()
     page.keyboard.press("Enter")
-    page.get_by_text("Trial 1: 1 cells saved").wait_for()
+    page.get_by_text("Trial 1: 1 cell saved").wait_for()
     with ledger_of(lab.root) as ledger:
         assert ledger.trial(1).cells == (14,)
 

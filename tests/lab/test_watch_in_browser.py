@@ -110,6 +110,9 @@ def test_report_is_written_and_works_in_its_sandbox(lab, visit):
     report.wait_for_load_state()
     report.on("console", lambda message: faults.append(message.text))
     report.on("pageerror", lambda error: faults.append(str(error)))
+    report.emulate_media(
+        reduced_motion="reduce"
+    )  # otherwise the replay may start, and the press below pauses it
     report.reload()
     report.get_by_role("heading", name="seen").first.wait_for()
     assert report.evaluate("origin") == "null"

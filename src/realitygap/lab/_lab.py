@@ -221,7 +221,7 @@ class Lab:
 
         Args:
             name: Of the study.
-            options: `port` of a robot that drives it, and what goes with it.
+            options: `replicates` if there are to be more; `port` of a robot that drives it, and what goes with it.
 
         Raises:
             StudyError: It goes on already, or another study has the robot.

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal
 
+from ._counted import counted
 from ._pace import duration
 from ._studies import StudyState
 from ._study_job import StudyJob
@@ -70,10 +71,10 @@ class Standing:
         """Progress in words, with the time left while it runs."""
         parts = []
         if self.n_runs:
-            done = f"{self.n_done:,}/{self.n_runs:,} runs"
-            parts.append(f"{self.n_runs:,} runs" if self.n_done == self.n_runs else done)
+            all_runs = counted(self.n_runs, "run")
+            parts.append(all_runs if self.n_done == self.n_runs else f"{self.n_done:,}/{all_runs}")
         if self.n_driven_runs:
-            parts.append(f"{self.n_driven_done}/{self.n_driven_runs} robot runs")
+            parts.append(f"{self.n_driven_done}/{counted(self.n_driven_runs, 'robot run')}")
         if self.trials:
             parts.append("trials: " + ", ".join(f"{n} {name}" for name, n in sorted(self.trials.items())))
         if self.word == "Running" and self.rate > 0 and self.n_done < self.n_runs:

@@ -27,8 +27,9 @@ def work(channel: Channel, order: Message) -> None:
 
     Args:
         channel: To the server.
-        order: `folder` of the results; `text` of the study file where it is new; `port` of the robot
-            and `camera` above it, where there are any; `allow_code` if Python files of tasks may run.
+        order: `folder` of the results; `text` of the study file where it is new; `replicates` if there are to be more;
+            `port` of the robot and `camera` above it, where there are any; `allow_code` if Python files of tasks may
+            run.
     """
     folder = Path(order["folder"])
     study = _study(order, folder)
@@ -49,6 +50,9 @@ def _study(order: Message, folder: Path) -> Study:
         return parse_study(order["text"], str(folder.parent / f"{folder.name}.toml"))
     study = study_of(ResultsFolder.open(folder).description)
     check_files(study, folder.parent)
+    if order.get("replicates"):
+        about = study.about.model_copy(update={"replicates": int(order["replicates"])})
+        return study.model_copy(update={"about": about})
     return study
 
 

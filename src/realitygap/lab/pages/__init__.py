@@ -9,10 +9,10 @@ from nicegui import app
 from realitygap.lab._lab import Lab
 
 from ._calibrate import add_calibrate
+from ._error_pages import add_error_pages
 from ._gap import add_gap
 from ._home import add_home
 from ._new import add_new
-from ._not_found import add_not_found
 from ._photos import add_photos
 from ._robot import add_robot
 from ._stop import add_stop
@@ -29,5 +29,5 @@ def add_pages(lab: Lab) -> None:
     app.add_static_file(local_file=str(playback / "player.js"), url_path="/lab-player/player.js")
     app.add_static_file(local_file=str(playback / "player.css"), url_path="/lab-player/player.css")
     pages = (add_home, add_new, add_trials, add_photos, add_robot, add_study, add_gap, add_calibrate)
-    for add in (*pages, add_stop, add_not_found):
+    for add in (*pages, add_stop, add_error_pages):
         add(lab)

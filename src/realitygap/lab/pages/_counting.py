@@ -10,6 +10,7 @@ from typing import Any
 from nicegui import run, ui
 
 from realitygap.errors import LedgerError
+from realitygap.lab._counted import counted
 from realitygap.lab._counts import CountCard, CountedTrial, Counts
 from realitygap.lab._drawn import Draft
 from realitygap.lab._lab import Lab
@@ -238,7 +239,7 @@ class Counting:
         doubt = f", {len(proposal.doubtful)} to check" if proposal.doubtful else ""
         name = proposal.name[:1].upper() + proposal.name[1:]
         with ui.row().classes("lab-row").props(f'data-proposal="{proposal.kind}"'):
-            ui.label(f"{name}: {len(proposal.cells)} cells{doubt}.")
+            ui.label(f"{name}: {counted(len(proposal.cells), 'cell')}{doubt}.")
             if is_chosen:
                 ui.label("In use").classes("lab-state")
             else:
@@ -273,7 +274,7 @@ class Counting:
                 raise LedgerError(f"Another visitor has just changed trial {each.number}. Check it again.")
             self._counts.score(each.number, draft, self._who(), role)
 
-        said = f"Trial {each.number}: {len(draft.cells)} cells saved."
+        said = f"Trial {each.number}: {counted(len(draft.cells), 'cell')} saved."
         if await attempt(enter, said, type="positive"):
             self._chosen, self._corrects = None, False
         self._lab.changed()

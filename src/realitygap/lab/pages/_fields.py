@@ -117,15 +117,16 @@ class Form:
             if entered is None or entered == "":
                 if value is None:
                     return None
-                raise ValueError(f"This field is empty. Enter {kind} from {low:g} to {high:g}.")
+                raise ValueError(f"This field is empty. Enter {kind}.")
             is_number = isinstance(entered, int | float) and not isinstance(entered, bool)
             if not is_number or not math.isfinite(entered) or not low <= entered <= high:
-                raise ValueError(f"Enter {kind} from {low:g} to {high:g}. You entered {shown(entered)}.")
+                got = f"{entered:.10g}" if is_number else shown(entered)
+                raise ValueError(f"Enter {kind}. You entered {got}.")
             if is_whole and entered != int(entered):
-                raise ValueError(f"Enter {kind} from {low:g} to {high:g}. You entered {shown(entered)}.")
+                raise ValueError(f"Enter {kind}. You entered {entered:.10g}.")
             return int(entered) if is_whole else float(entered)
 
-        kind = "a whole number" if is_whole else "a number"
+        kind = f"{'a whole number' if is_whole else 'a number'} from {low:.10g} to {high:.10g}"
         with self._around(label):
             element = ui.number(value=value)
             element.props(f'step="{1 if is_whole else "any"}"')

@@ -12,6 +12,7 @@ from starlette.requests import Request
 
 from realitygap.errors import StudyError
 from realitygap.lab._checks import Check
+from realitygap.lab._counted import counted
 from realitygap.lab._files import LONGEST_TEXT
 from realitygap.lab._form import (
     TITLES,
@@ -349,8 +350,8 @@ class _Page:
             return None
         self._form.show_problems({})
         n, replicates = found["n_conditions"], found["replicates"]
-        conditions = "1 condition" if n == 1 else f"{n:,} conditions"
-        self._size.text = f"No mistakes. {conditions} × {replicates:,} runs = {n * replicates:,} runs."
+        size = f"{counted(n, 'condition')} × {counted(replicates, 'run')}"
+        self._size.text = f"No mistakes. {size} = {counted(n * replicates, 'run')}."
         return {**found, "text": text}
 
     def _show_mistakes(self, found: dict[str, Any]) -> None:

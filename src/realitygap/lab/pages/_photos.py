@@ -12,6 +12,7 @@ from starlette.responses import FileResponse, PlainTextResponse, Response
 
 from realitygap.errors import RealityGapError
 from realitygap.lab._access import FOREIGN_HEADERS, LARGEST_BODY
+from realitygap.lab._counted import counted
 from realitygap.lab._counts import CountedTrial, Counts
 from realitygap.lab._drawn import Draft
 from realitygap.lab._lab import Lab
@@ -194,7 +195,7 @@ class SheetPhotos:
                 ui.label(self._told(each, photo))
         ready = [each for each in waiting if self._draft(each, photo) is not None]
         if len(ready) > 1:
-            ui.button(f"Save {len(ready)} trials", on_click=lambda: self._enter(photo)).props(
+            ui.button(f"Save {counted(len(ready), 'trial')}", on_click=lambda: self._enter(photo)).props(
                 "unelevated no-caps"
             )
 
@@ -204,7 +205,7 @@ class SheetPhotos:
     def _told(self, each: CountedTrial, photo: SheetPhoto) -> str:
         found = next(one for one in self._counts.proposals(each.number) if one.mark == photo.mark)
         doubt = f", {len(found.doubtful)} to check" if found.doubtful else ""
-        return f"{len(found.cells)} cells{doubt}. {found.said}"
+        return f"{counted(len(found.cells), 'cell')}{doubt}. {found.said}"
 
     def _draft(self, each: CountedTrial, photo: SheetPhoto) -> Draft | None:
         """Return the draft that began with this photo, with its corrections."""
@@ -216,6 +217,6 @@ class SheetPhotos:
             await self.load()
             found = {each.number: self._draft(each, photo) for each in self._waiting(photo.sheet)}
             drafts = {number: draft for number, draft in found.items() if draft is not None}
-            said = f"{len(drafts)} trials saved."
+            said = f"{counted(len(drafts), 'trial')} saved."
             await attempt(lambda: self._counts.score_all(drafts, self._who()), said, type="positive")
         self._lab.changed()

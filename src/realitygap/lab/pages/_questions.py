@@ -6,6 +6,7 @@ from typing import Any
 
 from nicegui import ui
 
+from realitygap.lab._counted import counted
 from realitygap.lab._counts import Counts
 from realitygap.lab._study_job import StudyJob
 from realitygap.trials import start_words
@@ -124,7 +125,9 @@ def _close(asked: _Asked) -> None:
     for number in asked.ask["trials"]:
         each = asked.counts.trial(number)
         with ui.row().classes("lab-row"):
-            ui.label(f"Trial {number}, {each.pen}: {len(each.trial.cells or ())} cells by {each.first}")
+            ui.label(
+                f"Trial {number}, {each.pen}: {counted(len(each.trial.cells or ()), 'cell')} by {each.first}"
+            )
             ui.button("Undo", on_click=lambda number=number: asked.answer(undo=number)).props(
                 f'flat dense no-caps aria-label="Undo the score of trial {number}"'
             ).set_enabled(asked.may)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import secrets
 from dataclasses import dataclass
 from typing import Any
@@ -12,6 +13,7 @@ from starlette.responses import FileResponse, PlainTextResponse, Response
 
 from realitygap.errors import RealityGapError, StudyError
 from realitygap.lab._access import FOREIGN_HEADERS
+from realitygap.lab._counted import counted
 from realitygap.lab._counts import Counts
 from realitygap.lab._figure_cache import read_thumbnail
 from realitygap.lab._lab import Lab
@@ -29,6 +31,8 @@ from ._notices import attempt
 from ._part import Part, watching
 from ._player import LivePlayer, Player
 
+MOST_REPLICATES = 1_000_000_000
+"""Largest number of runs per condition that a study takes."""
 MOST_FILES = 200
 """Number of files of the lab's folder that are proposed."""
 LOOK_S = 0.5
@@ -182,7 +186,8 @@ class _Page:
         self._name = opened.standing.name
         self._opened = opened
         self._watcher = opened.watcher
-        self._has_report = False
+        self._has_report = opened.standing.has_report
+        self._replicates = opened.replicates
         self._is_writing = False
         self._is_looking = False
         self._key = secrets.token_hex(8)
@@ -195,12 +200,16 @@ class _Page:
     def show(self) -> None:
         if self._standing.note:
             hint(self._standing.note)
+        self._dialogs = ui.element("div")  # apart from the state, which is drawn again while a dialog is open
         self._state = Part(lambda: self._standing, self._show_state)
         self._state.show()
         with ui.tabs().props("no-caps align=left") as tabs:
-            overview, replay, report = ui.tab("Overview"), ui.tab("Replay"), ui.tab("Report")
-        panels = ui.tab_panels(tabs, value=overview, on_change=self._turn).classes("lab-panels")
-        with panels.props("keep-alive"):
+            overview = ui.tab("Overview")
+            if self._standing.has_robot:
+                ui.tab("Trials")
+            replay, report = ui.tab("Replay"), ui.tab("Report")
+        self._panels_box = ui.tab_panels(tabs, value=overview, on_change=self._turn).classes("lab-panels")
+        with self._panels_box.props("keep-alive"):
             with ui.tab_panel(overview):
                 self._show_overview()
             with ui.tab_panel(replay).classes("lab-replay"):
@@ -211,7 +220,9 @@ class _Page:
         ui.timer(LOOK_S, self._look_at_disk)
 
     async def _turn(self, event: events.ValueChangeEventArguments[Any]) -> None:
-        """Play the typical run when the replays are opened for the first time."""
+        """Open the page of trials; play the typical run when the replays are opened for the first time."""
+        if event.value == "Trials":
+            self._open_trials()
         if event.value == "Replay" and not self._has_played and self._standing.n_done:
             await self._replay()
 
@@ -247,14 +258,52 @@ class _Page:
             ui.label(standing.progress).props('role="status"')
             show_control(self._lab, standing)
             if standing.has_robot:
-                ui.button(
-                    "Open trials", on_click=lambda: ui.navigate.to(f"/study/{self._name}/trials")
-                ).props("outline no-caps")
+                ui.button("Open trials", on_click=self._open_trials).props("outline no-caps")
+            if standing.n_done or standing.n_driven_done:
+                ui.button("Report", on_click=self._report_now).props("outline no-caps")
+            if standing.word == "Complete":
+                ui.button("Run more replicates", on_click=self._ask_replicates).props("outline no-caps")
         if standing.word != "Complete":
             share = standing.share
             ui.linear_progress(share, show_value=False).props(f'aria-label="{100 * share:.0f} % done"')
         if standing.message:
             ui.label(standing.message).classes("lab-problem lab-lines")
+
+    def _open_trials(self) -> None:
+        ui.navigate.to(f"/study/{self._name}/trials")
+
+    async def _report_now(self) -> None:
+        """Open the report; write it if there is none."""
+        if self._has_report:
+            ui.navigate.to(f"/reports/{self._name}", new_tab=True)
+            return
+        self._panels_box.value = "Report"
+        if not self._is_writing:
+            await self._write()
+
+    def _ask_replicates(self) -> None:
+        """Ask how many runs each condition is to have, and run those that are missing."""
+        now = self._replicates
+        with self._dialogs, ui.dialog(value=True) as dialog, ui.card():
+            form = Form()
+            section("Run more replicates")
+            form.summary()
+            form.number(
+                "replicates",
+                "Runs per condition",
+                2 * now,
+                now + 1,
+                MOST_REPLICATES,
+                explanation=f"Each condition has {counted(now, 'run')}. They are kept.",
+            )
+
+            async def start() -> None:
+                if await form.submit(lambda values: self._lab.go_on(self._name, **values)):
+                    dialog.close()
+
+            with ui.row().classes("lab-row"):
+                ui.button("Run", on_click=start).props("unelevated no-caps")
+                ui.button("Cancel", on_click=dialog.close).props("flat no-caps")
 
     def _job(self) -> StudyJob | None:
         return self._lab.jobs.get(self._name)
@@ -290,21 +339,24 @@ class _Page:
             self._is_looking = False
         if found is None:
             return
-        self._standing, has_report = found
+        self._standing, has_report, self._replicates = found
         self._state.look()
         self._renew_figures()
         if has_report != self._has_report:
             self._has_report = has_report
             self._report.refresh()
 
-    def _read_disk(self) -> tuple[Standing, bool]:
-        """Read the state of the study; ask for new figures if they are due."""
+    def _read_disk(self) -> tuple[Standing, bool, int]:
+        """Read the state of the study and its runs per condition; ask for new figures if they are due."""
         standing = self._lab.standing(self._name)
         state = self._lab.studies.lately(self._name)
         if state.n_done or state.n_driven_done:
             done = (state.n_done, state.n_driven_done)
             self._watcher.look(done, is_running=standing.word in _GROWING)
-        return standing, (self._lab.root / self._name / "report.html").is_file()
+        replicates = self._replicates
+        with contextlib.suppress(RealityGapError):  # it cannot be read in this moment
+            replicates = int(self._lab.studies.results(self._name).description["replicates"])
+        return standing, (self._lab.root / self._name / "report.html").is_file(), replicates
 
     def _show_driving(self, driven: tuple[StudyJob, dict[str, Any]] | None) -> None:
         if driven is not None and self._opened.counts is not None:
@@ -324,7 +376,7 @@ class _Page:
         best, n_missing = rows[0], self._standing.n_runs - self._standing.n_done
         return (
             f"{best['condition']} has the highest median best coverage{' so far' if n_missing else ''}: "
-            f"{_estimate(best)} ({best['label']}, {best['n']} runs)."
+            f"{_estimate(best)} ({best['label']}, {counted(best['n'], 'run')})."
         )
 
     def _show_finding(self, finding: str) -> None:
@@ -337,7 +389,7 @@ class _Page:
             return None
         standing = self._standing
         n = standing.n_done + standing.n_driven_done
-        return f"Drawing figures for {n:,} runs…" if n else ""
+        return f"Drawing figures for {counted(n, 'run')}…" if n else ""
 
     def _drawn(self) -> list[str]:
         """Names of the figures that can be shown."""
@@ -384,7 +436,7 @@ class _Page:
                 "condition": row["condition"],
                 "median": _estimate(row),
                 "n": row["n"],
-                "progress": f"{100 * row['n'] / self._opened.replicates:.0f} %",
+                "progress": f"{100 * row['n'] / self._replicates:.0f} %",
                 "label": row["label"],
                 "chosen": row["condition"] == self._chosen,
             }

@@ -10,6 +10,7 @@ from starlette.exceptions import HTTPException
 from starlette.requests import Request
 
 from realitygap.errors import RealityGapError
+from realitygap.lab._counted import counted
 from realitygap.lab._counts import Counts
 from realitygap.lab._lab import Lab, Visitor
 from realitygap.lab._photos import Photos
@@ -328,12 +329,14 @@ class _Page:
         if self._can_begin is not None and self._can_begin.is_complete:
             n_scored = sum(each.trial.state == "scored" for each in self._counts.trials())
             with ui.row().classes("lab-row"):
-                ui.label(f"All {n_scored} trials scored.").props('role="status"')
+                ui.label(
+                    "The trial is scored." if n_scored == 1 else f"All {n_scored:,} trials scored."
+                ).props('role="status"')
                 ui.button("Open results", on_click=lambda: ui.navigate.to(f"/study/{self._name}")).props(
                     "unelevated no-caps"
                 )
         elif not self._counts.trials():
-            ui.label(f"No trials yet. Connect a robot to drive {self._counts.n_planned} trials.")
+            ui.label(f"No trials yet. Connect a robot to drive {counted(self._counts.n_planned, 'trial')}.")
 
     def _may_end(self) -> _AskedStand:
         return _AskedStand(self._job(), may=self._may())
@@ -499,7 +502,7 @@ class _AskedStand:
 
 def _show_preflight(found: dict[str, Any]) -> None:
     n_problems = len(found["problems"])
-    found_words = f"{n_problems} problems" if n_problems else "passed"
+    found_words = counted(n_problems, "problem") if n_problems else "passed"
     with ui.expansion(f"Pre-flight check: {found_words}").classes("lab-expansion"):
         for name, value in found["facts"].items():
             ui.label(f"{name}: {value}")

@@ -7,6 +7,7 @@ from typing import Any
 
 from nicegui import run, ui
 
+from realitygap.lab._counted import counted
 from realitygap.lab._counts import Counts
 from realitygap.lab._lab import Lab
 from realitygap.lab._video_job import VideoJob, videos_in
@@ -96,7 +97,9 @@ class Videos:
             "tag=10&tag-height=0.1",
             explanation="As for realitygap track: tag, tag-size, tag-height, tag-at, corner-size, corner-inset, lens.",
         )
-        which = {0: f"All {len(waiting)} trials to score"} | {number: f"Trial {number}" for number in waiting}
+        which = {0: f"All to score: {counted(len(waiting), 'trial')}"} | {
+            number: f"Trial {number}" for number in waiting
+        }
         form.choice("trial", "Trials in the video", which, 0)
 
         def track(values: dict[str, Any]) -> None:

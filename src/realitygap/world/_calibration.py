@@ -33,15 +33,17 @@ class Fitted(Settings):
     sensors. `Calibration.numbers` and `Calibration.draws` have the robot's own names.
     """
 
-    name: str = Field(description="Of the parameter.")
+    name: str = Field(description="Name of the parameter.")
     estimate: float = Field(description="Median of the posterior, or the point of greatest likelihood.")
     low: float = Field(description="Lower end of the 90 % interval.")
-    high: float = Field(description="Upper end.")
-    prior_low: float = Field(description="Lower end of what was thought possible.")
-    prior_high: float = Field(description="Upper end.")
-    identified: bool = Field(description="Whether the observations tell it from its prior.")
-    unit: str = Field("", description="Such as m/s.")
-    advice: str = Field("", description="Where it is not identified: what to record to identify it.")
+    high: float = Field(description="Upper end of the 90 % interval.")
+    prior_low: float = Field(description="Lower end of the prior.")
+    prior_high: float = Field(description="Upper end of the prior.")
+    identified: bool = Field(description="Whether the observations narrow the parameter down from its prior.")
+    unit: str = Field("", description="Unit, such as m/s.")
+    advice: str = Field(
+        "", description="Observations that would identify the parameter, if it is not identified."
+    )
 
     @model_validator(mode="before")
     @classmethod
@@ -105,34 +107,34 @@ class Calibration(Settings):
     """A calibration of a robot: the fitted parameters, the robot's numbers, and draws from the posterior."""
 
     format: Literal["realitygap calibration 1"] = "realitygap calibration 1"
-    kind: Literal["path", "sensors", "motion", "contact", "all"] = Field(description="What was calibrated.")
-    robot: str = Field(description="The robot on whose numbers it builds, by name or file.")
-    target: str = Field(description="What was observed, such as twin:FILE.")
-    label: Literal["SIM", "TWIN", "EMULATED", "REAL"] = Field(description="Of the target.")
-    observe: Literal["cells", "encoders", "track"] = Field(description="How much was seen.")
-    trials: int = Field(ge=0, description="How many trials it took.")
+    kind: Literal["path", "sensors", "motion", "contact", "all"] = Field(
+        description="Parameters that were calibrated."
+    )
+    robot: str = Field(description="Robot whose file has all other numbers, by name or file.")
+    target: str = Field(description="Robot or simulator that was observed, such as twin:FILE.")
+    label: Literal["SIM", "TWIN", "EMULATED", "REAL"] = Field(description="Label of the target.")
+    observe: Literal["cells", "encoders", "track"] = Field(description="Kind of the observations.")
+    trials: int = Field(ge=0, description="Number of trials.")
     step_s: float = Field(
-        0.0, ge=0, le=60, description="How long its commands lasted [s]; 0: as the robot's file has it."
+        0.0, ge=0, le=60, description="Duration of a command [s]; 0: the one of the robot file."
     )
-    date: str = Field(description="When it was fitted, ISO 8601.")
-    measured: str = Field(
-        "", description="When the file that its trials came from was last changed, ISO 8601."
-    )
-    arena: str = Field("", description="Where it was measured, by name.")
-    seed: int = Field(0, description="Of trials and draws.")
-    software: str = Field("", description="What fitted it, with its version.")
-    method: str = Field(description="How it was fitted, with the source of the method.")
-    fitted: tuple[Fitted, ...] = Field((), description="The parameters.")
+    date: str = Field(description="Date of the fit, ISO 8601.")
+    measured: str = Field("", description="Date of the last change of the file with the trials, ISO 8601.")
+    arena: str = Field("", description="Arena of the trials, by name.")
+    seed: int = Field(0, description="Seed of trials and draws.")
+    software: str = Field("", description="Software that fitted the numbers, with its version.")
+    method: str = Field(description="Method of the fit, with its source.")
+    fitted: tuple[Fitted, ...] = Field((), description="Fitted parameters.")
     numbers: dict[str, float] = Field({}, description="Numbers of the robot by dotted name: the estimate.")
     draws: dict[str, tuple[float, ...]] = Field(
         {}, description="The same numbers in each draw from the posterior; all of one length."
     )
-    misspecified: bool = Field(False, description="Whether the simulator cannot make what was observed.")
+    misspecified: bool = Field(False, description="Whether the simulator cannot reproduce the observations.")
     misspecification_p: float = Field(
-        1.0, description="Of the posterior predictive check; 1 where there is none (path, motion, contact)."
+        1.0, description="P value of the posterior predictive check; 1 without one (path, motion, contact)."
     )
-    notes: tuple[str, ...] = Field((), description="What else there is to say.")
-    evidence: dict[str, Any] = Field({}, description="What figures are drawn from.")
+    notes: tuple[str, ...] = Field((), description="Notes on the fit, each a sentence.")
+    evidence: dict[str, Any] = Field({}, description="Data of the figures.")
 
     @model_validator(mode="after")
     def _draws_go_together(self) -> Self:

@@ -118,7 +118,7 @@ def test_report_is_written_and_works_in_its_sandbox(lab, visit):
     assert report.evaluate("origin") == "null"
     began = report.locator("#replay-clock").inner_text()
     report.get_by_role("button", name="To the start").click()
-    report.get_by_role("button", name="Play", exact=True).click()
+    report.locator("#replay-play").click()
     report.wait_for_function(
         "began => document.getElementById('replay-clock').innerText !== began", arg=began
     )

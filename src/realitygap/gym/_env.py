@@ -60,7 +60,7 @@ class _OneRobot(gymnasium.Env[Array, Array]):
         return observations[0], self._info()
 
     def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
-        """Carry out one command, (2,).
+        """Drive one command, (2,).
 
         Raises:
             ResetNeeded: No trial is under way.

@@ -128,7 +128,7 @@ class Robots:
         return self._observe()
 
     def drive(self, actions: ArrayLike) -> tuple[NDArray[Any], NDArray[np.float64]]:
-        """Carry out one command of each robot.
+        """Drive one command of each robot.
 
         Args:
             actions: (n, 2) outputs of controllers, limited to -1..1, and 0 where they are no number, as in a trial.
@@ -158,7 +158,7 @@ class Robots:
         return self._fleet.observe().astype(self._dtype)
 
     def facts(self) -> dict[str, NDArray[np.float64]]:
-        """What is so, whatever the controller sees: pose (n, 3), readings (n, s), and both coverages (n,)."""
+        """Return the true state, not the observed one: pose (n, 3), readings (n, s), and both coverages (n,)."""
         facts, n_cells = self._fleet.facts(), self._fleet.cells.shape[1]
         if not n_cells:
             return facts
@@ -283,7 +283,7 @@ def _platform(given: GivenPlatform, kind: str) -> Platform:
 
 
 def _made(name: str, kind: type[T], given: T | Mapping[str, Any] | None) -> T:
-    """What was given, made of its settings where it is a mapping."""
+    """Return the given object, built from its settings if it is a mapping."""
     if isinstance(given, kind):
         return given
     if not isinstance(given, Mapping | None):

@@ -60,7 +60,7 @@ class _ManyRobots(VectorEnv[Array, Array, NDArray[Any]]):
         return self._robots.start(options, self.np_random), self._info()
 
     def step(self, actions: Array) -> tuple[Array, NDArray[Any], NDArray[Any], NDArray[Any], dict[str, Any]]:
-        """Carry out one command of each robot, (n, 2); after the last step, begin anew.
+        """Drive one command of each robot, (n, 2); after the last step, start the next trials instead.
 
         Returns:
             (n, i) observations, (n,) rewards, terminations, truncations, and info, whose arrays have a row a robot.
@@ -94,7 +94,7 @@ class _ManyRobots(VectorEnv[Array, Array, NDArray[Any]]):
 
 
 class RobotVectorEnv(_ManyRobots):
-    """`RobotEnv` n times, each robot alone in an arena of its own, in one call a step.
+    """`RobotEnv` n times, each robot alone in its own arena, in one call a step.
 
     Robot k draws the random numbers of individual `noise_key.individual` + k, as `try_genomes` does. All trials have
     the same number of steps and end together; the step after it, whatever its actions, begins new ones with a new key

@@ -1,4 +1,4 @@
-"""How far the same controller's trials on two platforms come apart, step by step."""
+"""Divergence of the same controller's trials on two platforms, step by step."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Posed(Protocol):
 
 @dataclass(frozen=True)
 class Divergence:
-    """How far n pairs of trials are apart after each of t steps; row 0 is the start.
+    """The divergence of n pairs of trials after each of t steps; row 0 is the start.
 
     Attributes:
         distance: (n, t + 1) between the two robots [m].
@@ -33,17 +33,17 @@ class Divergence:
 
     @property
     def n_pairs(self) -> int:
-        """How many pairs of trials."""
+        """Number of pairs of trials."""
         return len(self.distance)
 
     @property
     def n_steps(self) -> int:
-        """How many steps of them."""
+        """Number of steps that all trials have."""
         return int(self.distance.shape[1]) - 1
 
 
 def measure_divergence(one: Sequence[Posed], other: Sequence[Posed]) -> Divergence:
-    """How far trial k of the one is from trial k of the other, after each step that both have.
+    """Measure the divergence of each trial of `one` from its counterpart in `other`, after each step that all have.
 
     A step is one command on every platform, whatever time it lasts there, so trials are compared by steps.
 
@@ -66,7 +66,7 @@ def measure_divergence(one: Sequence[Posed], other: Sequence[Posed]) -> Divergen
 
 
 def own_divergence(trials: Sequence[Posed]) -> Divergence:
-    """How far repeats on one platform are from each other: each from the next, the last from the first.
+    """Measure the divergence of repeats on one platform: each from the next, the last from the first.
 
     It is what noise alone does, to which the divergence of two platforms has to be compared.
 

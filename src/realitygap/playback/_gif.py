@@ -23,7 +23,7 @@ def gif_bytes(
     colors: Sequence[tuple[int, int, int]],
     comment: str,
 ) -> bytes:
-    """Pictures of one size as a GIF that begins anew at its end.
+    """Return pictures of one size as a GIF that repeats from its beginning.
 
     Pixels that stay as they are are left out, and all pictures share one palette, so that nothing flickers.
 

@@ -29,7 +29,7 @@ _FAN = 1.0
 
 
 class Page(Protocol):
-    """What shows a robot.
+    """A page that shows a robot.
 
     Attributes:
         scene: What stands still.
@@ -140,7 +140,7 @@ class WatchedRobot:
         return seen
 
     def drive(self, command: Command) -> None:
-        """Carry out one command; see `Robot`."""
+        """Drive one command; see `Robot`."""
         began = time.monotonic()
         lasts = self.step_s / (self._speed or 1.0)
         self.robot.drive(command)
@@ -195,7 +195,7 @@ class WatchedRobot:
 
     @property
     def trial(self) -> MovingTrial:
-        """What it did since it was reset."""
+        """Return the trial of the robot since its last reset."""
         with self._lock:
             poses = np.array(self._poses, np.float64).reshape(-1, 3)
             return MovingTrial(
@@ -266,7 +266,7 @@ class WatchedRobot:
         self._sent = _Sent(time.monotonic(), len(self._trail), len(self._cells))
 
     def _asked(self, _widget: Any, content: dict[str, Any], _buffers: Any) -> None:
-        """A page that is opened later is told everything."""
+        """Send the whole state to a page that is opened later."""
         if content.get("kind") != "all":
             return
         with self._lock:
@@ -307,14 +307,14 @@ class WatchedRobot:
 
 
 class _Sent:
-    """What a page was told, and when."""
+    """The state last sent to a page, and its time."""
 
     def __init__(self, time: float = float("-inf"), n_points: int = 0, n_cells: int = 0) -> None:
         self.time, self.n_points, self.n_cells = time, n_points, n_cells
 
 
 def _whereabouts(robot: Robot, witness: Any) -> Callable[[], Pose] | None:
-    """What says where a robot is."""
+    """Return a function that returns the robot's pose; None if there is none."""
     if witness is not None:
         pose: Callable[[], Pose] = witness.pose
         return pose
@@ -322,7 +322,7 @@ def _whereabouts(robot: Robot, witness: Any) -> Callable[[], Pose] | None:
 
 
 def _shape_of(robot: Robot) -> RobotShape:
-    """What is drawn of a robot: that of its platform, or the Scribbler's box with as many rays as it has sensors."""
+    """Return the shape of the robot's platform, or the Scribbler's box with one ray per sensor."""
     platform: Any = getattr(robot, "platform", None)
     is_known = hasattr(platform, "body") and hasattr(platform, "sensors")
     shape = RobotShape.of(platform if is_known else ScribblerPlatform())

@@ -125,7 +125,7 @@ def save_movie(
 
 
 def picture_period(step_s: float, duration_s: float) -> float:
-    """How long each picture of a GIF stays [s]: a step, some of them, or a part of one.
+    """Return the duration of each picture of a GIF [s]: one step, several steps, or a part of a step.
 
     Args:
         step_s: how long a step is shown [s].

@@ -26,11 +26,11 @@ Outline = tuple[tuple[float, float], ...]
 
 
 class Driven(Protocol):
-    """What a platform keeps of a trial step by step, such as a `Trajectory`; row 0 is the start."""
+    """A platform's record of a trial step by step, such as a `Trajectory`; row 0 is the start."""
 
     @property
     def step_s(self) -> float:
-        """How long a step lasts [s]."""
+        """Duration of a step [s]."""
 
     @property
     def poses(self) -> NDArray[np.float64]:
@@ -50,7 +50,7 @@ class Ranging(Protocol):
 
     @property
     def body(self) -> Body:
-        """What collides."""
+        """Body that collides."""
 
     @property
     def sensors(self) -> RangeSensors:
@@ -59,7 +59,7 @@ class Ranging(Protocol):
 
 @dataclass(frozen=True)
 class RobotShape:
-    """What is drawn of a robot.
+    """The drawn shape of a robot.
 
     Attributes:
         outlines: its parts, each a polygon.
@@ -73,7 +73,7 @@ class RobotShape:
 
     @property
     def front(self) -> float:
-        """How far it extends ahead of its origin [m]."""
+        """Distance from the robot's origin to its front [m]."""
         return max(forward for outline in self.outlines for forward, _ in outline)
 
     @classmethod
@@ -91,7 +91,7 @@ class RobotShape:
 
 @dataclass(frozen=True)
 class MovingTrial:
-    """Where a robot was and what it saw, step by step; row 0 is the start.
+    """A robot's positions and readings, step by step; row 0 is the start.
 
     Attributes:
         title: which trial it is.
@@ -151,12 +151,12 @@ class MovingTrial:
 
     @property
     def n_steps(self) -> int:
-        """How many steps it has."""
+        """Number of steps in the trial."""
         return (len(self.poses) - 1) // self.parts
 
     @property
     def duration_s(self) -> float:
-        """How long it lasted [s]."""
+        """Duration of the trial [s]."""
         return self.n_steps * self.step_s
 
     def named(self, title: str) -> MovingTrial:
@@ -164,7 +164,7 @@ class MovingTrial:
         return replace(self, title=title)
 
     def at(self, time: float) -> Moment:
-        """Where the robot is at a time since the start [s]; straight on between steps, and at the end afterwards."""
+        """Return the state at a time since the start [s], interpolated between steps, and the last state afterwards."""
         last = len(self.poses) - 1
         place = min(max(time / self.step_s * self.parts, 0.0), float(last))
         row = min(math.floor(place + 1e-9), last)

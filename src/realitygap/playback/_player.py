@@ -100,7 +100,7 @@ def player_class() -> type:
 
 
 def pack_scene(arena: Arena | None, title: str) -> dict[str, Any]:
-    """What stands still, ready for JSON; without an arena a bare square around the origin."""
+    """Return the fixed parts of a scene, ready for JSON; without an arena a bare rectangle around the origin."""
     if arena is None:
         return {"title": title, "extent": [-0.4, 0.4, -0.25, 0.25], "colors": _COLORS}
     grid = arena.grid
@@ -115,7 +115,7 @@ def pack_scene(arena: Arena | None, title: str) -> dict[str, Any]:
 
 
 def _pack_shape(shape: Shape) -> dict[str, Any]:
-    """A plain shape of something that stands in the arena, ready for JSON."""
+    """Return a plain shape of an object in the arena, ready for JSON."""
     if isinstance(shape, Line):
         points = [[round(x, _DIGITS), round(y, _DIGITS)] for x, y in shape.points]
         return {

@@ -264,7 +264,7 @@ class Screen:
         return artist
 
     def _move_cells(self, moments: Sequence[Moment]) -> None:
-        """Cells fill in seldom, so they are part of what stands still, which is drawn anew whenever one does."""
+        """Fill the visited cells. They change seldom, so they are fixed parts, which are redrawn only on a change."""
         visits = np.zeros(self.trials[0].arena.grid.n_cells)
         for trial, moment in zip(self.trials, moments, strict=True):
             visits[list(trial.cells[: moment.n_cells])] += 1.0
@@ -385,7 +385,7 @@ class _Robot:
 
 
 def _draw_shape(axes: Any, shape: Shape) -> None:
-    """A plain shape of something that stands in the arena."""
+    """Draw a plain shape of an object in the arena."""
     if isinstance(shape, Line):
         points = np.array([*shape.points, shape.points[0]] if shape.closed else shape.points)
         if shape.fill is not None:

@@ -56,7 +56,7 @@ class TwinDrive(NamedTuple):
 
     @property
     def title(self) -> str:
-        """What to call it."""
+        """Title of the trial."""
         return f"{self.model.name}, trial {self.number}"
 
 

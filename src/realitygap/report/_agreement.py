@@ -19,7 +19,7 @@ from realitygap.report._permutation import SEED
 
 @dataclass(frozen=True)
 class Agreement:
-    """How two people agree on which cells lines cross.
+    """The agreement of two people on the cells that lines cross.
 
     Attributes:
         n_trials: counted by two.
@@ -55,7 +55,7 @@ class Agreement:
 
 
 def measure_agreement(folder: str | Path) -> Agreement:
-    """How the second counts of trials agree with the first ones.
+    """Measure how well the second counts of trials agree with the first ones.
 
     Args:
         folder: of results, with a ledger in it.

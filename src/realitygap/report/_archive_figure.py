@@ -45,7 +45,7 @@ _HEIGHT = 2.25
 
 
 def draw_archive(folder: Results, condition: str | None = None, replicate: int | None = None) -> Drawing:
-    """Whose behaviors the novelty archive holds at the end of one run, and the novelty of generations in all runs.
+    """Draw the behaviors in the novelty archive at the end of one run, and the novelty of generations in all runs.
 
     Args:
         folder: the results of a study, or the path to them. The trials that are shown are recomputed.
@@ -108,7 +108,7 @@ def _chosen(tally: Tally, condition: str | None) -> str:
 
 
 def _members(condition: Condition, rows: pl.DataFrame) -> list[Member]:
-    """Of the archive at the end of a run."""
+    """Return the members of the archive at the end of a run."""
     by_position = DISTANCES[condition.novelty.distance].compares == "position"
     column = "behavior" if by_position else "cells"
     grid = condition.arena.arena().grid

@@ -1,4 +1,4 @@
-"""What the platform `sim` assumed of the robot, in words, from the settings in the records."""
+"""The assumptions of the platform `sim` about the robot, in words, from the settings in the records."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def sim_assumptions(conditions: Sequence[Mapping[str, Any]]) -> list[tuple[str, 
 
 
 def assumed(sim: Mapping[str, Any], noise: float) -> str:
-    """What one set-up assumes: robot, step, motors, contact, noise, and what is drawn.
+    """Describe the assumptions of one set-up: robot, step, motors, contact, noise, and random quantities.
 
     Args:
         sim: Settings of the platform, with the robot as resolved.

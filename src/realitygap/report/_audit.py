@@ -1,4 +1,4 @@
-"""What a small table of results can show, and what it cannot."""
+"""Audit of a small table of results: the conclusions that it supports, and those that it cannot."""
 
 from __future__ import annotations
 
@@ -125,7 +125,7 @@ class AuditedPair:
 
     @property
     def verdict(self) -> str:
-        """What may be said, in words."""
+        """The conclusion that the pair supports, in words."""
         if not self.can_claim:
             return f"no claim possible; {self.runs_for_a_claim} runs each at least"
         if self.p_holm < ALPHA:
@@ -136,7 +136,7 @@ class AuditedPair:
 
 @dataclass(frozen=True)
 class Audit:
-    """What `audit_results` finds.
+    """The result of `audit_results`.
 
     Attributes:
         conditions: in the order of the file.
@@ -174,7 +174,7 @@ class _Row:
 
 @dataclass(frozen=True)
 class AuditProgress:
-    """How far an audit is.
+    """The progress of an audit.
 
     Attributes:
         n_done: pairs of conditions compared.
@@ -191,7 +191,7 @@ Tell = Callable[[AuditProgress], None]
 
 
 def audit_results(table: str | Path, *, denominator: int | None = None, tell: Tell | None = None) -> Audit:
-    """What a small table of results can show, and what it cannot.
+    """Determine the conclusions that a small table of results supports, and those that it cannot.
 
     Runs are taken as independent. Every two conditions are compared by a permutation test of the difference
     of their means, corrected by Holm over all pairs. Detectable effects and numbers of runs are those of a t
@@ -294,7 +294,7 @@ def compare_samples(
 
 
 def doubt(text: str, denominator: int) -> tuple[str, int] | None:
-    """What is wrong with a value that should be k/N, and the nearest k; None where nothing is.
+    """Return the fault of a value that should be k/N, and the nearest k; None if there is no fault.
 
     Args:
         text: the value as written; its digits after the point decide how exact it claims to be.
@@ -411,7 +411,7 @@ def _doubles(rows: Sequence[_Row]) -> list[str]:
 
 
 def audit_notes(audit: Audit) -> list[str]:
-    """What must be said with the tables, in sentences."""
+    """Return the notes that belong to the tables, as sentences."""
     notes = []
     if audit.denominator is not None:
         n = sum(each.n for each in audit.conditions)

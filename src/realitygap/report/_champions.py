@@ -45,7 +45,7 @@ class Champions:
 
     @property
     def n(self) -> int:
-        """How many champions were tried again."""
+        """Number of champions that were tried again."""
         return len(self.reported)
 
     @property

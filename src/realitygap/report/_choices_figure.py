@@ -1,4 +1,4 @@
-"""How much each changed choice moves the result: conditions beside their baseline."""
+"""The effect of each changed choice on the result: conditions compared with their baseline."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Choice:
-    """A condition with its median, beside its baseline's.
+    """A condition with its median, compared with its baseline.
 
     Attributes:
         condition: its name.
@@ -59,7 +59,7 @@ class Choice:
 
 
 def compare_choices(folder: Results) -> list[list[Choice]]:
-    """Every condition that names a baseline, beside it: one list per baseline.
+    """Compare every condition that names a baseline with it: one list per baseline.
 
     Returns:
         For each baseline the baseline itself, then its variants from the largest increase of the median to
@@ -112,7 +112,7 @@ def _choice(tally: Tally, condition: Mapping[str, Any], baseline: str, reference
 
 
 def draw_choices(folder: Results) -> Drawing:
-    """How much each changed choice moves the median best coverage, sorted, with intervals.
+    """Draw the effect of each changed choice on the median best coverage, sorted, with intervals.
 
     Args:
         folder: the results of a study whose conditions name a baseline, or the path to them.
@@ -136,7 +136,7 @@ def draw_choices(folder: Results) -> Drawing:
 
 @dataclass(frozen=True)
 class _Layout:
-    """Where things stand in a figure of a width [in]."""
+    """The positions of all parts in a figure of a given width [in]."""
 
     width: float
 

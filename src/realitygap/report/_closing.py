@@ -150,7 +150,7 @@ def strategy_table(summary: Mapping[str, Any]) -> Table:
 
 
 def _counted(goal: Mapping[str, Any]) -> str:
-    """How many twins a goal is judged by, and of how many."""
+    """Return the number of twins that a goal is judged by, and their total if some are unknown."""
     n, n_unknown = goal["n"], len(goal["unknown"])
     return f"{n} of {n + n_unknown}" if n_unknown else str(n)
 

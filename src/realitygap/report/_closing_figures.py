@@ -305,7 +305,7 @@ def _spread(place: int, n: int) -> npt.NDArray[np.float64]:
 
 
 def draw_order(summary: Summary) -> Drawing | None:
-    """SRCC and MMRV of each twin, before and after, beside their goals."""
+    """Draw SRCC and MMRV of each twin, before and after, with their goals."""
     if not summary["twins"]:
         return None
     words, budget = words_of(summary), summary["budget"]
@@ -397,7 +397,7 @@ def _after(summary: Summary, observe: str, budget: int) -> list[tuple[Summary, S
 
 
 def _panels(width: float, n: int, height: float, left: float = _LEFT) -> tuple[Figure, list[Axes]]:
-    """Axes beside each other where the figure is wide, below each other where it is narrow."""
+    """Create axes: side by side in a wide figure, below each other in a narrow one."""
     wide = width > NARROW + 1
     columns = n if wide else 1
     each = (width - left - _RIGHT - (columns - 1) * _GAP) / columns
@@ -417,7 +417,7 @@ def _title(axes: Axes, title: str, text: str) -> None:
 
 
 def _key(figure: Figure, entries: Sequence[tuple[str, str]]) -> None:
-    """What colors and markers mean, in the upper right corner."""
+    """Draw the key of colors and markers in the upper right corner."""
     width = figure.get_size_inches()[0]
     height = figure.get_size_inches()[1]
     for k, (kind, text) in enumerate(reversed(entries)):

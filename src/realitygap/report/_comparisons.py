@@ -1,4 +1,4 @@
-"""Conditions against each other: how much, how sure, and what so many runs cannot say."""
+"""Comparisons between conditions: size and certainty of each difference, and the limits set by the number of runs."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ class Comparison:
 
     @property
     def can_claim(self) -> bool:
-        """Whether so many runs could show any difference at all."""
+        """Whether this number of runs could show any difference."""
         return self.best_p < ALPHA
 
     @property
@@ -195,7 +195,7 @@ class Samples:
         return sign_flip_p(self.one - self.other) if self.paired else permutation_p(self.one, self.other)
 
     def smallest_p(self) -> float:
-        """The smallest that `p` can be with so many runs."""
+        """The smallest `p` possible with this number of runs."""
         if self.paired:
             return smallest_p(len(self.one))
         exact = smallest_p(len(self.one), len(self.other))
@@ -363,7 +363,7 @@ _REASONS: dict[Reason, str] = {
 
 
 def comparisons_content(comparisons: Sequence[Comparison]) -> dict[str, Any] | None:
-    """What the page shows of the comparisons; None where there are none."""
+    """Return the content of the comparisons on the page; None without comparisons."""
     if not comparisons:
         return None
     return {
@@ -450,7 +450,7 @@ def signed(value: float, digits: int = 3) -> str:
 
 
 def span(interval: Interval | None, digits: int = 3, *, signs: bool = False) -> str:
-    """Bounds in words; a dash where there are none."""
+    """Return bounds in words; a dash without an interval."""
     if interval is None:
         return "–"
     if signs:

@@ -281,7 +281,7 @@ def _write_title(axes: Axes, panel: Panel, letters: int, *, note_below: bool) ->
 
 
 def _side_offset(n_generations: int) -> float:
-    """Where, right of the last generation, the best of the whole run stands [generations]."""
+    """Return the distance from the last generation to the mark of the run's best on its right [generations]."""
     return max(1.0, 0.2 * n_generations)
 
 
@@ -311,7 +311,7 @@ def _draw_runs(axes: Axes, values: npt.NDArray[np.float64]) -> None:
 
 
 def _opacity(single: float, count: int) -> float:
-    """What `count` lines of opacity `single` make together, in a few steps."""
+    """Return the combined opacity of `count` lines of opacity `single`, rounded up to one of a few steps."""
     opacity = 1.0 - (1.0 - single) ** int(count)
     return math.ceil(opacity * _SHADES) / _SHADES
 

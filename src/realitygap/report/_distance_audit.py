@@ -1,4 +1,4 @@
-"""What a distance of behaviors weighs: each cell, and how many there are."""
+"""Audit of a distance of behaviors: the weight of each cell, and the influence of the number of cells."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ _LEAST_PAIRS = 10
 
 @dataclass(frozen=True)
 class Confound:
-    """How far a distance is one of lengths, over pairs of behaviors.
+    """The dependence of a distance on lengths, over pairs of behaviors.
 
     Attributes:
         of: `random walks`, or the condition whose trials were compared.
@@ -67,14 +67,14 @@ class Confound:
 
     @property
     def shared(self) -> float:
-        """Of the variance of the ranks of distances, the share that goes with the lengths [0..1]."""
+        """Share of the variance of the ranks of distances that is explained by the lengths [0..1]."""
         found = self.correlation.estimate
         return math.nan if found is None else found**2
 
 
 @dataclass(frozen=True)
 class DistanceAudit:
-    """What `audit_distance` finds.
+    """The result of `audit_distance`.
 
     Attributes:
         distance: which one.
@@ -143,7 +143,7 @@ def audit_distance(
     n_pairs: int = N_PAIRS,
     sort: CellOrder = "x-then-y",
 ) -> DistanceAudit:
-    """What a distance of behaviors weighs: each cell, and how many there are.
+    """Measure the weight of each cell in a distance of behaviors, and the influence of the number of cells.
 
     A random walk starts in any of the paper's 12 x 6 cells and makes 1 to 87 steps to one of the four next cells, going
     on as it went in six of ten. A cell's leverage is the mean distance from a walk to the same walk without the cell,
@@ -232,7 +232,7 @@ def random_walk(rng: np.random.Generator, columns: int, rows: int, straight: flo
 
 
 def _as_behavior(distance: BehaviorDistance, walk: Sequence[int], columns: int) -> Any:
-    """What a distance compares of a walk: its cells, or the middle of the last one [m]."""
+    """Return the part of a walk that a distance compares: its cells, or the middle of the last one [m]."""
     if distance.compares == "cells":
         return walk
     row, column = divmod(walk[-1] if walk else 0, columns)
@@ -271,7 +271,7 @@ def _order(columns: int, rows: int, sort: CellOrder) -> npt.NDArray[np.int64]:
 
 
 def _resampled(leverages: Values, rng: np.random.Generator) -> tuple[Values, Values, Values]:
-    """Of walks drawn again with replacement: (b, c) means, (b,) front over back, (b,) correlations with order."""
+    """Resample walks with replacement; return (b, c) means, (b,) front over back, (b,) correlations with order."""
     n = len(leverages)
     weights = rng.multinomial(n, np.full(n, 1 / n), _RESAMPLES) / n
     means = weights @ leverages
@@ -312,7 +312,7 @@ def _confound(
     rows: int,
     sort: CellOrder,
 ) -> Confound:
-    """Of behaviors two by two: the first with the second, the third with the fourth, and so on."""
+    """Compare behaviors in pairs: the first with the second, the third with the fourth, and so on."""
     measure = measure_of(distance.name, columns, rows, sort)
     packed = pack_behaviors(
         measure, [_as_behavior(distance, each, columns) for each in behaviors], columns, rows
@@ -400,7 +400,7 @@ def _pairs_of_runs(rows: pl.DataFrame, rng: np.random.Generator, n_pairs: int) -
 
 
 def distance_notes(audit: DistanceAudit) -> list[str]:
-    """What an audit says, in sentences, and from what."""
+    """Return the findings of an audit, and their basis, as sentences."""
     distance = audit.distance
     unit = {"cells": "in cells", "m": "in meters", "1": "0 to 1"}[distance.unit]
     return [

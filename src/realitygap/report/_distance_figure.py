@@ -1,4 +1,4 @@
-"""What a distance of behaviors weighs, drawn: a map of cells, and the relation with length."""
+"""Figures of a distance of behaviors: a map of the weight of cells, and the relation with length."""
 
 from __future__ import annotations
 

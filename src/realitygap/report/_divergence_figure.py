@@ -1,4 +1,4 @@
-"""One network on two platforms or more, side by side, and how far they come apart."""
+"""One network on two platforms or more, side by side, and the divergence of its trials."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def save_divergence(
     individual: int | None = None,
     repeats: int = 30,
 ) -> Path:
-    """Draw one network's trials beside its trials elsewhere, and how far they come apart, into a file.
+    """Draw one network's trials next to its trials elsewhere, and their divergence, into a file.
 
     Args:
         results: the results of a study, or the path to them.
@@ -123,7 +123,7 @@ def compare_trials(
     individual: int | None = None,
     repeats: int = 30,
 ) -> tuple[Side, ...]:
-    """One network tried again on its own platform and elsewhere, each time on noise of its own.
+    """Return trials of one network on its own platform and elsewhere, each with separate noise.
 
     Arguments and errors as in `save_divergence`.
     """
@@ -163,7 +163,7 @@ def _is_platform(name: str) -> bool:
 
 
 def _beside(tally: Tally, own: Condition, against: str) -> Condition:
-    """What the network is tried on for comparison."""
+    """Return the condition on which the network is tried for comparison."""
     names = [condition["name"] for condition in tally.conditions]
     if against in names:
         return Condition.from_settings(against, dict(settings_of(tally.condition(against))))
@@ -196,7 +196,7 @@ def _try_again(trial: ChosenTrial, on: Condition, name: str, genome: Genome, rep
 
 
 def draw_divergence(one: Side, *others: Side, of: str = "", width: float = WIDE) -> Drawing:
-    """Trials of one network on two platforms or three, side by side, and how far they come apart step by step.
+    """Draw trials of one network on two or three platforms, side by side, and their divergence step by step.
 
     Args:
         one, others: as many repeats of each; repeat k of the one is compared with repeat k + 1 of another, so that
@@ -384,7 +384,7 @@ def _draw_curves(
 
 
 def _between_colors(between: tuple[Divergence, ...]) -> tuple[str, ...]:
-    """Of the curves: one alone is black, several have the color of whom they compare with the first."""
+    """Return the colors of the curves: black if there is one, otherwise that of the side compared with the first."""
     return (Ink.TEXT,) if len(between) == 1 else _COLORS[1 : len(between) + 1]
 
 

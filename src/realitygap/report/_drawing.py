@@ -1,4 +1,4 @@
-"""From a matplotlib figure to SVG: text as text, the same bytes every time, fit to stand beside others.
+"""Conversion of a matplotlib figure to SVG: text as text, the same bytes every time, in sizes that fit side by side.
 
 A figure is drawn in the colors of `Ink`. On a page each of them becomes a CSS variable, so that one drawing
 serves light and dark; a drawing by itself keeps the light colors, which every program understands.
@@ -78,7 +78,7 @@ _STYLE: dict[Any, Any] = {
 
 @dataclass(frozen=True)
 class Drawing:
-    """A figure with what has to be said of it.
+    """A figure with its caption and its description.
 
     Attributes:
         svg: the picture as one `svg` element; nothing in it is fetched from elsewhere.
@@ -288,7 +288,7 @@ def to_svg(figure: Figure, name: str, alt: str) -> str:
 
 
 def inline(svg: str) -> str:
-    """A drawing as part of an HTML page: no namespaces, size, or fonts of its own, colors as CSS variables."""
+    """Return a drawing as part of an HTML page: without namespaces, size, and fonts, with colors as CSS variables."""
     start, rest = svg.split(">", 1)
     start = re.sub(r' (?:xmlns(?::\w+)?|width|height)="[^"]*"', "", start)
     colors = {color: f"var(--ink-{name})" for name, color in Ink.names().items()}

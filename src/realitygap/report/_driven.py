@@ -1,4 +1,4 @@
-"""What a report says of conditions that a robot drove: their label, void trials, and unfinished runs."""
+"""Conditions that a robot drove, in the words of a report: their label, void trials, and unfinished runs."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Paths = dict[tuple[int, int], npt.NDArray[np.float64]]
 
 @dataclass(frozen=True)
 class Driven:
-    """What the ledger says of one condition.
+    """The state of one condition, as recorded in the ledger.
 
     Attributes:
         label: EMULATED or REAL; None before its first trial.
@@ -38,7 +38,7 @@ class Driven:
 
 
 def read_driven(folder: ResultsFolder) -> dict[str, Driven]:
-    """What the ledger of a folder says of each condition; nothing where there is none."""
+    """Return the state of each condition in a folder's ledger; empty without a ledger."""
     if not (folder.path / LEDGER_NAME).exists():
         return {}
     with Ledger.open(folder.path / LEDGER_NAME, writable=False) as ledger:
@@ -96,7 +96,7 @@ def driven_paths(folder: ResultsFolder, condition: str, replicate: int) -> Paths
 
 
 def refuse_replay(condition: str) -> RecordError:
-    """What to say where a trial of a robot would have to be computed again."""
+    """Return the error for a trial of a robot, which cannot be computed again."""
     return RecordError(
         f"The trials of condition {condition!r} were driven by a robot, and no program drives them again. What it "
         "saw and was told stands step by step in the ledger: realitygap.records.Ledger.open(...).record(TRIAL)."

@@ -1,4 +1,4 @@
-"""How large a difference is, with an interval, and how many runs it takes to see one."""
+"""Effect sizes with intervals, and the number of runs required to detect an effect."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ _BLOCK = 4_000_000
 
 
 def a12(one: Values, other: Values) -> float:
-    """How likely a run of one condition is above a run of the other; ties count half [0..1].
+    """Return the probability that a run of one condition is above a run of the other; ties count half [0..1].
 
     Args:
         one: (n,) and
@@ -308,7 +308,7 @@ def detectable_effect(n: int, *, paired: bool, alpha: float = ALPHA) -> float | 
 
 
 def _root(function: Callable[[float], float], low: float, high: float) -> float:
-    """Where a function changes its sign between two places, to the last bit or so, by halving."""
+    """Return the point between two bounds where a function changes its sign, by bisection, to about the last bit."""
     sign = function(low) > 0
     while low < (middle := (low + high) / 2) < high:
         if (function(middle) > 0) == sign:
@@ -337,5 +337,5 @@ def effect_of_a12(share: float) -> float:
 
 
 def a12_of_effect(effect: float) -> float:
-    """A12 of two normal conditions whose means differ by so many standard deviations."""
+    """Return A12 of two normal conditions whose means differ by `effect` standard deviations."""
     return float(special.ndtr(effect / math.sqrt(2)))

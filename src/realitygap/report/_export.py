@@ -1,4 +1,4 @@
-"""The page's figures and tables as files of their own."""
+"""Export of the page's figures and tables as separate files."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _NOTES = "figures.txt"
 
 @dataclass(frozen=True)
 class Exported:
-    """What was written.
+    """The names of the files that were written.
 
     Attributes:
         folder: where.

@@ -128,7 +128,7 @@ def drawing_bytes(drawing: Drawing, ending: str, title: str) -> bytes:
 
 
 def standalone_svg(drawing: Drawing, title: str) -> str:
-    """A figure as a document of its own: with title, description, and a ground to stand on."""
+    """Return a figure as a separate document, with a title, a description, and a background."""
     start, rest = drawing.svg.split(">", 1)
     about = f"<title>{_text(title)}</title><desc>{_text(drawing.alt)}</desc>"
     ground = f'<rect width="100%" height="100%" fill="{Ink.GROUND}" />'

@@ -19,7 +19,7 @@ from realitygap.report._tally import Tally, settings_of
 
 
 def content(tally: Tally) -> dict[str, Any]:
-    """What the page shows of these figures, or why one is missing.
+    """Return the figures of the page, or the reason why one is missing.
 
     Args:
         tally: the study.

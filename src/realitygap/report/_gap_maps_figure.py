@@ -1,4 +1,4 @@
-"""Where trials go on both sides of a gap, and where they go on one and not on the other."""
+"""Maps of the cells that trials visit on both sides of a gap, or on one side only."""
 
 from __future__ import annotations
 

@@ -32,7 +32,7 @@ _MOST_ACROSS = 4.4
 
 
 def draw_gap_pairs(gap: GapStudy) -> Drawing:
-    """Mean quality of each controller on both sides, with intervals, beside the line of no gap."""
+    """Draw the mean quality of each controller on both sides, with intervals and the line of no gap."""
     source, target = gap.source, gap.target
     order, score = _order_in_words(gap), gap.result.score
     caption = (

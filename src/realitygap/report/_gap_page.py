@@ -37,7 +37,7 @@ _OBSERVED = {
 
 
 def refuse_gap_page(path: str | Path) -> None:
-    """Refuse a place for the page before trials are carried out.
+    """Refuse an invalid path for the page before trials are run.
 
     Raises:
         RecordError: It ends in something else than .html, is a file of results, or is to lie in a folder that is none.

@@ -1,4 +1,4 @@
-"""How far replayed commands come away from what the target did, step by step."""
+"""The divergence of replayed commands from the target's trials, step by step."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def draw_gap_replay(gap: GapStudy) -> Drawing | None:
-    """Distance and difference in heading over steps beside what noise does; None where nobody saw the robot."""
+    """Draw distance and difference in heading over steps, compared with noise alone; None if no poses were recorded."""
     replay = gap.replay
     if replay is None:
         return None

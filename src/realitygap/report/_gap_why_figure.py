@@ -1,4 +1,4 @@
-"""What each part of the model carries of a gap, as bars."""
+"""The share of a gap that each part of the model explains, as bars."""
 
 from __future__ import annotations
 

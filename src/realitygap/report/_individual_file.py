@@ -102,7 +102,7 @@ def _writer(out: Path, format: str | None) -> Callable[[ChosenTrial, Genome, dic
 
 
 def _names(chosen: ChosenTrial) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Of all inputs and outputs, the constant input included."""
+    """Return the names of all inputs, including the constant one, and of all outputs."""
     return chosen.condition.network_inputs, chosen.condition.output_names
 
 

@@ -203,7 +203,7 @@ def _draw_pens(axes: Axes, paths: list[TracedPath], arena: Arena, body: Body, *,
 
 
 def _dot_cells(axes: Axes, path: TracedPath, arena: Arena, *, small: bool) -> None:
-    """A dot in each visited cell, every pen at a place of its own within it."""
+    """Draw a dot in each visited cell; each pen has a separate place within the cell."""
     grid, pen = arena.grid, path.individual % len(PENS)
     across, up = divmod(pen if pen < 4 else pen + 1, 3)  # eight places around the middle
     cells = np.array(path.cells)
@@ -214,7 +214,7 @@ def _dot_cells(axes: Axes, path: TracedPath, arena: Arena, *, small: bool) -> No
 
 
 def _pen(individual: int, *, small: bool) -> dict[str, Any]:
-    """How a pen draws: the first ones broad, so that they show beside those that lie over them."""
+    """Return the line style of a pen. The first pens are broad, so that they show under those drawn over them."""
     pen = individual % len(PENS)
     color, dash = PENS[pen]
     width = (2.7 - 0.25 * pen) * (0.75 if small else 1.0)

@@ -317,7 +317,7 @@ def _draw_numbers(
     champion: Ancestor,
     is_wide: bool,
 ) -> None:
-    """In each dot the species, beside it coverage and what is new."""
+    """Write the species into each dot, and coverage and new structure next to it."""
     for each in members:
         x, y = each.generation, places[each.generation, each.individual]
         axes.annotate(
@@ -337,7 +337,7 @@ def _draw_numbers(
 
 
 def _in_short(brought: str) -> str:
-    """What kinds of structure were brought."""
+    """Return the kinds of the new structure."""
     kinds = ["node" if each.startswith("node ") else "link" for each in brought.split(", ")]
     return ", ".join(dict.fromkeys(kinds))
 

@@ -187,7 +187,7 @@ def _moving(tally: Tally, trial: ChosenTrial, title: str) -> list[MovingTrial]:
 
 
 def _driven(tally: Tally, trial: ChosenTrial, title: str) -> MovingTrial:
-    """What the emulator's witness saw; of a robot on paper there is no more than cells.
+    """Return the trial that the emulator's witness recorded; trials of a robot on paper have cells only.
 
     Raises:
         RecordError: nobody saw where it drove.

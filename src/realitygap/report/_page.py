@@ -286,7 +286,7 @@ def _choices_figure(tally: Tally) -> FigureOnPage | None:
 
 
 def _banners(tally: Tally) -> list[tuple[str, str]]:
-    """What a reader must know first: a heading and a sentence each."""
+    """Return the notices that a reader must see first: a heading and a sentence each."""
     banners = []
     if tally.folder.version_note is not None:
         banners.append(("Results of another version", tally.folder.version_note))
@@ -402,7 +402,7 @@ def _published_sources(tally: Tally) -> list[str]:
 
 
 def _interval_notes(summary: pl.DataFrame) -> list[str]:
-    """What the intervals are in truth, for each number of runs."""
+    """Describe the ranks between which the intervals lie, for each number of runs."""
     notes = []
     for n in sorted(set(summary["n"]) - {0}):
         ranks = interval_ranks(n)
@@ -419,7 +419,7 @@ def _interval_notes(summary: pl.DataFrame) -> list[str]:
 
 
 def _command(tally: Tally) -> dict[str, Any]:
-    """How to run the study again: the words of the command, and whether it comes with realitygap."""
+    """Return the command that runs the study again: its words, and whether the study comes with realitygap."""
     description = tally.description
     name = str(description.get("name") or "")
     built_in = _is_built_in(description)

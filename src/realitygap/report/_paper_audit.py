@@ -65,7 +65,7 @@ class Finding:
 
 
 def audit_paper() -> list[Finding]:
-    """What does not add up in Rosenzweig & Remy, computed from the values that they print."""
+    """Return the inconsistencies in Rosenzweig & Remy, computed from the values that they print."""
     return [
         *_path_length(),
         _sensor_range(),
@@ -231,14 +231,14 @@ def _words() -> list[Finding]:
 
 
 def paper_audit_content(tally: Tally) -> dict[str, Any] | None:
-    """What the page shows; None unless the study is the paper's."""
+    """Return the content of the page; None unless the study is the paper's."""
     if tally.description.get("name") != "paper":
         return None
     return {"findings": audit_paper(), "spread": _spread_sentences(tally)}
 
 
 def _spread_sentences(tally: Tally) -> list[str]:
-    """How often three of our runs lie as far apart as the robot's three, and two threes differ as much."""
+    """Describe how often three of our runs spread as far as the robot's, and how often two threes differ as much."""
     robot, *simulated = table_2().values()
     narrowest = min(simulated, key=lambda values: float(values.std()))
     ratio = float(robot.std(ddof=1) / narrowest.std(ddof=1))

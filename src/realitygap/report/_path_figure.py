@@ -183,7 +183,7 @@ def _driven_paths(tally: Tally, condition: Condition, rows: pl.DataFrame, column
 
 
 def say_origin(condition: Mapping[str, Any], paths: Sequence[TracedPath], problem: str) -> str:
-    """Where the drawn lines come from, or why there are none."""
+    """Describe the source of the drawn lines, or the reason why there are none."""
     if is_physical(settings_of(condition)):
         if all(path.poses is not None for path in paths):
             return "The paths are what the emulator’s witness saw; where the robot was blocked is not marked."
@@ -283,7 +283,7 @@ def draw_cells(axes: Axes, cells: Iterable[int], arena: Arena, **style: Any) -> 
 
 
 def draw_visited(axes: Axes, cells: Iterable[int], arena: Arena, body: Body) -> None:
-    """What lies under paths: visited cells, the robot's outline at the start, and the start."""
+    """Draw the background of paths: visited cells, the robot's outline at the start, and the start."""
     draw_cells(axes, cells, arena, facecolor=Ink.VISITED)
     for start in arena.starts:
         outline = placed([*body.corners, body.corners[0]], start)
@@ -338,7 +338,7 @@ def _write_below(axes: Axes, path: TracedPath, arena: Arena, label: str) -> None
 
 
 def draw_path_legend(axes: Axes, paths: list[TracedPath], *, small: bool) -> None:
-    """What the marks of `draw_path` mean."""
+    """Draw the legend for the marks of `draw_path`."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 

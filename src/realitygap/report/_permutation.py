@@ -76,7 +76,7 @@ def sign_flip_p(differences: Values) -> float:
 
 
 def _sign_flip_counted(differences: npt.NDArray[np.int64]) -> float:
-    """All 2^n patterns at once: the distribution of the sum of those differences that turn negative."""
+    """Return p from all 2^n patterns together: the distribution of the sum of those differences that turn negative."""
     sizes = np.abs(differences[differences != 0])
     # with total T, a sum is T - 2 m where m is what turned negative, so a sum >= s means m <= (T - s) / 2
     most = int(sizes.sum() - abs(differences.sum())) // 2
@@ -127,7 +127,7 @@ def permutation_p(one: Values, other: Values) -> float:
 
 
 def _smaller_tail(sums: Values, observed: float, rounding: float) -> int:
-    """How many sums are as large as the observed one, or as small, whichever are fewer."""
+    """Return the number of sums as large as the observed one, or as small, whichever number is smaller."""
     return int(min((sums >= observed - rounding).sum(), (sums <= observed + rounding).sum()))
 
 

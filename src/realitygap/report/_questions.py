@@ -1,4 +1,4 @@
-"""What the paper asks and could not answer: plateaus, spread, variety, and what chance does with three runs."""
+"""Questions that the paper could not answer: plateaus, spread, variety, and the role of chance with three runs."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def plateaus(tally: Tally, condition: str) -> Share | None:
 
 @dataclass(frozen=True)
 class Spread:
-    """How far the runs of a condition are apart, beside another condition.
+    """The spread of the runs of a condition, compared with another condition.
 
     Attributes:
         condition: its name.
@@ -161,7 +161,7 @@ def _spread(tally: Tally, condition: str, reference: str) -> Spread:
 
 @dataclass(frozen=True)
 class Variety:
-    """How different the behaviors of a run are, averaged over runs.
+    """The difference between the behaviors of a run, averaged over runs.
 
     Attributes:
         condition: its name.
@@ -284,7 +284,7 @@ def mean_jaccard_distance(visited: npt.NDArray[np.bool_]) -> float:
 
 @dataclass(frozen=True)
 class Chance:
-    """How often each of several conditions has the highest mean of so few runs.
+    """The chance of each of several conditions to have the highest mean of a few runs.
 
     Attributes:
         conditions: names, one for each level.
@@ -300,7 +300,7 @@ class Chance:
 
 
 def chance_of_best(samples: Sequence[Values], n_runs: int) -> Values:
-    """How often each of k samples has the highest mean of `n_runs` values drawn from it, with replacement.
+    """Return the chance of each of k samples to have the highest mean of `n_runs` values drawn with replacement.
 
     Args:
         samples: k arrays of values that are multiples of one unit, as coverages are.
@@ -345,7 +345,7 @@ def _wins(sums: Values, below: Values, k: int) -> float:
 
 
 def chances(tally: Tally, n_runs: int = 3) -> list[Chance]:
-    """For each group of three or more noise levels with one selection: which is best of so few runs."""
+    """Return the chance of each noise level to be best of `n_runs` runs, for each group of three levels or more."""
     with_runs = [each for each in tally.conditions if len(tally.replicates(each["name"]))]
     found = []
     for group in same_but_for("noise", with_runs):

@@ -75,7 +75,7 @@ class Lead:
 
 
 def content(tally: Tally, lead: str) -> dict[str, Any]:
-    """What the template needs for the replay; trials that cannot be recomputed are left out, and it is said.
+    """Return the template's values for the replay, with a note on trials that cannot be recomputed and are left out.
 
     Args:
         tally: The study.
@@ -118,7 +118,7 @@ def content(tally: Tally, lead: str) -> dict[str, Any]:
 
 
 def _notes(runs: Sequence[_Run]) -> list[str]:
-    """What is missing, each with the names of the conditions of which it is true."""
+    """Return notes on missing content, each with the names of the conditions that it concerns."""
     notes = dict.fromkeys(run.note for run in runs if run.note)
     return [f"{', '.join(run.name for run in runs if run.note == note)}: {note}" for note in notes]
 
@@ -225,7 +225,7 @@ def _choose(rows: pl.DataFrame, most: int, column: str) -> pl.DataFrame:
 
 
 def _scene(condition: Condition) -> dict[str, Any]:
-    """Where and with what body and sensors; lengths in meters."""
+    """Return the arena, and the robot's body and sensors; lengths in meters."""
     arena, platform = condition.placed_arena, condition.on
     grid, mounts = arena.grid, platform.sensors.mounts
     return {

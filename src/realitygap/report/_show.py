@@ -1,4 +1,4 @@
-"""What `realitygap show` shows: a run, a trial, a network, species, a lineage, an arena or a robot, as a file."""
+"""Files that `realitygap show` draws: a run, a trial, a network, species, a lineage, an arena or a robot."""
 
 from __future__ import annotations
 

@@ -48,7 +48,7 @@ _NUMBER_WIDTH, _NUMBER_HEIGHT = 22.0, 9.0
 
 @dataclass(frozen=True)
 class SpeciesCounts:
-    """How many species there were.
+    """The number of species in each generation.
 
     Attributes:
         counts: (rows) condition, replicate, generation, species: how many there were.

@@ -101,7 +101,7 @@ def _deception(
 
 
 def _inputs_differ(conditions: Sequence[Mapping[str, Any]]) -> bool:
-    """Whether networks have one input more with novelty, so that two things change at once."""
+    """Return whether networks have an additional input with novelty, so that two settings change together."""
     return any(
         settings_of(each).get("task", {}).get("bias_input") == "with-novelty"
         and settings_of(each).get("selection") == "novelty"
@@ -195,7 +195,7 @@ def _champions(
 
 
 def _noise_sentences(by_name: Mapping[str, Champions], conditions: Sequence[Mapping[str, Any]]) -> list[str]:
-    """What more noise seems to do to the reported best, and what it does on fresh noise."""
+    """Describe the effect of more noise on the reported best, and its effect on fresh noise."""
     found = []
     for group in same_but_for("noise", conditions):
         # settings that could be used for trials have a number here
@@ -334,7 +334,7 @@ def _chance(tally: Tally) -> dict[str, Any] | None:
 
 
 def _chance_sentence(tally: Tally) -> str | None:
-    """How often 50 % comes out best of three levels, for objective and novelty search together."""
+    """Describe how often 50 % comes out best of three levels, for objective and novelty search together."""
     by_selection = {}
     for each in chances(tally, 3):
         settings = [settings_of(tally.condition(name)) for name in each.conditions]

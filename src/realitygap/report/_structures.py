@@ -45,7 +45,7 @@ class Structure:
 
     @property
     def n(self) -> int:
-        """How many networks have it."""
+        """Number of networks that have the structure."""
         return sum(self.by_condition.values())
 
     @property
@@ -88,12 +88,12 @@ class Structures:
 
 
 def selection_of(condition: Mapping[str, Any]) -> str:
-    """What decided who had children, as the settings say."""
+    """Return the selection method of a condition, as named in its settings."""
     return str(settings_of(condition).get("selection", "unknown")).encode("utf-8", "replace").decode()
 
 
 def count_structures(tally: Tally) -> list[Structures]:
-    """How often each structure occurs among the networks of each run's last generation, by selection."""
+    """Count how often each structure occurs among the networks of each run's last generation, by selection."""
     genes = _count_genes(tally)
     groups: dict[tuple[str, tuple[Names, Names]], list[str]] = {}
     for condition in tally.conditions:

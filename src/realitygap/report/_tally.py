@@ -1,4 +1,4 @@
-"""What tables and figures need of all rows, taken in one pass over the chunks."""
+"""Summaries of all rows for tables and figures, computed in one pass over the chunks."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ class Tally:
 
     @cached_property
     def measure(self) -> Measure:
-        """What figures show: coverage by step ends where all conditions select by it, else along the line."""
+        """Measure that figures show: coverage by step ends if all conditions select by it, otherwise along the line."""
         cells = [settings_of(condition).get("task", {}).get("cells") for condition in self.conditions]
         return "ends" if set(cells) == {"ends"} else "line"
 
@@ -137,7 +137,7 @@ class Tally:
         raise ValueError(f"Condition {condition!r} has no run {replicate} in {self.folder.path}: {has}.")
 
     def n_trials(self, condition: str | None = None) -> int:
-        """How many individuals were tried, in one condition or in all."""
+        """Return the number of individuals tried, in one condition or in the whole study."""
         rows = self.best if condition is None else self.best.filter(pl.col("condition") == condition)
         return int(rows["trials"].sum())
 
@@ -265,5 +265,5 @@ def task_of(condition: Mapping[str, Any]) -> str:
 
 
 def label_of(condition: Mapping[str, Any]) -> str:
-    """What stands on every figure for where the numbers come from: SIM, TWIN, EMULATED or REAL."""
+    """Return the label for the origin of the numbers, printed on every figure: SIM, TWIN, EMULATED or REAL."""
     return str(condition.get("label") or "unlabeled").encode("utf-8", "replace").decode()

@@ -1,4 +1,4 @@
-"""One evolution from one seed, and many of them at once."""
+"""One evolution from one seed, and many of them in parallel."""
 
 from ._classical import TaskRun, run_task
 from ._condition import NAME_PATTERN, Condition, Selection

@@ -23,7 +23,7 @@ _NUMBERS = {
 
 @dataclass(frozen=True)
 class TaskRun:
-    """What came of one run on a classical task.
+    """The result of one run on a classical task.
 
     Attributes:
         solved: Whether a network solved the task.

@@ -273,7 +273,7 @@ class Condition(Settings):
 
     @property
     def label(self) -> str:
-        """What every figure of this condition says, SIM; of a robot the ledger knows whether EMULATED or REAL."""
+        """Label on every figure, such as SIM. For a robot, the ledger records whether it is EMULATED or REAL."""
         return self.on.label
 
     @property

@@ -38,7 +38,7 @@ class Asked:
 
 @dataclass(frozen=True)
 class Told:
-    """What selection made of a generation.
+    """The scores by which selection judges a generation.
 
     Attributes:
         fitness: (n,) the number that it uses.

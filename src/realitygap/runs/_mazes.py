@@ -25,7 +25,7 @@ TURN = math.tau
 
 
 class Tried(NamedTuple):
-    """What came of n networks in a maze.
+    """The results of n networks in a maze.
 
     Attributes:
         ends: (m, 2) where their trials ended [m]; of those tried, the first m <= n.
@@ -37,7 +37,7 @@ class Tried(NamedTuple):
 
 
 class MazePath(NamedTuple):
-    """What one network did in a maze, step by step.
+    """The path of one network in a maze, step by step.
 
     Attributes:
         poses: (t + 1, 3) x, y [m] and heading [rad]; row 0 is the start.
@@ -76,7 +76,7 @@ class MazeTrials:
         self._scene = maze_scene(arena, self.agent, precision)
 
     def distances_to_exit(self, ends: NDArray[np.float64]) -> NDArray[np.float64]:
-        """How far from the exit places (n, 2) are [m]."""
+        """Return the distances of places (n, 2) from the exit [m]."""
         x, y = (ends - self._origin - self._exit).T
         return np.asarray(np.sqrt(x * x + y * y), np.float64)
 
@@ -87,7 +87,7 @@ class MazeTrials:
         return Tried(ends, int(solvers[0]) if solvers.size else -1)
 
     def path(self, genome: Genome) -> MazePath:
-        """What one network does."""
+        """Return the path of one network."""
         _, arrived, trace = self._run([genome], 1)
         n = arrived[0] + 1 if arrived[0] >= 0 else self.agent.steps
         poses = trace.poses[: n + 1, :, 0].astype(np.float64)
@@ -153,7 +153,7 @@ class _EndsArchive:
 
 @dataclass(frozen=True)
 class MazeRun:
-    """What came of one run in a maze.
+    """The result of one run in a maze.
 
     Attributes:
         solved: Whether a network reached the exit.

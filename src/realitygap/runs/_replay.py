@@ -84,7 +84,7 @@ def replay(condition: Condition | Mapping[str, Any], row: Mapping[str, Any]) -> 
 
 
 def _difference(condition: Condition, trajectory: Trajectory, row: Mapping[str, Any]) -> str:
-    """How a trial run again differs from its row; empty where it does not."""
+    """Describe the difference between a repeated trial and its row; empty if they are equal."""
     if row["key"] != condition.key:
         return f"its random numbers have the key {row['key']}, those of the condition {condition.key}"
     cells = list(row["cells"])

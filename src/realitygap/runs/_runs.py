@@ -32,7 +32,7 @@ MAX_REPLICATES = 1 << 32
 
 
 def run_rules(condition: Condition) -> RunRules:
-    """What its runs select for, in the form that kernels read."""
+    """Return the selection rules of a condition's runs, in the form that kernels read."""
     novelty = condition.novelty
     selection = {
         "coverage": block.COVERAGE,
@@ -86,7 +86,7 @@ def _empty_rows(condition: Condition, n_runs: int, n_cells: int, room: int, hidd
 
 
 def run_rows(condition: Condition, first_replicate: int, n_runs: int, *, staged: bool = False) -> RunRows:
-    """Carry out `n_runs` runs of a condition; see `run_replicates` for them as a frame.
+    """Run `n_runs` runs of a condition; see `run_replicates` for them as a frame.
 
     Args:
         condition: As resolved.
@@ -178,7 +178,7 @@ def _least(condition: Condition) -> Condition:
 
 
 def run_replicates(condition: Condition, first_replicate: int, n_runs: int) -> pl.DataFrame:
-    """Carry out `n_runs` runs of a condition.
+    """Run `n_runs` runs of a condition.
 
     Args:
         condition: As resolved.

@@ -39,7 +39,7 @@ class _Block(NamedTuple):
 
 
 class _Scored(NamedTuple):
-    """What came of the trials of one generation."""
+    """The results of the trials of one generation."""
 
     cells: NDArray[np.uint8]  # (t, c) along the line, in order of first visit
     ends: NDArray[np.uint8]  # (t, c) at the ends of steps, where they were asked for
@@ -57,7 +57,7 @@ def runs_together(population: int) -> int:
 def run_staged(
     condition: Condition, rules: RunRules, first_replicate: int, rows: RunRows, room: int, hidden_room: int
 ) -> bool:
-    """Carry out one run for each place of `rows`, replicate `first_replicate` and on.
+    """Run one replicate for each place of `rows`, numbered from `first_replicate`.
 
     Args:
         condition: As resolved.
@@ -158,7 +158,7 @@ class _Staged:
         self.which = (self.teams + first).reshape(-1, n_robots)
 
     def _try(self, n: int) -> _Scored:
-        """All trials of a generation: at once, or portions of which every step is kept."""
+        """Run all trials of a generation: together, or in portions if every step is kept."""
         if self.task is None or not self.task.needs_trace:
             return self._try_some(0, n)
         size = traced_at_once(self.trials, self.neat.n_inputs, is_single=self.condition.on.is_single)
@@ -187,7 +187,7 @@ class _Staged:
         return self.rules.selection in (block_kernels.NOVELTY, block_kernels.NEAREST_NOVELTY)
 
     def _select(self, scored: _Scored, n_runs: int) -> None:
-        """What selection uses, into the block's fitness."""
+        """Write the values that selection uses into the block's fitness."""
         runs, rules = self.block.runs, self.rules
         if self.task is None:
             block_kernels.cover_runs(runs, n_runs, scored.counts, rules, self.arena.grid.n_cells)
@@ -203,7 +203,7 @@ class _Staged:
             )
 
     def _keep(self, scored: _Scored, n_runs: int, rows: RunRows, first_row: int, generation: int) -> None:
-        """What the kernels do not keep."""
+        """Copy the values that the kernels do not keep into the rows."""
         place = (slice(first_row, first_row + n_runs), generation)
         n = self.rules.population
         rows.drawn[place] = scored.drawn.reshape(n_runs, n, -1)

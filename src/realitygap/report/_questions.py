@@ -345,7 +345,10 @@ def _wins(sums: Values, below: Values, k: int) -> float:
 
 
 def chances(tally: Tally, n_runs: int = 3) -> list[Chance]:
-    """Return the chance of each noise level to be best of `n_runs` runs, for each group of three levels or more."""
+    """Return the chance of each noise level to have the highest mean of `n_runs` runs.
+
+    Each group of three or more conditions that differ in noise alone gives one result.
+    """
     with_runs = [each for each in tally.conditions if len(tally.replicates(each["name"]))]
     found = []
     for group in same_but_for("noise", with_runs):

@@ -97,7 +97,7 @@ class Videos:
             "tag=10&tag-height=0.1",
             explanation="As for realitygap track: tag, tag-size, tag-height, tag-at, corner-size, corner-inset, lens.",
         )
-        which = {0: f"All to score: {counted(len(waiting), 'trial')}"} | {
+        which = {0: f"All unscored: {counted(len(waiting), 'trial')}"} | {
             number: f"Trial {number}" for number in waiting
         }
         form.choice("trial", "Trials in the video", which, 0)

@@ -1,4 +1,4 @@
-"""Whose behaviors an archive holds, generation by generation."""
+"""The individuals whose behaviors an archive holds, generation by generation."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def archive_members(
     columns: int = 12,
     rows: int = 6,
 ) -> list[list[Member]]:
-    """Whose behaviors the archive holds after each generation, in the order of its places.
+    """Return the members of the archive after each generation, in the order of their places in the archive.
 
     Args:
         generations: The behaviors of each, as `NoveltyArchive.update` takes them.
@@ -60,6 +60,6 @@ def archive_members(
 
 
 def _content(behaviors: Behaviors, row: int, width: int) -> tuple[bytes, int, bytes]:
-    """What tells a behavior from others, by as many marks as both sides have room for."""
+    """Return a key that identifies a behavior, from its first `width` marks, its number of cells and its points."""
     marks = np.ascontiguousarray(behaviors.marks[row][:width]).tobytes()
     return marks, int(behaviors.n_cells[row]), behaviors.points[row].tobytes()

@@ -55,7 +55,7 @@ class BehaviorDistance:
         rows: int = 6,
         sort: CellOrder = "x-then-y",
     ) -> NDArray[np.float64]:
-        """Of each behavior to each of some others.
+        """Return the distance of each behavior to each of the others.
 
         Args:
             behaviors: n lists of cells, numbered columns * row + column, in the order in which they were visited; of
@@ -196,7 +196,7 @@ def _made(name: str, columns: int, rows: int, sort: CellOrder) -> Measure:
 
 
 def measure_of(name: str, columns: int, rows: int, sort: CellOrder) -> Measure:
-    """The distance in the form that kernels read, with room of its own: threads may have one each."""
+    """Return the distance in the form that kernels read, with a separate work array for each thread."""
     return _made(name, columns, rows, sort)._replace(room=np.zeros(columns * rows + 1))
 
 

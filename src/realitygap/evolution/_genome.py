@@ -44,7 +44,7 @@ class ConnectionGene:
 
 
 class Network:
-    """What a genome decodes to: maps inputs to outputs, one pass a call.
+    """The network that a genome decodes to. It maps inputs to outputs, one pass a call.
 
     A recurrent network remembers its nodes between calls; `reset` makes it forget.
     """
@@ -59,7 +59,7 @@ class Network:
         self._before = np.zeros(room)
 
     def __getstate__(self) -> dict[str, Any]:
-        """Of the arrays, which may hold a whole population, only the network's own row."""
+        """Return the state to pickle, with only the network's own row of arrays that may hold a whole population."""
         return self.__dict__ | {"_networks": _row_of(self._networks, self._row), "_row": 0}
 
     @property
@@ -187,7 +187,7 @@ class Genome:
         self.bias_value = bias_value
 
     def __getstate__(self) -> dict[str, Any]:
-        """Of the arrays, which hold a whole population, only the genome's own row."""
+        """Return the state to pickle, with only the genome's own row of arrays that hold a whole population."""
         return self.__dict__ | {"_genomes": _row_of(self._genomes, self._row), "_row": 0}
 
     @property
@@ -466,7 +466,7 @@ def _arrays_of(record: Mapping[str, Sequence[Any]], rules: NeatRules) -> Genomes
 
 
 def genome_record(genome: Genome) -> dict[str, list[Any]]:
-    """What a row of results has of a genome; `genome_from_record` reads it."""
+    """Return the fields of a genome for a row of results; `genome_from_record` reads them."""
     nodes = [node for node in genome.nodes if node.kind in ("output", "hidden")]
     genes = genome.connections
     return {

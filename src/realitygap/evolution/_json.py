@@ -24,7 +24,7 @@ Kind = Literal["genome", "network"]
 
 
 class _Form(BaseModel):
-    """What genomes and networks have in common: how a node answers."""
+    """The fields that genomes and networks share: those that set how a node answers."""
 
     model_config = ConfigDict(extra="ignore", strict=True, allow_inf_nan=False)
 
@@ -111,7 +111,7 @@ F = TypeVar("F", GenomeForm, NetworkForm)
 
 
 def head(kind: Kind, rules: NeatRules, bias_value: float) -> dict[str, Any]:
-    """What every document begins with."""
+    """Return the fields that every document begins with."""
     names = {code: name for name, code in ACTIVATIONS.items()}
     return {
         "format": f"realitygap {kind}",

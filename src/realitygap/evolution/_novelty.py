@@ -18,7 +18,7 @@ from ._distances import DISTANCES, CellOrder, Cells, DistanceName, measure_of, p
 
 
 class NoveltySettings(Settings):
-    """How novelty is measured, and what is remembered.
+    """The settings of novelty: its measure and its archive.
 
     `paper`: Rosenzweig & Remy, section 2.4: a short archive whose oldest behavior is replaced; novelty is the
     mean distance to it. `lehman-stanley`: Lehman & Stanley (2011): the mean distance to the k nearest in

@@ -1,4 +1,4 @@
-"""What a genome looks like: its network from inputs to outputs, as plain shapes."""
+"""The picture of a genome: its network from inputs to outputs, as plain shapes."""
 
 from __future__ import annotations
 
@@ -108,7 +108,7 @@ def network_picture(
 def node_names(
     genome: Genome, input_names: Sequence[str] | None, output_names: Sequence[str] | None
 ) -> dict[int, str]:
-    """What inputs and outputs are called, by id; refuses another number of names."""
+    """Return the names of inputs and outputs, by id. Raise an error if the number of names is wrong."""
     rules = genome.rules
     inputs = input_names or ["bias" if k == rules.bias_input else f"input {k}" for k in range(rules.n_inputs)]
     outputs = output_names or [f"output {k}" for k in range(rules.n_outputs)]
@@ -122,7 +122,7 @@ def node_names(
 
 
 def _places(genome: Genome, links: Sequence[ConnectionGene]) -> dict[int, Point]:
-    """Where each node stands: by its longest way from the inputs, and clear of the links of others."""
+    """Return the place of each node: by its longest path from the inputs, and clear of the links of other nodes."""
     rules = genome.rules
     hidden = [node.id for node in genome.nodes if node.kind == "hidden"]
     depth = dict.fromkeys(range(rules.n_inputs), 0) | dict.fromkeys(hidden, 1)
@@ -147,7 +147,7 @@ def _places(genome: Genome, links: Sequence[ConnectionGene]) -> dict[int, Point]
 
 
 def _room(node: int, place: Point, places: dict[int, Point], links: Sequence[ConnectionGene]) -> float:
-    """How clear a place is: distance to other nodes and to links that are not the node's own."""
+    """Return a score of how clear a place is: its distance to other nodes and to links that are not the node's own."""
     nearest = min(math.dist(place, other) for other in places.values())
     for gene in links:
         if node not in (gene.source, gene.target) and gene.source in places and gene.target in places:
@@ -191,7 +191,7 @@ def _toward(a: Point, b: Point, distance: float) -> Point:
 
 
 def _end(curve: list[Point], color: str, *, positive: bool) -> Line:
-    """What a link ends in: an arrow where it adds, a bar where it takes away."""
+    """Return the end of a link: an arrow if its weight is positive, a bar if it is negative."""
     (x1, y1), (x2, y2) = curve[-2], curve[-1]
     length = math.hypot(x2 - x1, y2 - y1) or 1.0
     ux, uy = (x2 - x1) / length, (y2 - y1) / length
@@ -203,7 +203,7 @@ def _end(curve: list[Point], color: str, *, positive: bool) -> Line:
 
 
 def _label_place(curve: list[Point], taken: Sequence[Point]) -> Point:
-    """Where a link's weight stands: near its start, where links are still apart, and clear of what stands there."""
+    """Return the place of a link's weight: near its start, where links are still apart, and clear of other labels."""
     best, most = curve[0], -math.inf
     for k in range(14):
         part = 0.2 + 0.03 * k

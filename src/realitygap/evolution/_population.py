@@ -120,7 +120,7 @@ class Population:
 
     @property
     def parents(self) -> NDArray[np.int32]:
-        """(n, 2) each individual's parents in the generation before; -1 where there is none."""
+        """Each individual's parents in the generation before, shape (n, 2); -1 for a missing parent."""
         return self._parents.copy()
 
     @property

@@ -62,7 +62,7 @@ __all__ = [*names(), "MyroError"]
 
 
 def __getattr__(name: str) -> Any:
-    """What is left out of Myro, as a function that says why."""
+    """Return, for a name that this module leaves out of Myro, a function that raises an error with the reason."""
     if name in LEFT_OUT:
         return left_out(name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

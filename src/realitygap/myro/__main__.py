@@ -168,7 +168,7 @@ def _end() -> None:
 
 
 def _outcome() -> tuple[dict[str, Any], str]:
-    """What the robot did last: as values, and as a map."""
+    """Return the result of the robot's last run: as values, and as a map."""
     simulation, seconds = _finished[-1] if _finished else (None, 0.0)
     if simulation is None:
         return {"seconds": None, "cells": None, "coverage": None}, ""
@@ -221,7 +221,7 @@ def _is_untimed() -> bool:
 
 @contextlib.contextmanager
 def _limited(limit: float | None) -> Iterator[None]:
-    """Give each robot that is opened so many seconds."""
+    """Limit each robot that is opened to this number of seconds."""
     _robot.set_limit(limit)
     try:
         yield

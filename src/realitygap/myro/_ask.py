@@ -1,4 +1,4 @@
-"""Questions to whoever runs the program, in the terminal or in a notebook's input line."""
+"""Questions to the person who runs the program, in the terminal or in a notebook's input line."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What all parts of Myro's robot stand on: the driver, its clock, and time that passes."""
+"""The base of all parts of Myro's robot: the driver, its clock, and pauses."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class TimeUp(BaseException):
 
 
 class Part(threading.Thread):
-    """A function of a program that runs beside others.
+    """A function of a program that runs in parallel with others.
 
     Attributes:
         result: What it returned.
@@ -86,7 +86,7 @@ class Base:
         return self.clock.now()
 
     def pause(self, seconds: float) -> None:
-        """Let time pass on the robot's clock [s]; a robot that moves goes on moving.
+        """Let time pass on the robot's clock [s]; a moving robot keeps moving.
 
         Left before its end (Ctrl-C, a stop button, the program's time is over), it stops the robot.
         """

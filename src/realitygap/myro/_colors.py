@@ -67,7 +67,7 @@ class Color:
         self.rgb, self.alpha = new.rgb, new.alpha
 
     def getAlpha(self) -> int:
-        """How opaque the color is, 0 to 255."""
+        """Return the opacity of the color, 0 to 255."""
         return self.alpha
 
     def setAlpha(self, value: float) -> None:

@@ -1,4 +1,4 @@
-"""Moving: straight on, turning, both at once, for a time or until told otherwise."""
+"""Moving: straight ahead, turning, both together, for a time or until the next command."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class Driving(Base):
         self._go("turn", 0.0, speed, seconds)
 
     def move(self, translate: float, rotate: float, seconds: float | None = None) -> None:
-        """Drive and turn at once.
+        """Drive and turn at the same time.
 
         Args:
             translate: Speed ahead, from -1 (back) to 1.

@@ -30,7 +30,7 @@ class Fluke(Base):
         self.driver.send_ir_message(msg.encode("ascii"))
 
     def getIRMessage(self) -> str:
-        """What came by infrared since last asked; empty where nothing came."""
+        """Return the text received by infrared since the last call; empty if nothing came."""
         return bytes(self.driver.get_ir_message()).decode("latin-1")
 
     def setCommunicateLeft(self, on: bool = True) -> None:

@@ -97,7 +97,7 @@ enablePanNetworking = of_robot(Scribbler.enablePanNetworking)
 
 
 def beep(duration: Any = 0.5, frequency1: Any = None, frequency2: Any = None) -> None:
-    """Play a tone on the robot, or on the computer where there is no robot; go on when it has ended.
+    """Play a tone on the robot, or on the computer if there is no robot; return when it has ended.
 
     Args:
         duration: How long [s]; a list of frequencies here plays each for half a second.
@@ -118,7 +118,7 @@ def scaleDown(loopCount: int) -> None:
 
 
 def getInfo(*item: str) -> Any:
-    """What the robot says of itself, by name; without a robot only Myro's version."""
+    """Return the robot's identity and versions, by name; without a robot only Myro's version."""
     robot = _robot.robot_or_none()
     if robot is not None:
         return robot.getInfo(*item)

@@ -357,7 +357,7 @@ class Text(GraphicsObject):
         self._changed()
 
     def getText(self) -> str:
-        """What it says."""
+        """Return the text."""
         return self.text
 
     def getAnchor(self) -> Point:
@@ -463,7 +463,7 @@ def undraw(obj: GraphicsObject) -> None:
 
 
 def distance(tuple1: Sequence[float], tuple2: Sequence[float]) -> float:
-    """How far two points are apart that are given as lists of numbers."""
+    """Return the distance between two points that are given as lists of numbers."""
     return float(sum((a - b) ** 2 for a, b in zip(tuple1, tuple2, strict=True)) ** 0.5)
 
 

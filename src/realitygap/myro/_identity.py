@@ -60,7 +60,7 @@ class Identity(Base):
             self.setSingleData(place, int(number("setFudge: a correction", fudge, 0, 2) * 127))
 
     def getFudge(self) -> tuple[float, float, float, float]:
-        """What `setFudge` set, as the robot keeps it."""
+        """Return the values that `setFudge` set, as the robot stores them."""
         values = [value / 127 if value else 1.0 for value in self.getData(0, 1, 2, 3)]
         f1, f2, f3, f4 = values if self.driver.info.fluke == "none" else values[::-1]
         return (f1, f2, f3, f4)

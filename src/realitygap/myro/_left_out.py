@@ -1,4 +1,4 @@
-"""What stands in for what is left out: called, it says why and what to do instead."""
+"""Substitutes for the functions left out of Myro. A call raises an error with the reason and an alternative."""
 
 from __future__ import annotations
 

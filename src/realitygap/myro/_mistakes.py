@@ -1,4 +1,4 @@
-"""What a learner got wrong, said in one message: what was expected, what came, what to do."""
+"""Messages about a learner's mistakes: the expected value, the value given, and the next step."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def number(name: str, value: object, least: float | None = None, most: float | N
 
 
 def _hint(value: object) -> str:
-    """What helps someone who gave text for a number, as `input()` does."""
+    """Return a hint for a person who gave text for a number, as `input()` does; empty for other values."""
     if not isinstance(value, str):
         return ""
     try:
@@ -74,7 +74,7 @@ def whole(name: str, value: object, least: int, most: int) -> int:
 
 
 def choice(name: str, value: object, choices: Mapping[Any, T]) -> T:
-    """What a word or a number stands for; words in any case.
+    """Return the meaning of a word or a number; words in any case.
 
     Args:
         name: Of function and argument, for the message.

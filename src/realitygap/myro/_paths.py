@@ -1,4 +1,4 @@
-"""Where a Scribbler 2 is by its own counting, and driving to places."""
+"""The position of a Scribbler 2 by its own counting, and driving to places."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Paths(Base):
     setHereIs = hereIs
 
     def getAngle(self) -> int:
-        """Where the robot counts itself to face [degrees]."""
+        """Return the robot's heading by its own counting [degrees]."""
         return int(self.driver.angle)
 
     def setAngle(self, angle: int) -> None:
@@ -48,7 +48,7 @@ class Paths(Base):
     setEndPath = endPath
 
     def moveTo(self, x: int, y: int) -> None:
-        """Face a place, drive there and go on when arrived [half mm]."""
+        """Face a place, drive there and return on arrival [half mm]."""
         self._motion("move_to", _far("moveTo: x", x), _far("moveTo: y", y), "half-mm")
 
     def moveBy(self, x: int, y: int) -> None:
@@ -71,7 +71,7 @@ class Paths(Base):
         self._motion("turn_by", _degrees("turnBy", angle, radsOrDegrees), "deg")
 
     def arcTo(self, x: int, y: int, radius: int) -> None:
-        """Drive to a place along an arc and go on when arrived [half mm]; a positive radius turns to the left."""
+        """Drive to a place along an arc and return on arrival [half mm]; a positive radius turns to the left."""
         self._motion(
             "arc_to", _far("arcTo: x", x), _far("arcTo: y", y), _far("arcTo: the radius", radius), "half-mm"
         )
@@ -95,11 +95,11 @@ class Paths(Base):
         (self.arcTo if choice("setArc: the type", arcType, _HOW) == "to" else self.arcBy)(x, y, radius)
 
     def getEncoders(self, zeroEncoders: bool = False) -> list[int]:
-        """[left, right] what the wheels counted, about 0.25 mm each, backwards negative; perhaps begin anew at 0."""
+        """Return the wheels' counts [left, right], about 0.25 mm each, backwards negative; perhaps restart at 0."""
         return [int(value) for value in self.driver.encoders(zero=is_on("getEncoders", zeroEncoders))]
 
     def getMotorStats(self) -> dict[str, list[Any]]:
-        """How the wheels turn.
+        """Return the state of the wheels and motors.
 
         Returns:
             "wheel": [left, right] counts in 1/10 s; "IdlerTimer": [1/10 s since the caster moved];

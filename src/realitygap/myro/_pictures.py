@@ -111,15 +111,15 @@ class Picture:
         return self.getPixel(x, y).getRGBA()
 
     def getAlpha(self, x: int, y: int) -> int:
-        """How opaque a pixel is, 0 to 255."""
+        """Return the opacity of a pixel, 0 to 255."""
         return self.getPixel(x, y).getAlpha()
 
     def getWidth(self) -> int:
-        """How many columns of pixels there are."""
+        """Return the number of columns of pixels."""
         return self.width
 
     def getHeight(self) -> int:
-        """How many rows of pixels there are."""
+        """Return the number of rows of pixels."""
         return self.height
 
     def rotate(self, degreesCCwise: float) -> None:
@@ -206,7 +206,7 @@ class Pixel:
         self.setColor(Color(rgba))
 
     def getAlpha(self) -> int:
-        """How opaque it is, 0 to 255."""
+        """Return the opacity of the pixel, 0 to 255."""
         return self.getRGBA()[3]
 
     def setAlpha(self, alpha: float) -> None:
@@ -376,12 +376,12 @@ def _colored(function: str, value: object) -> Pixel | Color:
 
 
 def getWidth(picture: Picture) -> int:
-    """How many columns of pixels a picture has."""
+    """Return the number of columns of pixels of a picture."""
     return _a_picture("getWidth", picture).width
 
 
 def getHeight(picture: Picture) -> int:
-    """How many rows of pixels a picture has."""
+    """Return the number of rows of pixels of a picture."""
     return _a_picture("getHeight", picture).height
 
 
@@ -415,27 +415,27 @@ def getY(pixel: Pixel) -> int:
 
 
 def getRed(pixel: Pixel | Color) -> int:
-    """How red a pixel or a color is, 0 to 255."""
+    """Return the red value of a pixel or a color, 0 to 255."""
     return _colored("getRed", pixel).getRGB()[0]
 
 
 def getGreen(pixel: Pixel | Color) -> int:
-    """How green a pixel or a color is, 0 to 255."""
+    """Return the green value of a pixel or a color, 0 to 255."""
     return _colored("getGreen", pixel).getRGB()[1]
 
 
 def getBlue(pixel: Pixel | Color) -> int:
-    """How blue a pixel or a color is, 0 to 255."""
+    """Return the blue value of a pixel or a color, 0 to 255."""
     return _colored("getBlue", pixel).getRGB()[2]
 
 
 def getGray(pixel: Pixel | Color) -> int:
-    """How bright a pixel or a color is, 0 to 255: the mean of red, green and blue, rounded down."""
+    """Return the brightness of a pixel or a color, 0 to 255: the mean of red, green and blue, rounded down."""
     return sum(_colored("getGray", pixel).getRGB()) // 3
 
 
 def getAlpha(pixel: Pixel | Color) -> int:
-    """How opaque a pixel or a color is, 0 to 255."""
+    """Return the opacity of a pixel or a color, 0 to 255."""
     return _colored("getAlpha", pixel).getAlpha()
 
 

@@ -1,4 +1,4 @@
-"""What the robot senses."""
+"""The robot's sensors."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class Senses(Base):
     """Readings as the robot sends them; a list from left to right, or one where a position is given."""
 
     def getLight(self, *position: str | int) -> Any:
-        """How dark it is at the light sensors: 0 in bright light; the darker, the larger.
+        """Return the darkness at the light sensors: 0 in bright light; the darker, the larger.
 
         Args:
             position: "left", "center", "right", or 0, 1, 2; several give a list; none gives all three.
@@ -24,7 +24,7 @@ class Senses(Base):
         return self._picked("getLight", list(self._driven("light")), PLACES, position)
 
     def getIR(self, *position: str | int) -> Any:
-        """What the robot's own infrared sensors see: 1 nothing, 0 an obstacle.
+        """Return the readings of the robot's own infrared sensors: 1 nothing, 0 an obstacle.
 
         Args:
             position: "left", "right", or 0, 1; none gives both.
@@ -32,7 +32,7 @@ class Senses(Base):
         return self._picked("getIR", list(self._driven("ir")), _PAIR, position)
 
     def getLine(self, *position: str | int) -> Any:
-        """What the line sensors below the robot see: 1 dark, 0 light.
+        """Return the readings of the line sensors below the robot: 1 dark, 0 light.
 
         Args:
             position: "left", "right", or 0, 1; none gives both.
@@ -44,7 +44,7 @@ class Senses(Base):
         return int(self._driven("stall"))
 
     def getObstacle(self, position: str | int | None = None) -> Any:
-        """How strongly the Fluke's infrared comes back: 0 nothing, up to about 6400 very near.
+        """Return the strength of the Fluke's reflected infrared: 0 nothing, up to about 6400 very near.
 
         Args:
             position: "left", "center", "right", or 0, 1, 2; none gives all three. A Fluke 2 has one emitter and tells
@@ -53,7 +53,7 @@ class Senses(Base):
         return self._one_or_all("getObstacle", "obstacle", position)
 
     def getBright(self, position: str | int | None = None) -> Any:
-        """How bright the left, middle and right of the camera's picture are: the sum of their pixels.
+        """Return the brightness of the left, middle and right of the camera's picture: the sum of their pixels.
 
         Args:
             position: "left", "center", "right", or 0, 1, 2; none or "all" gives all three.
@@ -70,7 +70,7 @@ class Senses(Base):
         return float(self._driven("battery"))
 
     def getDistance(self, *position: str | int) -> Any:
-        """How near an obstacle is to the infrared sensors of a Scribbler 2: 0 touching, 99 nothing seen.
+        """Return the nearness of an obstacle to the infrared sensors of a Scribbler 2: 0 touching, 99 nothing seen.
 
         Args:
             position: "left", "right", or 0, 1; none gives both.
@@ -78,7 +78,7 @@ class Senses(Base):
         return self._picked("getDistance", list(self._driven("distance")), _PAIR, position)
 
     def getMicEnvelope(self) -> int:
-        """How loud it is at the microphone of a Scribbler 2."""
+        """Return the loudness at the microphone of a Scribbler 2."""
         return int(self._driven("mic_envelope"))
 
     def getAll(self) -> dict[str, Any]:
@@ -172,7 +172,7 @@ class Senses(Base):
         return str(self.driver.info.robot_version)
 
     def getInfo(self, *item: str) -> Any:
-        """What the robot says of itself, by name: "robot", "robot-version", "fluke", "mode"; and "myro", ours.
+        """Return the robot's identity by name: "robot", "robot-version", "fluke", "mode"; and "myro", ours.
 
         Args:
             item: Names of what is wanted; one gives its value, several a list, none all in a dictionary.

@@ -40,7 +40,7 @@ def parse_simulation(name: str) -> dict[str, Any]:
 
 
 class Simulation:
-    """A simulated Scribbler, open, and what an onlooker sees of it; printed, it is a map.
+    """An open simulated Scribbler, and a witness that records its true motion; printed, it is a map.
 
     Args:
         seed: Of its sensors' noise, and of a start by chance.
@@ -100,7 +100,7 @@ class Simulation:
         return self.speed is not None
 
     def pose(self) -> Pose:
-        """Where the robot is [m], and where the end looks that is ahead [rad]."""
+        """Return the position of the robot [m], and the direction of the end that is ahead [rad]."""
         return Pose(*self.witness.pose())
 
     def cells(self) -> tuple[int, ...]:

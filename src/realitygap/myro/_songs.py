@@ -65,7 +65,7 @@ def getNoteFromFrequency(hz: float) -> str:
 
 
 def makeSong(text: str) -> list[Note]:
-    """A song from text: notes between semicolons or on lines of their own, as "C 1/4; E G 1/4; pause .5".
+    """Return a song from text: notes between semicolons or on separate lines, as "C 1/4; E G 1/4; pause .5".
 
     Args:
         text: Each note has a name (or a frequency), perhaps a second one, and the part of a whole note that it lasts

@@ -19,13 +19,13 @@ _PIECE = 5.0  # the longest tone in one command [s]; a longer one is played in p
 
 
 class Plays:
-    """Whoever can play a tone can play notes and songs."""
+    """A player of tones, which can also play notes and songs."""
 
     def _tone(self, duration: float, hz: float, hz2: float | None) -> None:
         raise NotImplementedError
 
     def beep(self, duration: Any = 0.5, frequency1: Any = None, frequency2: Any = None) -> None:
-        """Play a tone and go on when it has ended.
+        """Play a tone and return when it has ended.
 
         Args:
             duration: How long [s]; a list of frequencies here plays each for half a second.

@@ -1,4 +1,4 @@
-"""What is said aloud in Myro is printed here; stories and a guessing game."""
+"""Myro's speech, printed here instead of spoken; stories and a guessing game."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from ._ask import ask
 
 
 def speak(message: object, async_: bool = False) -> None:
-    """Print what the computer would say: no voice comes with realitygap, and thirty at once help nobody.
+    """Print the text to speak: no voice comes with realitygap, and thirty voices together help nobody.
 
     Args:
         message: What to say.
@@ -19,7 +19,7 @@ def speak(message: object, async_: bool = False) -> None:
 
 
 def stopSpeaking() -> None:
-    """Do nothing: what `speak` prints is said at once."""
+    """Do nothing: `speak` prints its text immediately."""
 
 
 def makeStory(story: str) -> str:

@@ -42,7 +42,7 @@ def loop(*functions: Any) -> str:
 
 
 def doTogether(*functions: Callable[[], Any]) -> list[Any] | None:
-    """Run two or more functions at the same time: `doTogether(drive, sing)`; goes on when all have ended.
+    """Run two or more functions at the same time: `doTogether(drive, sing)`; return when all have ended.
 
     The robot still does one thing after another: where one function plays a tone, the other waits for the robot. On a
     simulated robot with `speed="off"` the times of all functions add up.

@@ -1,4 +1,4 @@
-"""The simulated robot as an onlooker sees it: live in a notebook, or a map of letters in a terminal."""
+"""The view of a simulated robot from outside: live in a notebook, or a map of letters in a terminal."""
 
 from __future__ import annotations
 
@@ -120,7 +120,7 @@ class NotebookView:
 
 
 def _screen(svg: str) -> Any:
-    """What shows an SVG, and each one after it in the same place."""
+    """Return a function that shows an SVG, and each later one in the same place."""
     from IPython.display import HTML, display
 
     try:

@@ -1,4 +1,4 @@
-"""What is rewarded."""
+"""Tasks: the rewards of trials and the inputs of networks."""
 
 from ._allowed import is_allowed, remember_allowed, source_hash
 from ._avoid import AvoidTask

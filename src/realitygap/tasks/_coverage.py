@@ -19,7 +19,7 @@ PAPER_INPUTS = ("obstacle", "stall", "time")
 
 
 class CoverageTask(Settings):
-    """What is counted and what the network is told.
+    """A task that rewards the cells that a robot visits.
 
     Source: Rosenzweig & Remy, sections 2.1 and 2.4.
     """
@@ -82,5 +82,5 @@ class CoverageTask(Settings):
         return self.bias_input == "always"
 
     def input_names(self, selection: str) -> tuple[str, ...]:
-        """What the network's inputs are, in order."""
+        """Return the names of the network's inputs, in order."""
         return (*self.inputs, *(("bias",) if self.has_bias_input(selection) else ()))

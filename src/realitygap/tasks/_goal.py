@@ -19,7 +19,7 @@ from ._trajectories import Trajectories
 
 
 class GoalTask(StepTask):
-    """How much of the way to the arena's goal was made good at the end: 1 - d / d0, or 1 where it was reached.
+    """A task that rewards the distance to the goal covered by the end: 1 - d / d0, or 1 if it was reached.
 
     d is the straight distance from the goal at the end and d0 that at the start, whatever walls stand between; reached
     is nearer than the goal's radius at the start or the end of any step. With `selection = "novelty"` and the distance

@@ -18,7 +18,7 @@ from ._trajectories import Trajectories
 
 
 class LightTask(StepTask):
-    """How near to the nearest light a robot was on the whole, less what it spent blocked, 0 to 1.
+    """A task that rewards the mean nearness to the nearest light, reduced by the time spent blocked, 0 to 1.
 
     At each step 1 - d / d0, at least 0, with d the distance to the nearest light and d0 that of the start; its mean
     over steps, times the share of steps that were not blocked.

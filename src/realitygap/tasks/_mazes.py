@@ -43,7 +43,7 @@ class MazeAgent:
 
     @property
     def input_names(self) -> tuple[str, ...]:
-        """What the network's inputs are, in order."""
+        """Return the names of the network's inputs, in order."""
         ranges = tuple(f"range.{k}" for k in range(len(self.rays)))
         return (*ranges, "goal.ahead", "goal.left", "goal.behind", "goal.right", "bias")
 

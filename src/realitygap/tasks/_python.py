@@ -245,7 +245,7 @@ def _failed(task: PythonTask, error: Exception) -> str:
 
 
 def _line_of(error: Exception, shown_as: str) -> str:
-    """Where in the file it happened; nothing where it did not happen there."""
+    """Return the line of the file at which the error occurred, or an empty string if it occurred elsewhere."""
     if isinstance(error, SyntaxError) and error.filename == shown_as:
         return f"line {error.lineno}: "
     lines = [

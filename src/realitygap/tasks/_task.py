@@ -1,4 +1,4 @@
-"""The contract of a task: what the networks are told, and what their trials are worth."""
+"""The contract of a task: the inputs of the networks and the scores of their trials."""
 
 from __future__ import annotations
 
@@ -15,7 +15,9 @@ from ._trajectories import Trajectories
 
 @runtime_checkable
 class Task(Protocol):
-    """What is rewarded. A task of a study file is also a `Settings`, whose values enter the condition's hash.
+    """A task, which rewards trials.
+
+    A task of a study file is also a `Settings`, whose values enter the condition's hash.
 
     `fitness` is a function of the trials alone: the same trials are worth the same, whatever else is tried in the
     same call.

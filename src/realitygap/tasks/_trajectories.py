@@ -1,4 +1,4 @@
-"""Trials step by step, many at once: what a task rewards and what films show."""
+"""The steps of many trials as arrays, for the scores of tasks and for films."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from realitygap.world import Arena
 
 
 class TraceArrays(NamedTuple):
-    """What kernels keep of n trials of t steps, in the precision of the trials; row 0 is the start.
+    """The arrays that kernels save of n trials of t steps, in the precision of the trials; row 0 is the start.
 
     A compiled task reads these: nothing is converted or copied for it.
     """
@@ -61,7 +61,7 @@ class Trajectories:
     drawn: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
 
     def __len__(self) -> int:
-        """How many trials."""
+        """Return the number of trials."""
         return int(self.arrays.stalled.shape[1])
 
     def number(self, name: str, value: float) -> NDArray[np.float64]:

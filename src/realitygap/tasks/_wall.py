@@ -23,7 +23,7 @@ WALL_SIDES = {"left": 1.0, "right": -1.0}
 
 
 class WallTask(StepTask):
-    """How far a robot went along walls that it had near and on one side [m].
+    """A task that rewards the distance driven along walls that are near and on one side of the robot [m].
 
     A step counts with its part along the nearest wall or obstacle: forward with that on the right side, backward with
     it on the wrong one. So going to and fro, or round in a circle, adds up to nothing.

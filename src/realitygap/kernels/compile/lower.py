@@ -161,7 +161,7 @@ class LowerKernel(NativeLowering):
 
     @property
     def lowering_class(self) -> Any:
-        """What lowers the instructions."""
+        """Return the class that lowers the instructions."""
         return functools.partial(_lowering, isinstance(self, LowerForCallers))
 
     def run_pass(self, state: Any) -> bool:

@@ -1,4 +1,4 @@
-"""Many robots at once, each given one command a step from outside; what a trial does, one step at a time.
+"""Many robots in parallel, each given one command a step from outside: a trial, one step at a time.
 
 The stages are those of `trial.py`, so that robots under the commands of networks drive the trials of
 `run_trials`, bit for bit. A fleet is blocks of lanes, whose states are kept; room is shared.
@@ -144,7 +144,7 @@ def start_robots(scene, rules, fleet, counters, cells, counts):
 
 @kernel
 def observe_robots(rules, fleet, key, step, observations):
-    """What the networks of all robots would see before a step.
+    """Write the inputs that the networks of all robots would have before a step.
 
     Args:
         rules, fleet: How, and who.
@@ -167,7 +167,7 @@ def observe_robots(rules, fleet, key, step, observations):
 
 @kernel
 def read_robots(rules, fleet, key, step, readings):
-    """What each sensor of all robots reads before a step; the largest of a robot is what `observe_robots` sees.
+    """Write each sensor's reading of all robots before a step; `observe_robots` has the largest of each robot.
 
     Args:
         rules, fleet: How, and who.
@@ -190,7 +190,7 @@ def read_robots(rules, fleet, key, step, readings):
 
 @kernel
 def step_robots(scene, fleet, commands, cells, counts):
-    """Carry out one command of each robot.
+    """Execute one command of each robot.
 
     Args:
         scene, fleet: Where, and who.

@@ -85,7 +85,7 @@ def make_run_room(scene, neat, rules, n_runs, room, hidden_room):
 
 @kernel
 def run_replicates(scene, trial, neat, rules, key, first_replicate, room, rows):
-    """Carry out one run for each place of `rows`, replicate `first_replicate` and on.
+    """Run one run for each place of `rows`, from replicate `first_replicate` upward.
 
     Runs go forward together, a block of them at a time, so that their trials fill the lanes. What comes of
     one does not depend on the others.

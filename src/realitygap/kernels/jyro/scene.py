@@ -55,7 +55,7 @@ _SPLITTER = float(2**27 + 1)  # Dekker's: splits a float64 into two halves of 26
 
 
 class Standing(NamedTuple):
-    """What is in the way at one moment. Letters: w walls, e edges of all bodies, r robots.
+    """The lines in the way at one moment. Letters: w walls, e edges of all bodies, r robots.
 
     Attributes:
         walls: (w, 6) lines.
@@ -71,7 +71,7 @@ class Standing(NamedTuple):
 
 
 class Scene(NamedTuple):
-    """What does not change while a scene runs. Letters: w walls, l lights, r robots, e edges, s sensors.
+    """The constant parts of a running scene. Letters: w walls, l lights, r robots, e edges, s sensors.
 
     A field that ends in `_rows` says where the part of each robot begins: the edges of robot i are
     `edges[edge_rows[i]:edge_rows[i + 1]]`.
@@ -272,7 +272,7 @@ def move_robot(standing, robot, edges, pose, speed, sideways, turn_rate, dt):
 
 @maker
 def cast_ray(standing, robot, px, py, angle, reach, stops):
-    """What a ray from P meets first: (distance [m] or inf, which line or -1); lines of bodies count on from the walls.
+    """Return the line that a ray from P meets first: (distance [m] or inf, index or -1); body lines follow walls.
 
     `angle` is clockwise from +y [rad]. A negative reach points backward and meets nothing. `stops` is a sum of
     WALLS, OWN_BODY and OTHER_BODIES.
@@ -297,7 +297,7 @@ def cast_ray(standing, robot, px, py, angle, reach, stops):
 
 @maker
 def look_along(standing, robot, pose, mount, reach):
-    """What the ray of a mount (3,) on a robot meets within `reach` [m]: (distance or inf, which line or -1)."""
+    """Return the line that the ray of a mount (3,) meets first within `reach` [m]: (distance or inf, index or -1)."""
     turned = pose[2] + _HALF_PI
     cos = math.cos(turned)
     sin = math.sin(turned)
@@ -308,7 +308,7 @@ def look_along(standing, robot, pose, mount, reach):
 
 @kernel
 def light_falloff(sensor, distance, reach):
-    """How much of a light's brightness arrives over a distance [m], by the sensor's mode: 0..1."""
+    """Return the share of a light's brightness that arrives over a distance [m], by the sensor's mode: 0..1."""
     if sensor == SENSOR_LIGHT_LINEAR:
         return 1.0 - min(distance, reach) / reach
     part = min(max(distance, LIGHT_NEAREST), reach) / reach
@@ -430,7 +430,7 @@ def first_weights(scene):
 
 @maker
 def run_scene(scene: Scene, dt: float, n_steps: int) -> tuple[FLOATS, FLOATS, INTS, FLOATS, FLOATS, FLOATS]:
-    """What happens in a scene, step by step; row 0 is the start.
+    """Return the events of a scene, step by step; row 0 is the start.
 
     All robots decide on the readings after the step before; they move one after the other, later ones
     meeting the earlier ones at their new poses; then all sensors are read.

@@ -31,7 +31,7 @@ from .walls import gap_to_planes, sense_planes, sense_segments, touch_segments
 
 
 class TrialScene(NamedTuple):
-    """Where and with what body trials take place, in the precision of the trials; lengths [m] from the start."""
+    """The place and the body of trials, in the precision of the trials; lengths [m] from the start."""
 
     walls: NDArray[np.floating]  # (w, 4) x1, y1, x2, y2
     normals: NDArray[np.floating]  # (w, 3) unit normal into the room and offset of each wall's line
@@ -50,7 +50,7 @@ INPUTS = {"obstacle": OBSTACLE, "stall": STALL, "time": TIME, "bias": BIAS, "ran
 
 
 class TrialRules(NamedTuple):
-    """How trials are run. The arrays have one number for all trials, or one for each."""
+    """The rules of trials. The arrays have one number for all trials, or one for each."""
 
     n_steps: int
     clip: bool  # whether a noisy reading is limited to 0..1
@@ -66,7 +66,7 @@ class TrialRules(NamedTuple):
 
 
 class Trace(NamedTuple):
-    """What happened step by step in the first k trials; row 0 is the start. Arrays of no rows keep nothing."""
+    """The steps of the first k trials; row 0 is the start. Arrays of no rows record nothing."""
 
     poses: NDArray[np.floating]  # (t + 1, 3, k)
     readings: NDArray[np.floating]  # (t + 1, s, k) parts of the range, without noise
@@ -116,7 +116,7 @@ def _larger_noisy(fraction, words, noise, clip, value):
 
 @stage
 def largest_noisy_readings(fractions, noise, clip, step, counters, key, words, value):
-    """What networks see of the obstacle sensors: the largest of the inverted, noisy readings.
+    """Compute the networks' view of the obstacle sensors: the largest of the inverted, noisy readings.
 
     Each reading becomes (R - d) / R and is moved by noise * U(-1, 1); then the largest is taken (the paper,
     section 2.3). With several sensors and noise this has a mean above that of one. Sensor k takes number k of
@@ -184,7 +184,7 @@ def wheels_to_commands(left, right, move, turn):
 
 @stage
 def propose(move, turn, step_length, step_turn, pose, proposed):
-    """Where a step would end: along the old heading, then turned."""
+    """Compute the pose that a step would end at: along the old heading, then turned."""
     x, y, heading, sine, cosine = pose.x, pose.y, pose.heading, pose.sine, pose.cosine
     to_x, to_y, to_heading = proposed.x, proposed.y, proposed.heading
     to_sine, to_cosine = proposed.sine, proposed.cosine
@@ -265,7 +265,7 @@ def observe(scene, rules, key, lanes, step):
 
 @stage
 def move(scene, lanes, ahead, turn):
-    """Carry out commands (LANES,), limited to -1..1, where nothing is in the way."""
+    """Execute commands (LANES,), limited to -1..1, where nothing is in the way."""
     propose(ahead, turn, lanes.step_length, lanes.step_turn, lanes.pose, lanes.proposed)
     if scene.is_enclosed:
         gap_to_planes(scene.normals, scene.body, lanes.proposed, lanes.seen, lanes.low)
@@ -350,7 +350,7 @@ def _keep(trace, lanes, neat, step, first, n_lanes):
 
 
 def make_trace(like, n_sensors, n_inputs, n_steps, n_kept):
-    """Room for the steps of so many trials; `n_steps` < 0: for none."""
+    """Return room for the steps of `n_kept` trials; `n_steps` < 0: for none."""
     real = like.dtype
     return Trace(
         np.zeros((n_steps + 1, 3, n_kept), real),
@@ -393,7 +393,7 @@ def _list(scene, lanes, n_lanes, cells, first):
 
 
 def make_block(scene, neat, hidden_room):
-    """Room for a block of trials of networks with so many hidden nodes: lanes and wiring."""
+    """Return room for a block of trials of networks with `hidden_room` hidden nodes: lanes and wiring."""
     n_nodes = neat.n_inputs + neat.n_outputs + hidden_room
     lanes = make_lanes(scene.heading, scene.sensors.shape[0], n_nodes, scene.columns, scene.rows)
     return lanes, make_wiring(scene.heading, neat, hidden_room)
@@ -430,7 +430,7 @@ def run_block(scene, rules, neat, wiring, key, counters, first, n_lanes, lanes, 
 def run_trials(
     scene, rules, neat, networks, rows, key, counters, lanes, wiring, cells, ends, ended, counts, trace
 ):
-    """Carry out n trials, a block after the other.
+    """Run n trials, one block after the other.
 
     Args:
         scene, rules, neat: Where, how, and how networks are activated.

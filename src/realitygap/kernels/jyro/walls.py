@@ -53,7 +53,7 @@ def gap_to_planes(normals, body, pose, seen, low):
 
 @stage
 def sense_planes(normals, sensors, sensor_range, pose, seen, fractions, rates):
-    """How far along its ray each sensor meets the nearest wall, 0..1.
+    """Compute the distance along each sensor's ray to the nearest wall, 0..1.
 
     Args:
         normals, pose, seen: As in `gap_to_planes`.

@@ -27,7 +27,7 @@ if numba.config.DISABLE_JIT:
         return int(word).bit_length() - 1
 
     def count_bits(word: Any) -> Any:
-        """How many bits of an int32 are set, which is not below zero."""
+        """Return the number of bits set in an int32 that is not below zero."""
         return int(word).bit_count()
 
     def power_of_two(exponent: Any) -> Any:
@@ -82,7 +82,7 @@ else:
 
     @intrinsic
     def count_bits(context, word):
-        """How many bits of an int32 are set, which is not below zero."""
+        """Return the number of bits set in an int32 that is not below zero."""
 
         def generate(context, builder, signature, arguments):
             return builder.zext(builder.ctpop(arguments[0]), ir.IntType(64))

@@ -41,7 +41,7 @@ def words_of(columns):
 
 
 class Poses(NamedTuple):
-    """Where robots are: [m] from the start, whole turns counter-clockwise from +x."""
+    """The poses of robots: [m] from the start, whole turns counter-clockwise from +x."""
 
     x: Row
     y: Row

@@ -26,7 +26,7 @@ RANDOM = 3
 
 
 class RunRules(NamedTuple):
-    """What a run selects for, and for how long."""
+    """The settings of a run: its length, its population and its selection."""
 
     n_generations: int
     population: int
@@ -42,7 +42,7 @@ class RunRules(NamedTuple):
 
 
 class RunRows(NamedTuple):
-    """What r runs of g generations of n individuals leave behind, with room for genomes."""
+    """The results of r runs of g generations of n individuals, with room for genomes."""
 
     fitness: NDArray[np.float64]  # (r, g, n)
     novelty: NDArray[np.float64]  # (r, g, n) NaN where selection is not novelty
@@ -66,7 +66,7 @@ class RunRows(NamedTuple):
 
 
 class Runs(NamedTuple):
-    """What a block of r runs of n individuals knows beside its genomes."""
+    """The state of a block of r runs of n individuals, without their genomes."""
 
     species_of: NDArray[np.int32]  # (r, n)
     parents: NDArray[np.int32]  # (r, n, 2)

@@ -77,7 +77,7 @@ def make_measure(kind, columns, rows, by_column):
 
 
 def make_behaviors(n, cells):
-    """Room for n behaviors in a grid of so many cells."""
+    """Return room for n behaviors in a grid of `cells` cells."""
     return Behaviors(np.zeros((n, cells), np.int32), np.zeros(n, np.int32), np.zeros((n, 2)))
 
 

@@ -89,7 +89,7 @@ class NeatRules(NamedTuple):
 
 
 def _count_first_numbers(rules):
-    """How many numbers the links have that a start can have; one between hidden nodes leads to the later one."""
+    """Return the count of innovation numbers of a start's links; one between hidden nodes leads to the later one."""
     h = rules.start_hidden
     return rules.n_inputs * rules.n_outputs + h * (rules.n_inputs + rules.n_outputs) + h * (h - 1) // 2
 
@@ -98,7 +98,7 @@ first_number_after_start = inlined(_count_first_numbers)
 
 
 def make_genomes(n, n_outputs, room, hidden_room):
-    """Empty genomes of n individuals with room for so many connection genes and hidden nodes."""
+    """Return empty genomes of n individuals with room for `room` connection genes and `hidden_room` hidden nodes."""
     return Genomes(
         np.zeros(n, np.int32),
         np.zeros(n, np.int32),
@@ -117,7 +117,7 @@ def make_genomes(n, n_outputs, room, hidden_room):
 
 @inlined
 def next_uniform(stream, cursor):
-    """The next number of a stream; `cursor` holds how many were taken, and four words drawn at once."""
+    """Return the next number of a stream; `cursor` holds the count taken, and four words drawn together."""
     index = cursor[0]
     cursor[0] = index + 1
     if index & 3 == 0:

@@ -23,7 +23,7 @@ from .genome import (
 
 
 class Innovations(NamedTuple):
-    """What arose in this generation, so that the same structure gets the same numbers (EC02, section 3.2).
+    """The innovations of this generation, so that the same structure gets the same numbers (EC02, section 3.2).
 
     `counters` holds the next innovation number, the next node id, and how many links and splits this
     generation has seen so far; the first two go on counting for the whole run.
@@ -70,7 +70,7 @@ def make_innovations(rules, n):
 
 @inlined
 def start_generation(innovations):
-    """Forget what arose in the generation before; the counters go on."""
+    """Forget the innovations of the generation before; the counters continue."""
     innovations.counters[N_LINKS] = 0
     innovations.counters[N_SPLITS] = 0
 
@@ -93,7 +93,7 @@ def number_of_link(innovations, source, target):
 
 @inlined
 def place_of_split(innovations, gene_number):
-    """Where the split of a gene is listed: as known in this generation, or newly."""
+    """Return the place at which the split of a gene is listed: as known in this generation, or newly."""
     n = innovations.counters[N_SPLITS]
     for k in range(n):
         if innovations.split_gene[k] == gene_number:

@@ -125,7 +125,7 @@ def paper_archive_step(behaviors, measure, archive, above_all, novelty):
 
 @kernel
 def mean_of_nearest(distance, n, nearest):
-    """Mean of the smallest of n distances (Lehman & Stanley 2011, sparseness); 0 where there is none.
+    """Return the mean of the smallest of n distances (Lehman & Stanley 2011, sparseness); 0 if there are no distances.
 
     Args:
         distance: (>= n,) to everyone that counts; negative for the individual itself.

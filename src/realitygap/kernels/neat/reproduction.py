@@ -87,7 +87,7 @@ def round_to_sum(share, total, count, rest):
 
 @inlined
 def share_offspring(fitness, species_of, species, rules, generation, offspring):
-    """How many children each species has; they add up to the size of the population.
+    """Compute the number of children of each species; they add up to the size of the population.
 
     A species' share is the mean fitness of its members (that is explicit fitness sharing). One whose best
     fitness has not risen for `stagnation` generations counts with `stagnation_factor`; when the whole

@@ -30,7 +30,7 @@ class Wiring(NamedTuple):
 
 
 def make_wiring(like, rules, hidden_room):
-    """Room for networks with so many hidden nodes, in the precision of the array `like`."""
+    """Return room for networks with `hidden_room` hidden nodes, in the precision of the array `like`."""
     active = rules.n_outputs + hidden_room
     nodes = rules.n_inputs + active
     return Wiring(

@@ -1,4 +1,4 @@
-"""What happens to a body that meets a wall or an obstacle, in lanes.
+"""The response of a body that meets a wall or an obstacle, in lanes.
 
 `freeze`: the whole step is refused (Jyro). `stop`: translation is refused, turning goes on where the body allows it.
 `slide`: the body is pushed free of the deepest two contacts, and turns and skids along them (`_sim_push`).
@@ -140,7 +140,7 @@ def _judge(reach, length, turn, went, turned, low, stall):
 
 @kernel
 def _push(shape, p, seconds, parts, near):
-    """Push bodies free of what they touch after one of so many parts of a motion."""
+    """Push bodies free of the things that they touch after one of `parts` parts of a motion."""
     row = shape.row_contact
     unsaturated(p, row, near.give)
     times = N_SECANTS if any_above_zero(p[row + SATURATION]) else 0
@@ -178,7 +178,7 @@ def _leave_free(near, sweep):
 
 @kernel
 def _resolve(shape, lanes, near):
-    """Carry out a step of robots that may touch something.
+    """Execute a step of robots that may touch something.
 
     In parts; in each of them, and once more at the end, the bodies give way until nothing touches, or long enough.
     All is one loop for the sake of a single place that asks what touches: that is most of the code.
@@ -259,7 +259,7 @@ def _begin(flag, low):
 
 @stage
 def _end(flag, touched, stall, axle, pose, low, proposed):
-    """Where flagged robots that touched something are after the step; 0 to `low` where they stall, 1 elsewhere."""
+    """Write the poses after the step of flagged robots that touched something; 0 to `low` if they stall, else 1."""
     real = low.dtype.type
     x, y, heading = pose.x, pose.y, pose.heading
     to_x, to_y, to_heading = proposed.x, proposed.y, proposed.heading
@@ -286,7 +286,7 @@ def _end(flag, touched, stall, axle, pose, low, proposed):
 
 @kernel
 def _meet(shape, lanes, near):
-    """Carry out the step of the lanes flagged in the first row of `spare`."""
+    """Execute the step of the lanes flagged in the first row of `spare`."""
     flag, axle = lanes.spare[0], lanes.p[shape.row_drive + AXLE]
     if not any_above_zero(flag):
         return

@@ -1,4 +1,4 @@
-"""Several robots of the platform `sim` in one arena: each is a trial of its own, in which the others are obstacles.
+"""Several robots of the platform `sim` in one arena: each is a separate trial, with the others as obstacles.
 
 A step of one robot is that of `_sim.step_sim` in two parts, so that all can move before any of them looks.
 """
@@ -51,5 +51,5 @@ def move_sim(shape, rules, key, room, cells, step, commands):
 
 @kernel
 def look_sim(shape, rules, key, room, step):
-    """What its sensors answer before a step, into `room.lanes.readings`; after a step the second part of `step_sim`."""
+    """Write the readings before a step to `room.lanes.readings`; after a step the second part of `step_sim`."""
     sense(shape, rules, key, room.lanes, step)

@@ -141,7 +141,7 @@ def _ask(shape, rules, lanes, step):
 
 @stage
 def _wait(words, delay, jitter, seconds, steps, late, rest):
-    """How many whole steps commands are late, and the time left of the old one in this step."""
+    """Compute the number of whole steps by which commands are late, and the time left of the old one in this step."""
     real = rest.dtype.type
     for lane in range(LANES):
         odd = np.int32(np.int32(words[lane] >> np.uint32(8)) * np.int32(2) + np.int32(1 - (1 << 24)))
@@ -165,7 +165,7 @@ def _pick(late, place, asked, picked):
 
 @stage
 def _fade(lag, time, rest):
-    """What is left of a difference in speed after a time, 0..1."""
+    """Compute the share of a difference in speed that is left after a time, 0..1."""
     real = rest.dtype.type
     for lane in range(LANES):
         slow = lag[lane] if lag[lane] > real(LEAST_LAG) else real(LEAST_LAG)
@@ -363,7 +363,7 @@ def _go(lanes, row, left, right, time, rises, left_way, right_way):
 
 @stage
 def plan(shape, rules, key, lanes, step):
-    """What the commands of a step ask of the body, into `lanes.moved`; wheels and their speeds go on.
+    """Compute the motion that a step's commands ask for, into `lanes.moved`; wheels and their speeds continue.
 
     Args:
         shape, rules, key: Structure, how trials are run, and of the random numbers.
@@ -428,7 +428,7 @@ def plan(shape, rules, key, lanes, step):
 
 @inlined
 def arc_step(length, turn, heading, sine, cosine):
-    """How far a point that drives an arc gets, and its heading there with sine and cosine.
+    """Return the displacement of a point that drives an arc, and its heading there with sine and cosine.
 
     It gets length * sin(h) / h, h being half the turn [rad], in the direction halfway.
     """
@@ -449,7 +449,7 @@ def arc_step(length, turn, heading, sine, cosine):
 
 @stage
 def _face(pose):
-    """Sines and cosines anew from the headings, so that errors do not add up over steps."""
+    """Recompute sines and cosines from the headings, so that errors do not add up over steps."""
     heading, sine, cosine = pose.heading, pose.sine, pose.cosine
     for lane in range(LANES):
         s, c = sin_cos_of(heading[lane])
@@ -505,7 +505,7 @@ def _straight_then_turn(length, turn, axle, pose, proposed):
 
 @stage
 def drive(shape, rules, key, lanes, step):
-    """Where the commands of a step would carry the robots, if nothing is in the way, into `lanes.proposed`.
+    """Compute the poses to which a step would carry the robots, if nothing is in the way, into `lanes.proposed`.
 
     Commands that are a speed and a turn rate have the body go along its old heading, and then turn, as Jyro's
     do; wheels have it drive an arc.

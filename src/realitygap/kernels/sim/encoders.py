@@ -71,7 +71,7 @@ def reckon(left, right, track, axle, drift, reckoned):
 
 @stage
 def as_input(step, speed, step_s, value):
-    """What a network sees of an encoder: the last step's count as a part of that at full speed, limited to -1..1."""
+    """Compute an encoder's input to a network: the last step's count as a part of full speed, limited to -1..1."""
     real = value.dtype.type
     for lane in range(LANES):
         full = speed[lane] * real(step_s)

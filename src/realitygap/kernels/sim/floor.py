@@ -17,7 +17,7 @@ from realitygap.kernels.math.lanes import LANES
 
 @stage
 def place_point(mount_x, mount_y, pose, to_x, to_y):
-    """Where a point of the body is in the arena [m]."""
+    """Compute the position of a point of the body in the arena [m]."""
     x, y, sine, cosine = pose.x, pose.y, pose.sine, pose.cosine
     for lane in range(LANES):
         to_x[lane] = x[lane] + mount_x[lane] * cosine[lane] - mount_y[lane] * sine[lane]

@@ -1,4 +1,4 @@
-"""Where the goal is as a robot sees it, whatever stands between: in which quarter around it, and how far.
+"""The goal as a robot senses it, even through obstacles: its quarter around the robot, and its distance.
 
 Source: Lehman & Stanley (2011), the four pie-slice sensors; the distance is ours.
 """
@@ -41,7 +41,7 @@ def see_goal_sector(goal_x, goal_y, sector, pose, value):
 
 @stage
 def see_goal_distance(goal_x, goal_y, start_x, start_y, pose, value):
-    """How far the goal is as a part of its distance from the start, at most 1; 1 where that is 0.
+    """Compute the distance to the goal as a part of its distance from the start, at most 1; 1 if that is 0.
 
     Args:
         goal_x, goal_y, start_x, start_y: (LANES,) [m].

@@ -20,7 +20,7 @@ N_SPARE = 24  # rows for what stages work out on the way
 
 
 class SimRules(NamedTuple):
-    """How the trials of a call are run."""
+    """The rules of the trials of a call."""
 
     n_steps: int
     step_s: float  # how long a command lasts [s]
@@ -79,7 +79,7 @@ class SimRoom(NamedTuple):
 
 
 class Contact(NamedTuple):
-    """Where bodies are met, in the frames of their axles."""
+    """The contacts of bodies, in the frames of their axles."""
 
     gap: Row  # [m]
     facing: Row  # the normal, towards the body: ahead and left
@@ -90,7 +90,7 @@ class Contact(NamedTuple):
 
 
 class Near(NamedTuple):
-    """What contact works out for a block of trials in a step. Poses are of the axle."""
+    """The results of contact for a block of trials in a step. Poses are of the axle."""
 
     pose: Poses
     before: Poses  # at the beginning of a part of the step
@@ -111,7 +111,7 @@ class Near(NamedTuple):
 
 
 class SimTrace(NamedTuple):
-    """What happened step by step in the first k trials; row 0 is the start. Arrays of no rows keep nothing."""
+    """The steps of the first k trials; row 0 is the start. Arrays of no rows record nothing."""
 
     poses: NDArray[np.floating]  # (t + 1, 3, k) x, y [m from the origin], heading [turns]
     readings: NDArray[np.floating]  # (t + 1, s, k) with their noise, 0..1
@@ -174,7 +174,7 @@ def make_near(shape, dtype):
 
 
 def make_sim_room(shape, neat, hidden_room, dtype):
-    """Room for a block of trials with networks of so many hidden nodes, in a precision."""
+    """Return room for a block of trials with networks of `hidden_room` hidden nodes, in a precision."""
     n_nodes = neat.n_inputs + neat.n_outputs + hidden_room
     words = shape.rows * -(-shape.columns // 32)
     n_rays = int(shape.first_ray[-1])

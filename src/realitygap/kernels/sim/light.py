@@ -38,7 +38,7 @@ def prepare_light(direction, width, cosine, sine, edge, scale):
 
 @stage
 def look_to(light_x, light_y, mount_x, mount_y, pose, ahead, left, distance):
-    """Where a light is as seen from a mount: unit vector in the body's frame, and distance [m].
+    """Compute the direction and the distance [m] of a light from a mount: unit vector in the body's frame.
 
     Args:
         light_x, light_y: (LANES,) [m].

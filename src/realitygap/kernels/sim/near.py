@@ -188,7 +188,7 @@ def look_ahead(first, second, reach, axle, pose, from_x, from_y, far):
 
 @stage
 def sizes_asked(asked, around, reach, length, turn):
-    """What a part of a step asks for, as lengths [m]: straight on, and of the farthest point by turning."""
+    """Add the lengths that a part of a step asks for [m]: straight on, and of the farthest point by turning."""
     real = length.dtype.type
     for lane in range(LANES):
         length[lane] = length[lane] + abs(asked[lane])

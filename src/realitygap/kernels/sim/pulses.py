@@ -17,7 +17,7 @@ from realitygap.kernels.math.lanes import LANES
 
 @inlined
 def pulse_words(pulses):
-    """Random words of a reading of so many pulses: one for the burst, half a word a pulse."""
+    """Return the number of random words of a reading of `pulses` pulses: one for the burst, half a word a pulse."""
     return 1 + ((pulses + 1) >> 1)
 
 

@@ -1,4 +1,4 @@
-"""How far bodies that touch something give way, in lanes: the physics of a push.
+"""The physics of a push: the motion of bodies that touch something and give way, in lanes.
 
 At the deepest two contacts the wall pushes along its normal n and rubs along its tangent t; the body gives way along
 A * wrench, until it is free. While its wheels grip the more the more they slip, A = diag(long, lat, ang) in the frame
@@ -30,7 +30,7 @@ SHORTEST = 1e-6  # time of a part in which anything slips [s]
 
 @inlined
 def _held_up(deep, slip, friction, nn, tt, nt):
-    """By how much a contact pushes and rubs, to be free of what is `deep` and of slip as far as friction can.
+    """Return the push and the rub of a contact that free it of `deep`, and of `slip` as far as friction can.
 
     Args:
         deep, slip: What the body is to be moved along the normal, and has slipped along the tangent [m].
@@ -57,7 +57,7 @@ def _held_up(deep, slip, friction, nn, tt, nt):
 
 @inlined
 def _gives(along, across, around, both, a, b, turn_n, turn_t):
-    """What a body gives along a contact's normal by it, along its tangent by that, and along either by the other.
+    """Return a body's motion along a contact's normal by it, along its tangent by that, and along either by the other.
 
     Args:
         along, across, around, both: Motion by a force of 1 ahead and by one to the left, turn by a torque of 1 and by
@@ -74,7 +74,7 @@ def _gives(along, across, around, both, a, b, turn_n, turn_t):
 
 @inlined
 def _moves(along, across, around, both, ahead, aside, torque):
-    """How a body moves by a wrench."""
+    """Return the motion of a body by a wrench."""
     return along * ahead + both * torque, across * aside, around * torque + both * ahead
 
 
@@ -89,7 +89,7 @@ def _between(angle):
 
 @stage
 def unsaturated(p, row, give):
-    """What a body gives while its wheels' grip grows with their slip: along, across, around, and around by along."""
+    """Compute a body's give while its wheels' grip grows with slip: along, across, around, and around by along."""
     long, lat, ang = p[row + LONG], p[row + LAT], p[row + ANG]
     along, across, around, both = give[0], give[1], give[2], give[3]
     real = both.dtype.type
@@ -102,7 +102,7 @@ def unsaturated(p, row, give):
 
 @stage
 def saturated(p, row, seconds, parts, moved, give):
-    """What it gives where its wheels slipped as far as a push moved it: the more each has, the less it holds.
+    """Compute the give with wheels that slipped as far as a push moved them: the more each slips, the less it holds.
 
     A wheel's grip is slip / sqrt(1 + (saturation * speed of slip) ** 2), slip to the side counting sqrt(long / lat)
     times, as it does where nothing gives out; here it is the secant to the slip that there was, which makes the slip
@@ -283,7 +283,7 @@ def _move_by_both(gap, go_x, go_y, spin, next_x, next_y, next_spin, to_x, to_y, 
 
 @kernel
 def give_way(first, second, friction, give, pose, before, pushes, moved):
-    """How bodies that touch something are pushed free at their deepest two contacts, in the frames of their axles.
+    """Compute the push that frees touching bodies at their deepest two contacts, in the frames of their axles.
 
     What the contacts push depends on how the body is turned meanwhile: it is worked out as it stands halfway, which
     a push by the deepest contact alone foretells. The two are then worked out in turn, each with what the other does.
@@ -313,7 +313,7 @@ def give_way(first, second, friction, give, pose, before, pushes, moved):
 
 @stage
 def go(moved, pose):
-    """Carry out what `give_way` worked out."""
+    """Apply the motion that `give_way` computed."""
     x, y, heading, sine, cosine = pose.x, pose.y, pose.heading, pose.sine, pose.cosine
     go_x, go_y, to_spin, half_sine, half_cosine = moved[0], moved[1], moved[2], moved[3], moved[4]
     real = x.dtype.type

@@ -1,4 +1,4 @@
-"""What a range sensor of the platform `sim` answers to the distances along its rays, before noise.
+"""The reading of a range sensor of the platform `sim` from the distances along its rays, before noise.
 
 A reading is 0 where nothing is within reach, and grows to 1 as things come near. A cone is several rays, evenly
 spaced from one edge of it to the other. What measures a time of flight (`linear`, `table`) answers the nearest
@@ -276,7 +276,7 @@ def prepare_table(table):
 
 @stage
 def table_response(near, table, reading):
-    """What a table of measured readings says, straight between its entries and level beyond them.
+    """Compute the response from a table of measured readings, straight between its entries and level beyond them.
 
     Args:
         near: (LANES,) distance to what is nearest [m].

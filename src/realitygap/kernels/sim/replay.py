@@ -26,7 +26,7 @@ from .trial import observe, sense
 
 
 class Rehearsed(NamedTuple):
-    """What happened in n trials step by step; row 0 is the start. Arrays of no rows keep nothing."""
+    """The steps of n trials; row 0 is the start. Arrays of no rows record nothing."""
 
     poses: NDArray[
         np.floating
@@ -124,7 +124,7 @@ def _arrive(shape, rules, lanes):
 
 @kernel
 def rehearse(shape, table, rules, neat, networks, which, commands, tried, anchors, key, counters, room, kept):
-    """Carry out n trials, a block after the other.
+    """Run n trials, one block after the other.
 
     Args:
         shape: Structure of robot and arena, `SimShape`.

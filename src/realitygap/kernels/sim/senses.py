@@ -1,4 +1,4 @@
-"""What all sensors of a robot of the platform `sim` answer, in lanes."""
+"""The readings of all sensors of a robot of the platform `sim`, in lanes."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ N_RANGE = len(RANGE_NUMBERS)
 
 
 class Senses(NamedTuple):
-    """What the sensors of a block of trials remember, and what follows from their numbers."""
+    """The memory of the sensors of a block of trials, and values derived from their numbers."""
 
     range_rates: (
         Rows  # (3 * s,) of the response, of dropouts, of outliers [1/m]; of lorentz 1 / cos(cone) first
@@ -107,7 +107,7 @@ class Senses(NamedTuple):
 
 @inlined
 def mixture_words(sensors):
-    """Random words of the mixture of so many range sensors."""
+    """Return the number of random words of the mixture of `sensors` range sensors."""
     return 4 * ((sensors + PER_BLOCK - 1) // PER_BLOCK)
 
 
@@ -206,7 +206,7 @@ def start_senses(shape, rules, lanes):
 
 @stage
 def _respond(shape, lanes, senses):
-    """What the range sensors would answer without noise."""
+    """Compute the readings of the range sensors without noise."""
     p = lanes.p
     for s in range(shape.row_range.size):
         row = shape.row_range[s]
@@ -375,7 +375,7 @@ def _tell(said, stalled, n_stalls):
 
 @stage
 def feel_motion(shape, rules, key, lanes, step):
-    """After a command was carried out: what the encoders count, and on an S2 whether it stalls.
+    """Update, after a command has ended, the encoders' counts, and on an S2 the stall sensor.
 
     Args:
         shape, rules, key, lanes: As in `answer`; `wheels` and `pose` are read, `stalled` is changed.

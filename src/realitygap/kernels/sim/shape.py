@@ -1,4 +1,4 @@
-"""What the trials of one call of the platform `sim` have in common, and where each of their numbers is.
+"""The common structure of the trials of one call of the platform `sim`, and the place of each of their numbers.
 
 A robot and its arena are structure (how many corners, sensors, walls, and of which kind) and numbers. The
 structure is a `SimShape`, the same for all trials of a call; the numbers are a table with a row for each and a
@@ -370,7 +370,7 @@ def _firsts(row: Mapping[str, int], name: str, n: int) -> NDArray[np.int32]:
 
 
 def _stack(sizes: Sequence[int], first: int) -> tuple[NDArray[np.int32], int]:
-    """Where groups of rows begin that follow each other from `first` on, and where they end."""
+    """Return the first row of each of several consecutive groups of rows, from `first` on, and the end of the last."""
     ends = first + np.cumsum([0, *sizes])
     return ends[:-1].astype(np.int32), int(ends[-1])
 

@@ -1,4 +1,4 @@
-"""What stands between two points, and how near a point is to what can be touched, in lanes.
+"""The obstacles between two points, and the distance of a point to the nearest thing to touch, in lanes.
 
 Obstacles and open walls are convex outlines grown by a radius (`row_shape` of the structure): their corners x, y, each
 with the outward normal and the length of the edge that begins there, then the radius. The walls of an enclosed room
@@ -145,7 +145,7 @@ def _grow(outside, distance, radius, solid, gap):
 
 @stage
 def gap_of_point(shape, p, x, y, outside, distance, gap):
-    """How far points are from the nearest wall or obstacle [m], below zero inside one.
+    """Compute the distance of points from the nearest wall or obstacle [m], below zero inside one.
 
     Args:
         shape: Structure.

@@ -19,7 +19,7 @@ COUNT = 2.5e-4  # of an S2's encoders [m]; less than that is no difference
 
 @stage
 def prepare_stall(window, step_s, keep):
-    """What a step leaves of the averages: e^(-step / window), 0 without a window.
+    """Compute the factor by which a step keeps the averages: e^(-step / window), 0 without a window.
 
     Args:
         window: (LANES,) [s].

@@ -12,7 +12,7 @@ FAR = 1e9  # farther than anything [m]
 
 @inlined
 def low_height(p, outline, n, along, across, lane):
-    """How low the lowest of n corners lies along a normal.
+    """Return the height of the lowest of n corners along a normal.
 
     Args:
         p: (rows, LANES) the corners are in rows `outline` and on, PER_CORNER for each.
@@ -30,7 +30,7 @@ def low_height(p, outline, n, along, across, lane):
 
 @inlined
 def lowest(p, outline, n, along, across, lane):
-    """Where the lowest of n corners along a normal is: the first of several.
+    """Return the position of the lowest of n corners along a normal: the first of several.
 
     Args:
         p, outline, n, along, across, lane: As in `low_height`.

@@ -1,4 +1,4 @@
-"""Where bodies meet walls and obstacles most deeply, in lanes.
+"""The deepest contacts of bodies with walls and obstacles, in lanes.
 
 A body is convex polygons grown by a radius each, in the frame of its axle; obstacles and open walls are likewise,
 in the world; the walls of an enclosed room are half-planes. Two polygons that are apart, or overlap a little, are
@@ -173,7 +173,7 @@ def _within(shape, p, lane):
 
 @inlined
 def _farthest_face(p, corners, n, others, other, m, lane):
-    """Of an outline's n faces that which has the other outline of m corners farthest in front of it."""
+    """Return the face, among an outline's n faces, that has the other outline of m corners farthest in front of it."""
     best = spread(-p.dtype.type(FAR))
     x, y, a, b, length = best, best, best, best, best
     for corner in range(n):

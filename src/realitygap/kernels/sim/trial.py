@@ -47,7 +47,7 @@ from .shape import (
 
 @stage
 def sense(shape, rules, key, lanes, step):
-    """What the sensors answer before a step, noise and all, into `lanes.readings`."""
+    """Compute the readings of the sensors before a step, with noise, into `lanes.readings`."""
     cast_rays(shape, lanes)
     answer(shape, rules, key, lanes, step)
 
@@ -181,7 +181,7 @@ def _run_block(shape, table, rules, neat, key, counters, first, n_lanes, room, c
 def run_sim_trials(
     shape, table, rules, neat, networks, which, key, counters, room, cells, ends, ended, counts, trace
 ):
-    """Carry out n trials, a block after the other.
+    """Run n trials, one block after the other.
 
     Args:
         shape: Structure of robot and arena, `SimShape`.
@@ -226,7 +226,7 @@ def start_sim(shape, table, rules, key, counters, n, room, cells):
 
 @kernel
 def step_sim(shape, rules, key, n, room, cells, step, commands):
-    """Carry out one command of each robot; what the sensors answer after it is in `room.lanes.readings`.
+    """Execute one command of each robot; the sensors' readings after it are in `room.lanes.readings`.
 
     A network that answers each observation drives the very trial that `run_sim_trials` gives it.
 

@@ -28,7 +28,7 @@ def _see_plane(rows, row, pose, lane):
 
 @kernel
 def clearance(shape, p, pose, turned, near, active, low):
-    """How far bodies are from each wall of a room [m], below zero inside it.
+    """Compute the distance of bodies from each wall of a room [m], below zero inside it.
 
     Args:
         shape, p: Structure and numbers.
@@ -94,7 +94,7 @@ def _keep_two(
 
 @stage
 def choose_walls(shape, p, near):
-    """Of the walls of a room those that `clearance` found nearest, into `near.walls`."""
+    """Choose the walls of a room that `clearance` found nearest, into `near.walls`."""
     walls = near.walls
     for k in range(N_NEAREST):
         fill(walls[PER_WALL * k + 3], walls.dtype.type(FAR))

@@ -1,4 +1,4 @@
-"""Random words of a step of `sim`: for each use a purpose of its own, so that no two share a word.
+"""Random words of a step of `sim`: a separate purpose for each use, so that no two share a word.
 
 A use of w words takes the blocks step * ceil(w / 4) and on of its purpose's stream; so switching one kind of noise
 on or off, or adding a sensor of another kind, leaves all other noise as it is.
@@ -26,7 +26,7 @@ def _draw(block, purpose, c1, c2, c3, k0, k1, w0, w1, w2, w3):
 
 @inlined
 def blocks_of(words):
-    """Blocks of four that so many words take."""
+    """Return the number of blocks of four that `words` words take."""
     return (words + 3) >> 2
 
 

@@ -53,7 +53,7 @@ ENOUGH_STARTS = 200
 
 @kernel
 def accelerations(force, a1, w1, a2, w2):
-    """Of the cart [m/s^2] and the two poles [rad/s^2] under a force [N]."""
+    """Return the accelerations of the cart [m/s^2] and of the two poles [rad/s^2] under a force [N]."""
     sin_1, cos_1 = sin_cos(a1)
     sin_2, cos_2 = sin_cos(a2)
     fall_1 = HINGE_FRICTION * w1 / (MASS_1 * HALF_LENGTH_1) - GRAVITY * sin_1
@@ -91,7 +91,7 @@ def cart_step(force, step, x, v, a1, w1, a2, w2):
 
 @kernel
 def balance(networks, row, rules, bias_value, velocities, most, start, values, before, shaking):
-    """How many actions a network keeps the cart on its track and both poles up, at most `most`.
+    """Return the number of actions for which a network keeps the cart on its track and both poles up, at most `most`.
 
     Args:
         networks, row: Which network; six inputs with velocities, else three, and perhaps a constant one.
@@ -134,7 +134,7 @@ def balance(networks, row, rules, bias_value, velocities, most, start, values, b
 
 @kernel
 def first_start():
-    """Where every trial but the generalization test begins."""
+    """Return the start of every trial except those of the generalization test."""
     return 0.0, 0.0, FIRST_ANGLE, 0.0
 
 

@@ -205,7 +205,7 @@ def list_fresh(line, columns, rows, fresh, any_fresh, n_lanes, cells, first, n_l
 
 @kernel
 def count_cells(marks, lane):
-    """How many bits of a lane are set."""
+    """Return the number of bits set in a lane."""
     n = 0
     for word in range(marks.shape[0]):
         bits = marks[word, lane]

@@ -75,7 +75,7 @@ class MazeLanes(NamedTuple):
 
 
 class MazeTrace(NamedTuple):
-    """What happened step by step in the first k lanes; row 0 is the start. Arrays of no rows keep nothing."""
+    """The steps of the first k lanes; row 0 is the start. Arrays of no rows record nothing."""
 
     poses: NDArray[np.floating]  # (t + 1, 3, k)
     inputs: NDArray[np.floating]  # (t, i, k)
@@ -98,7 +98,7 @@ def make_maze_lanes(like, n_rays, n_nodes):
 
 
 def make_maze_block(scene, neat, hidden_room):
-    """Room for a block of trials of networks with so many hidden nodes: lanes and wiring."""
+    """Return room for a block of trials of networks with `hidden_room` hidden nodes: lanes and wiring."""
     n_nodes = neat.n_inputs + neat.n_outputs + hidden_room
     return make_maze_lanes(scene.heading, len(scene.rays), n_nodes), make_wiring(
         scene.heading, neat, hidden_room
@@ -106,7 +106,7 @@ def make_maze_block(scene, neat, hidden_room):
 
 
 def make_maze_trace(like, n_inputs, n_steps, n_kept):
-    """Room for the steps of so many trials; `n_steps` < 0: for none."""
+    """Return room for the steps of `n_kept` trials; `n_steps` < 0: for none."""
     real = like.dtype
     return MazeTrace(
         np.zeros((n_steps + 1, 3, n_kept), real), np.zeros((max(n_steps, 0), n_inputs, n_kept), real)
@@ -158,7 +158,7 @@ def _nearest_along(cosine, sine, from_x, from_y, over_x, over_y, inverse, nearne
 
 @stage
 def _find_ranges(walls, reach, lanes, ranges):
-    """What the range finders read: the distance to the nearest wall as a part of their reach, 1 beyond it.
+    """Compute the range finders' readings: the distance to the nearest wall as a part of their reach, 1 beyond it.
 
     Args:
         walls: (w, 4) ends of each wall; one along a ray is not seen.
@@ -226,7 +226,7 @@ def _limited(value, most):
 
 @inlined
 def _around_half(output, activation):
-    """How far an output is from one half of its range 0..1; tanh is stretched to that, identity cut off."""
+    """Return an output's difference from half of its range 0..1; tanh is stretched to that, identity cut off."""
     real = type(output)
     if activation == TANH:
         return real(0.5) * output
@@ -353,7 +353,7 @@ def observe_maze(scene, rules, neat, lanes):
 
 @stage
 def drive_maze(scene, rules, neat, lanes, step):
-    """Carry out what the networks answered: outputs `turn` and `push`."""
+    """Execute the commands of the networks: outputs `turn` and `push`."""
     real = lanes.x.dtype.type
     turn, push = lanes.values[neat.n_inputs], lanes.values[neat.n_inputs + 1]
     _accelerate(rules, neat.activation, turn, push, lanes.spin, lanes.speed)

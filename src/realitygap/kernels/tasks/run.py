@@ -69,7 +69,7 @@ class TaskRoom(NamedTuple):
 
 
 def make_task_room(rules, neat, room, hidden_room):
-    """Room for one run, with genomes of at most so many connection genes and hidden nodes."""
+    """Return room for one run, with genomes of at most `room` connection genes and `hidden_room` hidden nodes."""
     n = rules.population
     nodes = neat.n_inputs + neat.n_outputs + hidden_room
     return TaskRoom(

@@ -1,4 +1,4 @@
-"""What trials are worth, from their traces: arrays as `TraceArrays` has them, trials last.
+"""The scores of trials, from their traces: arrays as `TraceArrays` has them, trials last.
 
 Loops run over steps, and within each over trials, which lie side by side.
 """
@@ -59,7 +59,7 @@ def _nearest_of(x, y, places, trial):
 
 @kernel
 def nearness_scores(poses, stalled, places, scores):
-    """How near to the nearest of some places a robot was on the whole, less what it spent blocked.
+    """Compute the robots' mean nearness to the nearest of some places, reduced by the time spent blocked.
 
     At each step 1 - d / d0, but not below 0, with d0 the distance at the start; its mean over steps, times the share
     of steps that were not blocked.
@@ -86,7 +86,7 @@ def nearness_scores(poses, stalled, places, scores):
 
 @kernel
 def goal_scores(poses, goals, radii, scores):
-    """How much of the way to a goal was made good at the end: 1 - d / d0, or 1 where it was reached at any step.
+    """Compute the share of the distance to a goal covered by the end: 1 - d / d0, or 1 if it was reached at any step.
 
     Args:
         poses: (t + 1, 3, n) from the start.
@@ -135,7 +135,7 @@ def _nearest_wall(x, y, walls):
 
 @kernel
 def wall_scores(poses, walls, side, farthest, scores):
-    """How far a robot went along walls that it had on one side and near [m].
+    """Compute the distance that robots drove along walls that were near and on one side [m].
 
     A step counts with its part along the nearest wall, as it lies halfway between the ends of the step, forward with
     the wall on the right side and backward with it on the wrong one; so going to and fro, or round in a circle, adds

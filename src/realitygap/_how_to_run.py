@@ -45,11 +45,12 @@ def _uv(path: str) -> str:
 
 def _source_folder() -> Path | None:
     """Return the clone that realitygap was installed from; None if it came from elsewhere."""
-    import json
     from importlib import metadata
 
+    from realitygap._limits import parse_json
+
     try:
-        origin = json.loads(metadata.distribution("realitygap").read_text("direct_url.json") or "{}")
+        origin = parse_json(metadata.distribution("realitygap").read_text("direct_url.json") or "{}")
     except (metadata.PackageNotFoundError, ValueError):
         return None
     url = str(origin.get("url", ""))

@@ -50,18 +50,21 @@ class Fitted(Settings):
     def _is_not_identified_by_its_prior(cls, values: Any) -> Any:
         """An interval that begins at an end of the prior is that of the prior, however narrow it is.
 
-        If it is wide, the advice still names that end if the estimate is there.
+        If it is wide, the advice begins with that end if the estimate is there.
         """
         if not isinstance(values, Mapping) or not _is_bound(values):
             return values
         if not values.get("identified") and not _is_bound(values, "estimate", "estimate"):
             return values
         low, high, unit = values["prior_low"], values["prior_high"], values.get("unit", "")
-        advice = (
-            f"The estimate is at an end of its prior, {low:.3g} to {high:.3g}{f' {unit}' if unit else ''}. "
-            "Build on another robot (--base ROBOT)."
+        at_end = (
+            f"The estimate is at an end of its prior, {low:.3g} to {high:.3g}{f' {unit}' if unit else ''}."
         )
-        return {**values, "identified": False, "advice": advice}
+        if not values.get("identified") and values.get("advice", "").startswith(at_end):  # read from a file
+            return values
+        advice = "" if values.get("identified") else values.get("advice", "")
+        advice = advice or "Build on another robot (--base ROBOT)."
+        return {**values, "identified": False, "advice": f"{at_end} {advice}"}
 
     @model_validator(mode="after")
     def _has_its_ends_in_order(self) -> Self:

@@ -53,21 +53,6 @@ if "realitygap.lab._work" in sys.orig_argv:
 """
 
 
-UNCOVERED = """(it) => {
-  const box = it.getBoundingClientRect();
-  const across = [box.left + 4, box.right - 4], down = [box.top + 4, box.bottom - 4];
-  const points = across.flatMap((x) => down.map((y) => [x, y]));
-  points.push([(box.left + box.right) / 2, (box.top + box.bottom) / 2]);
-  return points.map(([x, y]) => document.elementFromPoint(x, y)).map(
-    (found) => it.contains(found) ? "itself" : found ? found.outerHTML.slice(0, 200) : "out of sight");
-}"""
-
-
-def check_uncovered(locator: Any) -> None:
-    """Its center and its corners are in view, and nothing lies above them."""
-    assert locator.evaluate(UNCOVERED) == ["itself"] * 5
-
-
 class RunningLab:
     """A lab of a folder; `address` is that of its first page, `cookie` what lets a browser in."""
 

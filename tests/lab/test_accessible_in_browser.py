@@ -1,38 +1,20 @@
-"""Every page of the lab, on a desktop and a phone: axe-core finds no fault, and nothing is cut off."""
+"""Every page of the lab in its states: readable at each size and in both themes, and usable by keyboard."""
 
 from __future__ import annotations
 
-import pytest
-from axe_playwright_python.sync_playwright import Axe
+import re
 
+import pytest
+
+from realitygap.emulator import Emulator, serve_tcp
 from realitygap.study import parse_study, run_study
 
-from .conftest import DESKTOP, PHONE, open_advanced, open_fold
+from .conftest import open_advanced, open_fold
+from .page_checks import faults, keyboard, states, watch_states
 from .robot_study import begin_sitting, make_study
 from .sheets import drive_sheet, photo_of
 
 pytestmark = pytest.mark.slow
-
-CUT = """() => [...document.querySelectorAll("body *")].filter((it) => it.checkVisibility() && it.textContent.trim()
-  && it.scrollWidth > it.clientWidth + 1 && getComputedStyle(it).textOverflow === "ellipsis")
-  .map((it) => it.textContent)"""
-"""Texts that end in an ellipsis because their place is too narrow."""
-
-SIZES = {"desktop": DESKTOP, "tablet": (768, 1024), "twice as large": (720, 450), "phone": PHONE}
-AXE = ("desktop", "phone")
-"""Sizes at which axe-core runs, which takes seconds."""
-
-CONTROLS = """() => [...document.querySelectorAll(
-  "a[href], button, input, textarea, select, [tabindex='0']")].filter((it) => it.checkVisibility() && !it.disabled
-  && it.tabIndex >= 0 && it.getAttribute("aria-disabled") !== "true" && it.type !== "file").length"""
-FOCUSED = """() => {
-  const it = document.activeElement, style = getComputedStyle(it);
-  if (it === document.body || it.dataset.reached) return "all";
-  it.dataset.reached = "yes";
-  const border = it.closest(".q-field") && getComputedStyle(it.closest(".q-field__control"), "::after").borderTopWidth;
-  return style.outlineStyle !== "none" || border === "2px" ? "seen" : it.outerHTML.slice(0, 200);
-}"""
-"""Whether the control with the focus shows it; all once every one has had it."""
 
 TEXT = """
 [study]
@@ -48,43 +30,7 @@ selection = "novelty"
 @pytest.fixture
 def look(visit):
     """Opens a page: look("robot")."""
-    return lambda path: visit(path, bypass_csp=True)
-
-
-def faults(page) -> list[str]:
-    """Return what axe-core finds, texts that are cut, and where the page is wider than the screen.
-
-    The page has the size of a phone from then on.
-    """
-    found = []
-    for size, (width, height) in SIZES.items():
-        page.set_viewport_size({"width": width, "height": height})
-        page.wait_for_timeout(300)  # until nothing fades in any more
-        violations = Axe().run(page).response["violations"] if size in AXE else []
-        found += [
-            f"{size}: {fault['impact']}: {fault['id']}: {[node['target'] for node in fault['nodes']][:3]}"
-            for fault in violations
-        ]
-        over = page.evaluate("() => document.documentElement.scrollWidth - window.innerWidth")
-        found += [f"{size}: {over} px wider than the screen"] if over > 0 else []
-        found += [f"{size}: cut: {text}" for text in page.evaluate(CUT)]
-    return found
-
-
-def check_keyboard(page) -> None:
-    """Tab reaches each control, and the focus is visible there."""
-    page.set_viewport_size({"width": DESKTOP[0], "height": DESKTOP[1]})
-    page.evaluate("document.activeElement.blur()")
-    n, reached = page.evaluate(CONTROLS), 0
-    for _ in range(n + 5):
-        page.keyboard.press("Tab")
-        page.wait_for_timeout(60)  # until the border has its width
-        found = page.evaluate(FOCUSED)
-        if found == "all":
-            break
-        assert found == "seen"
-        reached += 1
-    assert reached >= n
+    return lambda path, **options: visit(path, bypass_csp=True, **options)
 
 
 def test_pages_without_a_study(lab, look):
@@ -94,23 +40,50 @@ def test_pages_without_a_study(lab, look):
         ("calibrate", "No calibrations yet."),
         ("gap", "Measure"),
         ("robot", "No robot connected."),
+        ("nonsense", "There is no page here."),
+        ("broken", "This page cannot be shown: "),
     ):
-        page = look(path)
+        page = look(path, forgive=["404", "500"])
         page.get_by_text(text).first.wait_for()
-        assert faults(page) == [], path
-        check_keyboard(page)
+        assert faults(page, lab.root) == [], path
+        assert keyboard(page) == [], path
 
 
-def test_a_study_that_is_watched_and_played(lab, look):
+def test_a_gap_with_a_mistake_while_it_is_measured_and_its_result(lab, look):
+    page = look("gap")
+    page.get_by_label("Simulator").fill("sim:/etc/passwd")
+    page.get_by_role("button", name="Measure the gap").click()
+    page.locator(".lab-field .lab-problem", has_text="outside").wait_for()
+    assert faults(page, lab.root) == []
+    page.get_by_label("Simulator").fill("sim")
+    page.get_by_label("Trials per controller").fill("3")
+    page.get_by_role("button", name="Measure the gap").click()
+    page.get_by_role("button", name="Stop", exact=True).wait_for()
+    assert faults(page, lab.root) == []
+    page.get_by_text("Complete.", exact=True).wait_for()
+    assert faults(page, lab.root) == []
+
+
+def test_a_study_that_runs_and_is_watched_played_and_extended(lab, look):
+    home = look("")
+    watch_states(home)
     run_study(parse_study(TEXT, "study.toml"), lab.root / "seen")
     page = look("study/seen")
+    watch_states(page)
     page.locator(".lab-figure img").nth(4).wait_for()
+    assert faults(page, lab.root) == []
+    assert keyboard(page) == []
+    page.get_by_role("button", name="Run more replicates").click()
+    page.get_by_label("Runs per condition").fill("5")
+    assert faults(page, lab.root) == []
+    page.get_by_role("button", name="Run", exact=True).click()
+    page.get_by_text("5 runs", exact=True).wait_for()
     page.get_by_role("tab", name="Replay").click()
     page.locator(".lab-replay").locator(".rg-player").wait_for()
-    assert faults(page) == []
-    home = look("")
-    home.locator('[data-study="seen"]').wait_for()
-    assert faults(home) == []
+    assert faults(page, lab.root) == []
+    home.locator('[data-study="seen"]').get_by_text("5 runs", exact=True).wait_for()
+    assert faults(home, lab.root) == []
+    assert states(home) + states(page) == []
 
 
 def test_trials_that_are_counted_from_a_photo(lab, look):
@@ -119,12 +92,10 @@ def test_trials_that_are_counted_from_a_photo(lab, look):
     page.get_by_label("Your name").fill("anna")
     photo = {"name": "sheet.jpg", "mimeType": "image/jpeg", "buffer": photo_of(lines)}
     page.get_by_label("Choose a photo").set_input_files(photo)
-    page.get_by_text("You can leave this page.").wait_for()
-    assert faults(page) == []
     page.locator("[data-counting] image").wait_for()
     page.get_by_text("Score from a video").click()
     page.get_by_label("Tags").wait_for()
-    assert faults(page) == []
+    assert faults(page, lab.root) == []
 
 
 def test_a_robot_in_a_sitting_and_in_the_hand(lab, look):
@@ -132,21 +103,34 @@ def test_a_robot_in_a_sitting_and_in_the_hand(lab, look):
     page = look("study/by-robot/trials")
     begin_sitting(page)
     page.get_by_role("button", name="Start trial").wait_for()
-    assert faults(page) == []
+    assert faults(page, lab.root) == []
+    assert keyboard(page) == []
     open_fold(page, "Robot")
     page.get_by_role("button", name="Disconnect").click()
     page.get_by_role("button", name="Connect robot").wait_for()
     robot = look("robot")
-    robot.get_by_role("button", name="Use an emulated robot").click()
-    robot.get_by_text("Battery").wait_for()
-    assert faults(robot) == []
+    with serve_tcp(Emulator("s2"), speed=20) as server:
+        robot.get_by_text("Another port").click()
+        robot.get_by_label("Port", exact=True).fill(server.name)
+        robot.get_by_role("button", name="Connect", exact=True).click()
+        robot.get_by_text("Battery").wait_for()
+        assert faults(robot, lab.root) == []
+        assert keyboard(robot) == []
+        watcher = look("robot")
+        watcher.get_by_role("button", name="Request control").wait_for()
+        assert faults(watcher, lab.root) == []
+    robot.get_by_text(re.compile(r"Last reading \d+ s ago")).wait_for()
+    assert faults(robot, lab.root) == []
 
 
-def test_a_calibration_whose_plot_grows(lab, look):
+def test_a_calibration_whose_plot_grows_and_its_result(lab, look):
     page = look("calibrate")
     page.get_by_role("button", name="Next").click()
+    assert keyboard(page) == []
     open_advanced(page, page.get_by_label("Number of trials"))
     page.get_by_label("Number of trials").fill("4")
     page.get_by_role("button", name="Calibrate", exact=True).click()
     page.locator(".lab-plot").wait_for()
-    assert faults(page) == []
+    assert faults(page, lab.root) == []
+    page.get_by_role("button", name="Use in a study").wait_for()
+    assert faults(page, lab.root) == []

@@ -14,7 +14,8 @@ import pytest
 from realitygap.emulator import connect_witness
 from realitygap.study import parse_study, run_study
 
-from .conftest import PATIENCE_MS, PHONE, check_uncovered, open_advanced
+from .conftest import PATIENCE_MS, PHONE, open_advanced
+from .page_checks import covered
 from .test_robot_in_browser import hold
 from .test_studies_in_browser import TINY, start
 
@@ -41,21 +42,21 @@ def test_stop_is_shown_while_a_robot_is_connected_and_nothing_covers_it(visit, t
         stop = page.get_by_role("button", name="Stop robot")
         stop.wait_for()
         assert stop.bounding_box()["height"] >= 44
-        check_uncovered(page.locator(".lab-stop"))
+        assert covered(page.locator(".lab-stop")) == []
 
         page.evaluate(NOTICES)
         page.locator(".q-notification").nth(2).wait_for()
-        check_uncovered(page.locator(".lab-stop"))
+        assert covered(page.locator(".lab-stop")) == []
         page.screenshot(path=tmp_path / f"{view}-notices.png")
 
         open_advanced(page, page.get_by_role("combobox", name="Observation level"))
         page.get_by_role("combobox", name="Observation level").click()
         page.get_by_role("option", name="encoders").wait_for()
         page.wait_for_timeout(400)  # until it has moved in
-        check_uncovered(page.locator(".lab-stop"))
+        assert covered(page.locator(".lab-stop")) == []
 
         page.evaluate("document.getElementById('too_long_message_popup').ariaHidden = false")
-        check_uncovered(page.locator(".lab-stop"))
+        assert covered(page.locator(".lab-stop")) == []
         page.screenshot(path=tmp_path / f"{view}-choice.png")
         stop.click()
         page.get_by_role("button", name="Robot stopped").wait_for()
@@ -195,7 +196,7 @@ def test_page_without_the_lab_shows_the_stop_and_disables_everything_else(visit)
     page.get_by_text("Reconnecting…").wait_for()
     lost = page.get_by_role("button", name="Connection lost. Use the robot's power switch.")
     lost.wait_for()  # whether a robot is connected is unknown
-    check_uncovered(page.locator(".lab-stop"))
+    assert covered(page.locator(".lab-stop")) == []
     page.get_by_role("button", name="Measure the gap").click()
     page.context.set_offline(False)
     page.get_by_text("Reconnecting…").wait_for(state="hidden")

@@ -8,7 +8,8 @@ from collections.abc import Callable
 
 import pytest
 
-from .conftest import DESKTOP, OUTAGE, PHONE, check_uncovered, open_advanced, open_fold
+from .conftest import DESKTOP, OUTAGE, PHONE, open_advanced, open_fold
+from .page_checks import covered
 from .robot_study import FAST, SLOW, begin_sitting, count, ledger_of, make_study, start_trial, tap
 from .sheets import drive_sheet
 
@@ -36,7 +37,7 @@ def test_a_whole_study_is_driven_and_counted_by_taps_on_a_phone(lab, visit):
     page.get_by_role("button", name="Start trial").wait_for()
     page.evaluate("scrollTo(0, 0)")
     for action in ("Start trial", "Stop robot"):
-        check_uncovered(page.get_by_role("button", name=action))
+        assert covered(page.get_by_role("button", name=action)) == []
     for first in (1, 3):
         start_trial(page, first)
         start_trial(page, first + 1)
@@ -72,7 +73,7 @@ def test_only_the_current_step_is_open_and_its_action_is_in_view(lab, visit, siz
         button = page.get_by_role("button", name=action)
         button.wait_for()
         assert open_folds(page) == folds
-        check_uncovered(button)
+        assert covered(button) == []
 
     page.get_by_text("No trials yet. Connect a robot to drive 4 trials.").wait_for()
     check("Place", "Connect robot", ["Robot"])
@@ -83,7 +84,7 @@ def test_only_the_current_step_is_open_and_its_action_is_in_view(lab, visit, siz
     start_trial(page, 2)
     page.get_by_text("is full").wait_for()
     check("Score", "Save score", ["Score"])
-    check_uncovered(page.get_by_role("button", name="Stop robot"))
+    assert covered(page.get_by_role("button", name="Stop robot")) == []
     for number in (1, 2):
         count(page, number, 0)
     check("Close", "Close generation", [])

@@ -67,8 +67,8 @@ def refuse_outside(root: Path, text: str) -> None:
     for part in (text, *text.split(":")):
         if not _is_within(root, part):
             raise StudyError(
-                f"{shown(text)} would be a file outside {root}, and the lab reads none there. Put the file into that "
-                "folder, and name it without one."
+                f"{shown(text)} would be a file outside the lab's folder, and the lab reads none there. Put the file "
+                "into that folder, and enter its name alone."
             )
 
 

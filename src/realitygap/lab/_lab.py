@@ -160,7 +160,7 @@ class Lab:
             raise StudyError("There are no trials to score from a video. Drive a trial first.")
         if video not in videos_in(self.root):
             raise StudyError(
-                f"There is no video {video!r} in {self.root}. Put it there; its name ends in {', '.join(ENDINGS)}."
+                f"There is no video {video!r} in the lab's folder. Put it there; its name ends in {', '.join(ENDINGS)}."
             )
         with self._lock:
             if any(not each.is_over for each in self.videos.values()):

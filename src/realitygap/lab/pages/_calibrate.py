@@ -390,8 +390,9 @@ def _show_fit(made: dict[str, Any], name: str) -> None:
     fitted = made["fitted"]
     n_identified = sum(each["identified"] for each in fitted)
     ui.label(f"{n_identified} of {len(fitted)} parameters are identified.")
-    columns = [
+    columns: list[dict[str, Any]] = [
         {"name": name, "label": label, "field": name, "align": "left"}
+        | ({"classes": "lab-not-on-phones", "headerClasses": "lab-not-on-phones"} if name == "bar" else {})
         for name, label in (
             ("name", "Parameter"),
             ("estimate", "Estimate"),

@@ -59,7 +59,7 @@ def _show_part(lab: Lab, part: Part[RobotRequest | None]) -> None:
 
 def _confirm(lab: Lab, visitor: Visitor) -> None:
     """Show what the robot is doing before the visitor takes control without consent."""
-    with ui.dialog(value=True) as dialog, ui.card():
+    with ui.dialog(value=True).props('aria-label="Take control"') as dialog, ui.card():
         state = ui.label("").props('role="status"')
         ui.label(f"{lab.operator_name} did not answer, and may have a hand on the robot.")
 

@@ -284,7 +284,11 @@ class _Page:
     def _ask_replicates(self) -> None:
         """Ask how many runs each condition is to have, and run those that are missing."""
         now = self._replicates
-        with self._dialogs, ui.dialog(value=True) as dialog, ui.card():
+        with (
+            self._dialogs,
+            ui.dialog(value=True).props('aria-label="Run more replicates"') as dialog,
+            ui.card(),
+        ):
             form = Form()
             section("Run more replicates")
             form.summary()

@@ -1,0 +1,141 @@
+"""Checks that hold on every page of the lab, in every state.
+
+Each returns the faults that it finds, so that a test reads `assert covered(button) == []`.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from axe_playwright_python.sync_playwright import Axe
+
+from .conftest import DESKTOP, PHONE
+
+SIZES = {"desktop": DESKTOP, "tablet": (768, 1024), "zoom of 200 %": (720, 450), "phone": PHONE}
+AXE_SIZES = ("desktop", "phone")
+"""Sizes at which axe-core runs, which takes seconds."""
+SETTLED_MS = 250
+"""Time until nothing fades in any more [ms]."""
+
+_COVERED = """(it) => {
+  const box = it.getBoundingClientRect();
+  const across = [box.left + 4, box.right - 4], down = [box.top + 4, box.bottom - 4];
+  const points = across.flatMap((x) => down.map((y) => [x, y]));
+  points.push([(box.left + box.right) / 2, (box.top + box.bottom) / 2]);
+  return points.map(([x, y]) => document.elementFromPoint(x, y)).filter((found) => !it.contains(found))
+    .map((found) => found ? found.outerHTML.slice(0, 200) : "out of sight");
+}"""
+_CUT = """() => [...document.querySelectorAll("body *")].filter((it) => it.checkVisibility() && it.textContent.trim()
+  && it.scrollWidth > it.clientWidth + 1 && getComputedStyle(it).textOverflow === "ellipsis")
+  .map((it) => `cut: ${it.textContent}`)"""
+_WATCH = """() => {
+  window.tooManyStates = [];
+  const look = () => {
+    const cards = [...document.querySelectorAll(".lab-study")];
+    for (const card of cards.length ? cards : [document.body]) {
+      const words = [...card.querySelectorAll(".lab-state")].map((it) => it.textContent);
+      if (words.length > 1) window.tooManyStates.push(words.join(" and "));
+    }
+  };
+  new MutationObserver(look).observe(document.body, { subtree: true, childList: true, characterData: true });
+  look();
+}"""
+_CONTROLS = """() => [...document.querySelectorAll(
+  "a[href], button, input, textarea, select, [tabindex='0']")].filter((it) => it.checkVisibility() && !it.disabled
+  && it.tabIndex >= 0 && it.getAttribute("aria-disabled") !== "true" && it.type !== "file").length"""
+_TO_START = """() => {
+  document.body.tabIndex = -1;
+  document.body.focus();
+  document.body.removeAttribute("tabindex");
+  window.lastFocused = null;
+}"""
+_FOCUSED = """() => {
+  const it = document.activeElement, style = getComputedStyle(it), last = window.lastFocused;
+  if (it === document.body || it.dataset.reached) return "all";
+  it.dataset.reached = "yes";
+  window.lastFocused = it;
+  if (last && last.isConnected && !(last.compareDocumentPosition(it) & Node.DOCUMENT_POSITION_FOLLOWING))
+    return `out of order: ${it.outerHTML.slice(0, 200)}`;
+  const border = it.closest(".q-field") && getComputedStyle(it.closest(".q-field__control"), "::after").borderTopWidth;
+  return style.outlineStyle !== "none" || border === "2px" ? "" : `no visible focus: ${it.outerHTML.slice(0, 200)}`;
+}"""
+
+
+def covered(locator: Any) -> list[str]:
+    """Return what lies above the center or a corner of an element, or "out of sight"."""
+    found: list[str] = locator.evaluate(_COVERED)
+    return found
+
+
+def cut(page: Any) -> list[str]:
+    """Return the texts that end in an ellipsis because their place is too narrow."""
+    found: list[str] = page.evaluate(_CUT)
+    return found
+
+
+def wide(page: Any) -> list[str]:
+    """Return by how much the page is wider than the screen."""
+    over = page.evaluate("() => document.documentElement.scrollWidth - window.innerWidth")
+    return [f"{over} px wider than the screen"] if over > 0 else []
+
+
+def watch_states(page: Any) -> None:
+    """Watch every change of a page for `states`, until it is loaded again."""
+    page.evaluate(_WATCH)
+
+
+def states(page: Any) -> list[str]:
+    """Return each moment since `watch_states` at which a card, or the page of a study, had two states."""
+    found: list[str] = page.evaluate("() => window.tooManyStates")
+    return found
+
+
+def keyboard(page: Any) -> list[str]:
+    """Return the controls that Tab reaches out of order, without a visible focus, or not at all."""
+    page.set_viewport_size({"width": DESKTOP[0], "height": DESKTOP[1]})
+    page.evaluate(_TO_START)
+    n, reached, found = page.evaluate(_CONTROLS), 0, []
+    for _ in range(n + 5):
+        page.keyboard.press("Tab")
+        page.wait_for_timeout(50)  # until the border has its width
+        problem = page.evaluate(_FOCUSED)
+        if problem == "all":
+            break
+        found += [problem] if problem else []
+        reached += 1
+    return [*found, *([f"Tab reaches {reached} of {n} controls"] if reached < n else [])]
+
+
+def no_paths(page: Any, root: Path) -> list[str]:
+    """Return the lines of a page that contain the absolute path of the lab's folder."""
+    return [f"path: {line}" for line in page.locator("body").inner_text().splitlines() if str(root) in line]
+
+
+def axe(page: Any) -> list[str]:
+    """Return what axe-core finds in the light theme, and what is hard to read in the dark one."""
+    found = []
+    for theme, options in (("light", None), ("dark", {"runOnly": ["color-contrast"]})):
+        page.emulate_media(color_scheme=theme)
+        page.wait_for_timeout(SETTLED_MS)
+        for fault in Axe().run(page, options=options).response["violations"]:
+            targets = [node["target"] for node in fault["nodes"]][:3]
+            found.append(f"{theme}: {fault['impact']}: {fault['id']}: {targets}")
+    page.emulate_media(color_scheme="light")
+    return found
+
+
+def faults(page: Any, root: Path) -> list[str]:
+    """Return what is wrong with a page at any size and in any theme; it has the size of a phone from then on.
+
+    Args:
+        page: A page, opened with `bypass_csp=True` so that axe-core can run in it.
+        root: The lab's folder.
+    """
+    found = no_paths(page, root)
+    for size, (width, height) in SIZES.items():
+        page.set_viewport_size({"width": width, "height": height})
+        page.wait_for_timeout(SETTLED_MS)
+        problems = [*wide(page), *cut(page), *(axe(page) if size in AXE_SIZES else [])]
+        found += [f"{size}: {problem}" for problem in problems]
+    return found

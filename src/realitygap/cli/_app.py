@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import itertools
 import sys
 from collections.abc import Sequence
 from importlib import import_module
@@ -86,7 +87,7 @@ class _GroupedCommand(TyperCommand):
             if (parameter.metavar or "").startswith(("DIR", "FILE", "PATH"))
             for option in parameter.opts
         }
-        for option, value in zip(args, [*args[1:], None], strict=True):
+        for option, value in itertools.zip_longest(args, args[1:]):
             if (option in paths and value == "") or option in {f"{path}=" for path in paths}:
                 name = option.rstrip("=")
                 raise typer.BadParameter(f"{name} is empty. Name a file or folder, or leave {name} out.", ctx)

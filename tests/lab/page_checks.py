@@ -5,8 +5,10 @@ Each returns the faults that it finds, so that a test reads `assert covered(butt
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
 from axe_playwright_python.sync_playwright import Axe
 
@@ -15,6 +17,7 @@ from .conftest import DESKTOP, PHONE
 SIZES = {"desktop": DESKTOP, "tablet": (768, 1024), "zoom of 200 %": (720, 450), "phone": PHONE}
 AXE_SIZES = ("desktop", "phone")
 """Sizes at which axe-core runs, which takes seconds."""
+MOST_CONTROLS = 200
 SETTLED_MS = 250
 """Time until nothing fades in any more [ms]."""
 
@@ -26,8 +29,10 @@ _COVERED = """(it) => {
   return points.map(([x, y]) => document.elementFromPoint(x, y)).filter((found) => !it.contains(found))
     .map((found) => found ? found.outerHTML.slice(0, 200) : "out of sight");
 }"""
-_CUT = """() => [...document.querySelectorAll("body *")].filter((it) => it.checkVisibility() && it.textContent.trim()
-  && it.scrollWidth > it.clientWidth + 1 && getComputedStyle(it).textOverflow === "ellipsis")
+_CUT = """() => [...document.querySelectorAll("body *:not(svg *)")].filter((it) => it.checkVisibility()
+  && it.clientWidth && [...it.childNodes].some((node) => node.nodeType === Node.TEXT_NODE && node.textContent.trim())
+  && it.scrollWidth > it.clientWidth + 1
+  && (getComputedStyle(it).textOverflow === "ellipsis" || getComputedStyle(it).overflowX === "visible"))
   .map((it) => `cut: ${it.textContent}`)"""
 _WATCH = """() => {
   window.tooManyStates = [];
@@ -41,14 +46,16 @@ _WATCH = """() => {
   new MutationObserver(look).observe(document.body, { subtree: true, childList: true, characterData: true });
   look();
 }"""
-_CONTROLS = """() => [...document.querySelectorAll(
+_MISSED = """() => [...document.querySelectorAll(
   "a[href], button, input, textarea, select, [tabindex='0']")].filter((it) => it.checkVisibility() && !it.disabled
-  && it.tabIndex >= 0 && it.getAttribute("aria-disabled") !== "true" && it.type !== "file").length"""
+  && it.tabIndex >= 0 && it.getAttribute("aria-disabled") !== "true" && it.type !== "file"
+  && !it.dataset.reached).map((it) => `Tab does not reach ${it.outerHTML.slice(0, 200)}`)"""
 _TO_START = """() => {
   document.body.tabIndex = -1;
   document.body.focus();
   document.body.removeAttribute("tabindex");
   window.lastFocused = null;
+  for (const it of document.querySelectorAll("[data-reached]")) delete it.dataset.reached;
 }"""
 _FOCUSED = """() => {
   const it = document.activeElement, style = getComputedStyle(it), last = window.lastFocused;
@@ -69,7 +76,7 @@ def covered(locator: Any) -> list[str]:
 
 
 def cut(page: Any) -> list[str]:
-    """Return the texts that end in an ellipsis because their place is too narrow."""
+    """Return the texts that are too wide for their place: they end in an ellipsis, or run into what is next to them."""
     found: list[str] = page.evaluate(_CUT)
     return found
 
@@ -94,17 +101,21 @@ def states(page: Any) -> list[str]:
 def keyboard(page: Any) -> list[str]:
     """Return the controls that Tab reaches out of order, without a visible focus, or not at all."""
     page.set_viewport_size({"width": DESKTOP[0], "height": DESKTOP[1]})
-    page.evaluate(_TO_START)
-    n, reached, found = page.evaluate(_CONTROLS), 0, []
-    for _ in range(n + 5):
-        page.keyboard.press("Tab")
-        page.wait_for_timeout(50)  # until the border has its width
-        problem = page.evaluate(_FOCUSED)
-        if problem == "all":
+    found: list[str] = []
+    for _ in range(2):  # again if a part of the page was drawn again meanwhile: its controls are new
+        page.evaluate(_TO_START)
+        found = []
+        for _ in range(MOST_CONTROLS):
+            page.keyboard.press("Tab")
+            page.wait_for_timeout(50)  # until the border has its width
+            problem = page.evaluate(_FOCUSED)
+            if problem == "all":
+                break
+            found += [problem] if problem else []
+        found += page.evaluate(_MISSED)
+        if not found:
             break
-        found += [problem] if problem else []
-        reached += 1
-    return [*found, *([f"Tab reaches {reached} of {n} controls"] if reached < n else [])]
+    return found
 
 
 def no_paths(page: Any, root: Path) -> list[str]:
@@ -112,12 +123,16 @@ def no_paths(page: Any, root: Path) -> list[str]:
     return [f"path: {line}" for line in page.locator("body").inner_text().splitlines() if str(root) in line]
 
 
-def axe(page: Any) -> list[str]:
-    """Return what axe-core finds in the light theme, and what is hard to read in the dark one."""
+def axe(page: Any, size: str = "") -> list[str]:
+    """Return what axe-core finds in the light theme, and what is hard to read in the dark one.
+
+    If `REALITYGAP_PAGES` names a folder, a picture of each theme is written there, for review.
+    """
     found = []
     for theme, options in (("light", None), ("dark", {"runOnly": ["color-contrast"]})):
         page.emulate_media(color_scheme=theme)
         page.wait_for_timeout(SETTLED_MS)
+        _keep(page, f"{size}-{theme}")
         for fault in Axe().run(page, options=options).response["violations"]:
             targets = [node["target"] for node in fault["nodes"]][:3]
             found.append(f"{theme}: {fault['impact']}: {fault['id']}: {targets}")
@@ -136,6 +151,14 @@ def faults(page: Any, root: Path) -> list[str]:
     for size, (width, height) in SIZES.items():
         page.set_viewport_size({"width": width, "height": height})
         page.wait_for_timeout(SETTLED_MS)
-        problems = [*wide(page), *cut(page), *(axe(page) if size in AXE_SIZES else [])]
+        problems = [*wide(page), *cut(page), *(axe(page, size) if size in AXE_SIZES else [])]
         found += [f"{size}: {problem}" for problem in problems]
     return found
+
+
+def _keep(page: Any, name: str) -> None:
+    folder = os.environ.get("REALITYGAP_PAGES")
+    if folder:
+        place = urlsplit(page.url).path.strip("/").replace("/", "-") or "studies"
+        number = len(list(Path(folder).glob("*.png")))
+        page.screenshot(path=f"{folder}/{number:03}-{place}-{name}.png", full_page=True)

@@ -56,10 +56,6 @@ def keep(page: Any, name: str, **options: Any) -> None:
 def test_studies_and_one_that_is_watched(lab, visit):
     run_study(parse_study(STUDY, "study.toml"), lab.root / "first-look")
     make_study(lab.root)
-    page = visit("", size=WIDE)
-    page.locator('[data-study="first-look"]').wait_for()
-    page.locator('[data-study="by-robot"]').wait_for()
-    keep(page, "studies")
     page = visit("study/first-look", size=WIDE)
     page.locator(".lab-figure img").nth(4).wait_for()
     page.wait_for_function(
@@ -80,14 +76,18 @@ def test_studies_and_one_that_is_watched(lab, visit):
     assert rays.count() >= 3
     player.scroll_into_view_if_needed()
     keep(page, "replay", clip=_around(player))
+    page = visit("", size=WIDE)
+    page.locator('[data-study="by-robot"]').wait_for()
+    picture = page.locator('[data-study="first-look"] .lab-thumbnail img')
+    page.wait_for_function("image => image.naturalWidth", arg=picture.element_handle())
+    keep(page, "studies")
 
 
 def test_a_robot_driven_by_hand(lab, visit):
     page = visit("robot", size=PHONE, has_touch=True, **FINE)
     page.get_by_role("button", name="Use an emulated robot").click()
     page.get_by_text("Battery").wait_for()
-    for _ in range(3):
-        page.locator(".lab-pad").press("ArrowUp")
+    page.locator(".lab-pad").press("ArrowUp", delay=3000)
     page.locator(".lab-pad").blur()
     keep(page, "robot")
 

@@ -356,7 +356,7 @@ def _options(points: list[dict[str, Any]], across: str) -> dict[str, Any]:
     return {
         "animation": False,
         "grid": {"left": 50, "right": 16, "top": 36, "bottom": 44},
-        "legend": {"data": [f"sensor {k + 1}" for k in range(n)], "top": 4},
+        "legend": {"data": [f"sensor {k + 1}" for k in range(n)], "top": 4, "left": 80},
         "xAxis": {"type": "value", "name": across, "nameLocation": "middle", "nameGap": 28},
         "yAxis": {"type": "value", "name": "reading", "min": 0},
         "series": [

@@ -217,7 +217,8 @@ class _Page:
             with ui.column().classes("lab-cards"):
                 section("Drive")
                 self._show_pad(hand)
-                if not hand.is_over:
+            if not hand.is_over:
+                with ui.column().classes("lab-cards lab-drive-actions"):
                     self._show_actions(hand)
             with ui.column().classes("lab-cards lab-senses") as self._senses:
                 if hand.arena is not None:

@@ -52,10 +52,17 @@ def test_demo_refuses_a_file_as_folder(tmp_path):
     assert done.stderr == "realitygap: --out is the file tour, expected a folder. Name another one.\n"
 
 
-@pytest.mark.parametrize("words", [("demo", "--out", ""), ("run", "paper", "--out=")])
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("demo", "--out", ""),
+        ("run", "paper", "--out="),
+        ("twin", "sample", "--family", "worn", "-o", ""),
+    ],
+)
 def test_an_empty_name_of_a_folder_is_refused(words, tmp_path):
     """The path of an empty name is the current folder."""
     done = realitygap(*words, cwd=tmp_path)
     assert done.returncode == 2
-    assert done.stderr.endswith("--out is empty. Name a file or folder, or leave --out out.\n")
+    assert " is empty. Name a file or folder, or leave " in done.stderr
     assert not list(tmp_path.iterdir())

@@ -17,19 +17,9 @@ from realitygap.kernels.compile.progress import report_compiling
 
 from ._commands import COMMANDS, Command, root_help
 
-_STUDY_SETTINGS = tuple(
-    f"--{name}"
-    for name in (
-        "noise",
-        "selection",
-        "arena",
-        "start",
-        "task",
-        "fitness",
-        "population",
-        "generations",
-        "steps",
-    )
+_STUDY_SETTINGS = (
+    *("--noise", "--selection", "--arena", "--start", "--task", "--fitness"),
+    *("--population", "--generations", "--steps"),
 )
 """What newcomers try as options of `run`."""
 
@@ -87,10 +77,12 @@ class _GroupedCommand(TyperCommand):
             if (parameter.metavar or "").startswith(("DIR", "FILE", "PATH"))
             for option in parameter.opts
         }
-        for option, value in itertools.zip_longest(args, args[1:]):
-            if (option in paths and value == "") or option in {f"{path}=" for path in paths}:
-                name = option.rstrip("=")
-                raise typer.BadParameter(f"{name} is empty. Name a file or folder, or leave {name} out.", ctx)
+        for word, value in itertools.zip_longest(args, args[1:]):
+            option = word.removesuffix("=")
+            if option in paths and (word != option or value == ""):
+                raise typer.BadParameter(
+                    f"{option} is empty. Name a file or folder, or leave {option} out.", ctx
+                )
         return super().parse_args(ctx, args)
 
     def format_options(self, ctx: Any, formatter: Any) -> None:
@@ -113,6 +105,8 @@ def make_app(commands: Sequence[Command]) -> typer.Typer:
     for command in commands:
         item = getattr(import_module(f"{__package__}.{command.module}"), command.attribute)
         if isinstance(item, typer.Typer):
+            for each in item.registered_commands:
+                each.cls = _GroupedCommand
             app.add_typer(item, name=command.name)
         else:
             app.command(command.name, cls=_GroupedCommand)(item)

@@ -70,7 +70,7 @@ class Senses(Base):
         return float(self._driven("battery"))
 
     def getDistance(self, *position: str | int) -> Any:
-        """Return the nearness of an obstacle to the infrared sensors of a Scribbler 2: 0 touching, 99 nothing seen.
+        """Return the distance of an obstacle from the infrared sensors of a Scribbler 2: 0 touching, 99 nothing seen.
 
         Args:
             position: "left", "right", or 0, 1; none gives both.

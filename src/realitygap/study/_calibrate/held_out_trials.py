@@ -69,8 +69,10 @@ def compare_on_trials(
     evidence, every = _evidence(unseen, ensemble), _evidence(trials, ensemble)
     try:
         estimate, draws = fit([trial for trial, is_held in zip(trials, held, strict=True) if not is_held])
-    except ValueError:  # without them, the others are too few for a fit
-        return parts
+    except ValueError as error:
+        return replace(
+            parts, notes=(f"No trials were held out: a fit to the others failed ({error}).", *parts.notes)
+        )
     if not evidence or not estimate:
         return parts
     own = ensemble.platform.robot.numbers()

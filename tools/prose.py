@@ -26,7 +26,7 @@ BASELINE = ROOT / "tools" / "prose.json"
 LONGEST_SENTENCE = 30  # words
 LONGEST_SUMMARY = 58  # characters: the list of commands shows whole lines in 80 columns
 
-OPENING = re.compile(r"^(Of|Where|Whoever|Whose|That which|What|By|Nor|In place of|How)\b")
+OPENING = re.compile(r"^(Of|Where|Whoever|Whose|That which|What|By(?! default)|Nor|In place of|How)\b")
 WORDS = re.compile(
     r"\b("
     r"carr(y|ies|ied|ying) out|go(es)? on\b(?! (to|the))|anew|what it takes|in all\b(?! )|what is there"
@@ -109,7 +109,7 @@ def sentences(text: str) -> list[str]:
     """Split prose into sentences, without code."""
     plain = re.sub(r"`[^`]*`", "CODE", " ".join(text.split()))
     plain = re.sub(r"!?\[([^\]]*)\]\([^)]*\)", r"\1", plain)
-    return [part for part in re.split(r"(?<=[.!?])\s+(?=[A-Z])", plain) if part]
+    return [part for part in re.split(r"(?<=[.!?])\s+(?=['*(“]*[A-Za-z])", plain) if part]
 
 
 def markdown(source: str) -> Iterator[Text]:
@@ -125,7 +125,8 @@ def markdown(source: str) -> Iterator[Text]:
     for number, line in enumerate([*source.splitlines(), ""], 1):
         bare = line.strip()
         is_item = re.match(r"([*+-]|\d+\.)\s", bare) is not None
-        is_prose = bare and not bare.startswith(("|", "#", ">", "(")) and not re.match(r"(\t| {4})\S", line)
+        is_code = re.match(r"(\t| {4})\S" if paragraph else r"\t| {4}", line) is not None
+        is_prose = bare and not bare.startswith(("|", "#", ">", "(")) and not is_code
         if paragraph and (not is_prose or is_item):
             yield Text("text", start, " ".join(paragraph))
             paragraph = []

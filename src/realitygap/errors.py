@@ -12,19 +12,19 @@ from typing import Any
 
 
 class RealityGapError(Exception):
-    """Anything that realitygap says about a file, a study or a machine; its text is meant for people."""
+    """An error in a file, a study, or a machine, with a message for people. The base of all other errors here."""
 
 
 class StudyError(RealityGapError):
-    """A study, or the file that describes it, cannot be carried out as written."""
+    """A study, or the file that describes it, cannot be run as written."""
 
 
 class OutgrownError(StudyError):
-    """A genome of a run grew beyond the largest that there is room for; nothing of the run was cut off and kept."""
+    """A genome of a run grew beyond the largest supported size. No part of the run is stored."""
 
 
 class TaskError(StudyError):
-    """A function of somebody's own that says what trials are worth cannot be loaded, or failed."""
+    """A custom function that scores trials cannot be loaded, or failed."""
 
 
 class RecordError(RealityGapError):
@@ -36,15 +36,15 @@ class RecordVersionError(RecordError):
 
 
 class ClusterError(RealityGapError):
-    """A cluster cannot be reached, or cannot compute what was asked; what was published before is safe."""
+    """A cluster cannot be reached, or cannot compute a request. Chunks that were published before are safe."""
 
 
 class CaseError(RealityGapError):
-    """A case file for `realitygap simulate` cannot be carried out as written."""
+    """A case file for `realitygap simulate` cannot be run as written."""
 
 
 class ControllerError(RealityGapError, ValueError):
-    """A controller does not say what its inputs are, or a platform does not have them."""
+    """A controller does not name its inputs, or a platform does not have them."""
 
 
 class DescriptionError(RealityGapError, ValueError):
@@ -56,11 +56,11 @@ class TableError(RealityGapError):
 
 
 class LogError(RealityGapError):
-    """A log or a table of measurements of a robot cannot be read as its mapping says."""
+    """A log or a table of measurements of a robot cannot be read with its mapping."""
 
 
 class RobotError(RealityGapError):
-    """A robot cannot be reached, or does not do what was asked; the text says whether its motors are stopped."""
+    """A robot cannot be reached, or does not obey a command. The message states whether its motors are stopped."""
 
 
 class RobotTimeout(RobotError):  # noqa: N818  # the word that its users know
@@ -72,15 +72,15 @@ class RobotStopped(RobotError):  # noqa: N818  # the word that its users know
 
 
 class ProtocolError(RobotError):
-    """What came is not what the protocol has there."""
+    """A received byte or message does not follow the protocol."""
 
 
 class LedgerError(RecordError):
-    """A ledger of physical trials cannot be trusted, written, or does not allow what was asked."""
+    """A ledger of physical trials cannot be trusted or written, or does not allow the requested change."""
 
 
 class VisionError(RealityGapError):
-    """A picture or video does not show what it has to, or cannot be read; the text says what was missing."""
+    """A picture or video cannot be read, or does not show what is needed. The message names what is missing."""
 
 
 class MissingExtraError(RealityGapError, ImportError):
@@ -88,11 +88,12 @@ class MissingExtraError(RealityGapError, ImportError):
 
 
 def from_extra(module: str, extra: str) -> Any:
-    """A module that comes with an extra of realitygap.
+    """Return a module that comes with an extra of realitygap.
 
     Raises:
-        MissingExtraError: it is not installed; the text has the command that installs it.
-        KeyboardInterrupt: Ctrl-C came while it was loaded; some modules written in C report that as an ImportError.
+        MissingExtraError: The module is not installed; the message has the command that installs it.
+        KeyboardInterrupt: The user pressed Ctrl-C while the module was loading. Some modules written in C report that
+            as an ImportError.
     """
     try:
         return import_module(module)
@@ -103,10 +104,10 @@ def from_extra(module: str, extra: str) -> Any:
 
 
 def require_extra(module: str, extra: str) -> None:
-    """Refuse work for which another process will need an extra, before any of it is done.
+    """Raise an error before work starts for which another process needs an extra that is not installed.
 
     Raises:
-        MissingExtraError: The module is not installed; the text has the command that installs it.
+        MissingExtraError: The module is not installed; the message has the command that installs it.
     """
     if find_spec(module) is None:
         raise _missing(module, extra, "is not installed")
@@ -122,7 +123,7 @@ def _missing(module: str, extra: str, problem: str) -> MissingExtraError:
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """A hint that names the known word nearest to `name`, or lists all; empty when nothing is known."""
+    """Return a hint that names the known word nearest to `name`, or lists all; empty if there are none."""
     choices = sorted(known)
     near = difflib.get_close_matches(name, choices, n=1, cutoff=0.5)
     if near:
@@ -131,16 +132,16 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
 
 
 def whole_number(name: str, value: object, least: int | None = None, most: int | None = None) -> int:
-    """An argument that counts or numbers something, as Python's own int; numpy's whole numbers are taken too.
+    """Return a whole number as Python's own int; numpy's whole numbers are accepted too.
 
     Args:
-        name: Of the argument, for the message.
-        value: What came.
-        least, most: What it may be; no limit where one is not given, and no `most` without `least`.
+        name: Name of the argument, for the message.
+        value: Value of the argument.
+        least, most: Smallest and largest allowed value. `most` counts only if `least` is given.
 
     Raises:
-        TypeError: It is not a whole number.
-        ValueError: It is out of range.
+        TypeError: The value is not a whole number.
+        ValueError: The value is out of range.
     """
     try:
         number = operator.index(value)  # type: ignore[arg-type]  # refused below where it has no such thing
@@ -155,16 +156,16 @@ def whole_number(name: str, value: object, least: int | None = None, most: int |
 
 
 def real_number(name: str, value: object, least: float, most: float) -> float:
-    """An argument that measures something, as Python's own float; numpy's numbers are taken too.
+    """Return a real number as Python's own float; numpy's numbers are accepted too.
 
     Args:
-        name: Of the argument, for the message.
-        value: What came.
-        least, most: What it may be.
+        name: Name of the argument, for the message.
+        value: Value of the argument.
+        least, most: Smallest and largest allowed value.
 
     Raises:
-        TypeError: It is not a number.
-        ValueError: It is out of range, or NaN.
+        TypeError: The value is not a number.
+        ValueError: The value is out of range, or NaN.
     """
     if not isinstance(value, Real) or isinstance(value, bool):
         raise TypeError(f"{name} is {value!r}, expected a number from {least} to {most}.")

@@ -1,4 +1,4 @@
-"""What all settings have in common: plain values, checked, whose mistakes are told in our words."""
+"""Common base of all settings: plain values, which are checked, with our own error messages."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ _LIMITS = {
 
 
 def _refusing(wrong: Literal["float_type", "int_type"]) -> dict[str, Any]:
-    """A step before a number is checked, which says of true and false that they are none."""
+    """Return a step before the check of a number that refuses true and false."""
 
     def refuse_truth(value: Any) -> Any:
         if isinstance(value, bool):
@@ -52,7 +52,7 @@ _REFUSING = {"float": _refusing("float_type"), "int": _refusing("int_type")}
 
 
 def _without_truth_in_numbers(schema: Any) -> Any:
-    """A schema whose numbers are not true or false, which pydantic would take for 1 and 0."""
+    """Return a schema that refuses true and false as numbers, which pydantic would take for 1 and 0."""
     if isinstance(schema, list | tuple):
         return type(schema)(map(_without_truth_in_numbers, schema))
     if not isinstance(schema, dict) or schema.get("function") in _REFUSING.values():
@@ -64,10 +64,10 @@ def _without_truth_in_numbers(schema: Any) -> Any:
 
 
 class Settings(BaseModel):
-    """Settings that cannot be changed once they are made, of which no other than the named ones may be given.
+    """Immutable settings that refuse unknown names.
 
     Raises:
-        ValueError: A setting is unknown, missing, or cannot be what it is; the text has every mistake.
+        ValueError: A setting is unknown, missing, or out of range. The message lists all mistakes.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
@@ -84,7 +84,7 @@ class Settings(BaseModel):
             "\n".join(f"{name}.{place}: {text}" if place else f"{name}: {text}" for place, text in found)
         )
 
-    # Else pydantic would call it for tables within tables, too, and tell of its errors as if they were a value's.
+    # Otherwise pydantic would call it for nested tables, too, and report its errors as errors of a value.
     __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]
 
     @classmethod
@@ -94,7 +94,7 @@ class Settings(BaseModel):
 
     @classmethod
     def __get_pydantic_core_schema__(cls, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        """As pydantic has it, except that true and false are no numbers."""
+        """Return the schema of pydantic, but refuse true and false as numbers."""
         strict: CoreSchema = _without_truth_in_numbers(handler(source))
         return strict
 
@@ -102,14 +102,14 @@ class Settings(BaseModel):
 def mistakes(
     error: ValidationError, model: type[BaseModel], values: Mapping[str, Any]
 ) -> list[tuple[str, str]]:
-    """What pydantic found wrong with the values of a model: the place in it, such as start[3], and what is wrong."""
+    """Return all mistakes that pydantic found in the values of a model: the place, such as start[3], and a message."""
     found: dict[str, list[str]] = {}
     is_setting: dict[str, bool] = {}
     problems = error.errors(include_url=False)
     within = {problem["loc"][:-2] for problem in problems} | {problem["loc"][:-1] for problem in problems}
     for problem in problems:
         if problem["type"] == "too_short" and problem["loc"] in within:
-            continue  # entries with mistakes of their own are not counted
+            continue  # a list whose entries have mistakes is not too short
         place, last, owner = _place(model, problem["loc"])
         found.setdefault(place, []).append(_explained(problem, owner))
         is_setting[place] = last in owner.model_fields
@@ -123,7 +123,7 @@ def mistakes(
 
 
 def is_hidden(info: FieldInfo) -> bool:
-    """Whether a setting is filled in by realitygap and no part of study files."""
+    """Return whether realitygap fills in a setting, which is then no part of study files."""
     extra = info.json_schema_extra
     return isinstance(extra, dict) and bool(extra.get("hidden"))
 
@@ -202,12 +202,12 @@ def _explained(problem: Any, model: type[BaseModel]) -> str:
     if kind == "literal_error":
         return f"expected {context['expected']}, got {came}.{_meant(problem['input'], context['expected'])}"
     if kind == "value_error":
-        # of the model as a whole there is nothing short to show
+        # the value of a whole model is too long to show
         is_table = not problem["loc"] or isinstance(problem["input"], Mapping | BaseModel)
         said = str(context["error"])
         if is_table:
             return said if said.endswith("?") else f"{said}."
-        # who names it already has nothing to add
+        # a message that already includes the value needs no addition
         return f"{said}." if str(problem["input"]) in said else f"{said}, got {came}."
     expected = _EXPECTED.get(kind)
     if kind in _LIMITS:
@@ -227,7 +227,7 @@ def _explained(problem: Any, model: type[BaseModel]) -> str:
 
 
 def _meant(came: object, expected: str) -> str:
-    """Which of the words may have been meant; nothing where none is near."""
+    """Return a hint that names the expected word nearest to a value; empty if none is near."""
     if not isinstance(came, str):
         return ""
     names = [name.strip(" '") for name in expected.replace(" or ", ",").split(",")]

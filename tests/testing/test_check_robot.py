@@ -42,14 +42,14 @@ BROKEN = [
         r"readings after reset has \[2.0\], expected 0 to 1; scale and limit them",
     ),
     ("channels", ("light.0",), "It has `channels` and no `select`"),
-    ("drive", lambda self, command: None, r"drive\(Command\(move=1.01, turn=0.0\)\) was carried out; call"),
+    ("drive", lambda self, command: None, r"drive\(Command\(move=1.01, turn=0.0\)\) moved the robot; call"),
     ("__enter__", lambda self: None, "__enter__ returns something else; return self"),
-    ("__exit__", lambda self, *_: True, "__exit__ swallows exceptions; return None"),
+    ("__exit__", lambda self, *_: True, "__exit__ suppresses exceptions; return None"),
     ("close", lambda self: None, r"observe\(\) works after close\(\); raise RobotError"),
     (
         "stop",
         lambda self: 1 / 0,
-        "ZeroDivisionError came out of it .* raise RobotError where the robot fails",
+        "It raised ZeroDivisionError .* raise RobotError if the robot fails",
     ),
 ]
 

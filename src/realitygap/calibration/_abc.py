@@ -28,7 +28,7 @@ from ._score import Compression, learn_compression
 
 Effort = Literal["least", "small", "full"]
 Simulate = Callable[[Evidence, Mapping[str, Floats], int], Vectors]
-"""(m, d) vectors of trials carried out with m sets of numbers, and a key of random numbers."""
+"""A function that simulates trials with m sets of numbers and a key of random numbers, and returns vectors, (m, d)."""
 
 N_LEARN = {"least": 600, "small": 800, "full": 1500}
 N_REGRESS = {"least": 600, "small": 800, "full": 1500}
@@ -71,12 +71,12 @@ def fit_all(
     """The posterior of all parameters together.
 
     Args:
-        evidence: What was observed, and what to carry out anew.
+        evidence: Observations, and trials to simulate.
         simulate: Carries it out.
-        prior: Of the parameters.
-        robot: Whose numbers they stand for.
-        seed: Of all random numbers.
-        effort: How many simulations.
+        prior: Prior of each parameter.
+        robot: Robot whose numbers the parameters change.
+        seed: Seed of all random numbers.
+        effort: Number of simulations: least, small, or full.
         tell: Called with a line after each round.
     """
     rng = np.random.default_rng(seed)

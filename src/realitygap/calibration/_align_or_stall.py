@@ -1,4 +1,4 @@
-"""Whether a robot that drives straight into a wall aligns with it or stalls: a check on friction without a simulator.
+"""A check on friction without a simulator: whether a robot that drives straight into a wall aligns with it or stalls.
 
 The wall's push, tilted by friction, passes the axle on one side or on the other: the robot aligns where
 a + atan(mu) < atan(c_x / |c_y|), with a between its heading and the wall, and c where it touches, from its axle.
@@ -27,8 +27,8 @@ class Encounters:
     """First touches of robots that drove straight on.
 
     Attributes:
-        margin: (e,) atan(c_x / |c_y|) - a [rad]: it aligns where friction's angle is less.
-        aligned: (e,) whether it turned towards the wall.
+        margin: (e,) atan(c_x / |c_y|) - a [rad]. The robot aligns if the angle of friction is smaller.
+        aligned: (e,) True if it turned towards the wall.
     """
 
     margin: Floats

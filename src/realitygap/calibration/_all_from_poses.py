@@ -51,12 +51,12 @@ def fit_from_poses(
     """The posterior of all parameters.
 
     Args:
-        trials: With poses.
-        ensemble: Carries them out anew.
-        prior: Of the parameters.
-        robot: Whose numbers they stand for.
-        arena: Where it drove.
-        seed: Of all random numbers.
+        trials: Trials with poses.
+        ensemble: Simulator of the trials.
+        prior: Prior of each parameter.
+        robot: Robot whose numbers the parameters change.
+        arena: Arena of the trials.
+        seed: Seed of all random numbers.
         tell: Called with a line after each part.
     """
     say = tell or (lambda _: None)
@@ -154,7 +154,7 @@ WITH_SLIP = {
     "drive.travel_noise_per_m": 0.5,
     "drive.heading_noise_per_m": 0.5,
 }
-"""With what power of what slip leaves of the wheels' way parameters go that were fitted without any."""
+"""Power of (1 - slip) by which each parameter that was fitted without slip is multiplied."""
 
 
 def _spread_slip(

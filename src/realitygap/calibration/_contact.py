@@ -57,15 +57,15 @@ def fit_contact(
     Only ratios of how easily it is pushed count: `contact.long` stays as it is.
 
     Args:
-        trials: As observed, with poses.
+        trials: Recorded trials with poses.
         simulate: Carries out trials in the arena, such as `SimEnsemble(...).replay`.
-        robot: On whose numbers the fit builds.
-        arena: Where it drove.
+        robot: Robot with the numbers that are not fitted.
+        arena: Arena of the trials.
         motion: Numbers of the drive by dotted name, such as those of `fit_motion`; the robot's own when not given.
         observe: Use no more than this of the trials; without poses nothing is identified.
-        prior: What is thought possible; `scribbler_prior` when not given.
+        prior: Prior of each parameter. Default: `scribbler_prior`.
         window: Commands from one observed pose to the next that is compared.
-        seed: Of the draws.
+        seed: Seed of the draws.
 
     Raises:
         ValueError: No trial, trials with commands of different lengths, or none in which a robot with poses met a wall.

@@ -27,10 +27,10 @@ def contact_plans(
     heading, and after each push the robot backs off and turns by another angle.
 
     Args:
-        arena: Trials begin where there is most room.
-        robot: As its file has it.
-        n: How many trials.
-        first_number: Of the first trial.
+        arena: Arena. Trials begin at the place with the most room.
+        robot: Robot with the numbers of its file.
+        n: Number of trials.
+        first_number: Number of the first trial.
 
     Raises:
         ValueError: There is no room for the robot to turn in place.

@@ -43,7 +43,8 @@ FINEST = {
     "command": 0.02,
     "coverage": 0.01,
 }
-"""Of each kind of entry, in its unit; `readings` are those seen from afar, of a robot that is not put back."""
+"""Smallest difference that counts for each kind of entry, in its unit. `readings` are those of a robot that is not put
+back."""
 
 
 @dataclass(frozen=True)
@@ -52,11 +53,11 @@ class Evidence:
 
     Attributes:
         play: The trials.
-        keep: What must be kept of their steps.
+        keep: Names of the values that are stored for each step.
         of: (m, d) vectors of m robots' trials.
-        seen: (d,) of the observed trials.
-        kinds: (d,) what each entry is, a key of `FINEST`.
-        trial: (d,) from which of the observed trials it is.
+        seen: (d,) vector of the observed trials.
+        kinds: (d,) kind of each entry, a key of `FINEST`.
+        trial: (d,) index of the observed trial of each entry.
         step: (d,) at which step; -1 for what is of the whole trial.
     """
 
@@ -70,7 +71,7 @@ class Evidence:
 
     @property
     def finest(self) -> Vectors:
-        """(d,) the least that can be told apart."""
+        """The smallest difference that counts, (d,)."""
         return np.array([FINEST[kind] for kind in self.kinds], np.float32)
 
 
@@ -123,9 +124,9 @@ def evidence_of(
     """Return the evidence of trials, grouped by their number of steps.
 
     Args:
-        trials: As observed.
-        genomes: The controller of each; None where commands were given.
-        n_cells: Of the arena's grid.
+        trials: Recorded trials.
+        genomes: Controller of each trial; None if its commands were given.
+        n_cells: Number of cells of the arena's grid.
     """
     numbered = [
         (k, trial, genome)

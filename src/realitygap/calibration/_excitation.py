@@ -50,12 +50,12 @@ def excitation(
     """N trials of commands: straight at full speed, in place, slow, and arcs, each for 1 to 8 steps, from anywhere.
 
     Args:
-        arena: Where.
-        radius: Of the robot's farthest point [m].
-        n: How many trials.
+        arena: Arena of the trials.
+        radius: Distance of the robot's farthest point [m].
+        n: Number of trials.
         steps: Commands in each.
         rng: Random numbers.
-        number: Of the first.
+        number: Number of the first trial.
     """
     return [
         TrialPlan(

@@ -15,15 +15,15 @@ MOTION = (
     "drive.gain", "drive.asymmetry", "drive.track", "drive.axle", "drive.lag", "drive.delay", "drive.slip",
     "drive.drift_per_m", "drive.battery_sag", "drive.soft_dead_band",
 )  # fmt: skip
-"""What decides the mean of a motion, smoothly."""
+"""Numbers that determine the mean of a motion, smoothly."""
 
 MOTION_NOISE = (
     "drive.delay_jitter", "drive.travel_noise_per_m", "drive.heading_noise_per_m", "drive.heading_noise_per_s",
 )  # fmt: skip
-"""What decides how motions scatter."""
+"""Numbers that determine the scatter of motions."""
 
 CONTACT = ("contact.friction", "contact.lat", "contact.ang", "contact.saturation")
-"""What decides how a robot gives way; `contact.long` is 1: only ratios count."""
+"""Numbers that determine the contact with walls. `contact.long` is 1, because only ratios count."""
 
 BELOW_ONE = 1.0 - 1e-12  # distributions are asked for places below 1
 Known = Mapping[str, Parameter]
@@ -35,7 +35,7 @@ def parameters_of(robot: RobotModel, prior: Sequence[Parameter] | None = None) -
 
 
 def values_at(parameters: Sequence[Parameter], places: Floats) -> dict[str, Floats]:
-    """(m,) of each parameter at places (m, p) between the ends of its prior, 0..1, each as likely."""
+    """Return the values of each parameter, (m,), at places (m, p) between the ends of its prior, 0 to 1, uniformly."""
     return {
         parameter.name: parameter.prior.of(np.clip(place, 0.0, BELOW_ONE))
         for parameter, place in zip(parameters, places.T, strict=True)
@@ -57,7 +57,7 @@ def own_values(robot: RobotModel) -> dict[str, float]:
 
 
 def robot_numbers(known: Known, robot: RobotModel, values: Mapping[str, Floats]) -> dict[str, Floats]:
-    """(m,) of each of the robot's numbers that parameters (m,) stand for."""
+    """Return the robot's numbers, (m,) each, for parameters (m,)."""
     plain = {name: value for name, value in values.items() if name not in known}
     given = {name: value for name, value in values.items() if name in known}
     return plain | numbers_of([known[name] for name in given], given, robot)

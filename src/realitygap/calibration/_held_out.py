@@ -1,4 +1,4 @@
-"""The error of predictions of the part of a recording that no fit has seen."""
+"""The error of predictions of the part of a recording that no fit used."""
 
 from __future__ import annotations
 

@@ -26,8 +26,8 @@ class Identified:
 
     Attributes:
         ratio: Width of its posterior interval in parts of the prior's.
-        identified: Whether that is less than half.
-        partners: Parameters from which it cannot be told: only together they are known.
+        identified: True if the ratio is less than half.
+        partners: Parameters that cannot be distinguished from it: only a combination of them is known.
     """
 
     ratio: float
@@ -41,7 +41,7 @@ def collinear_groups(sensitivities: Floats, names: Sequence[str]) -> list[tuple[
     Args:
         sensitivities: (n, p) derivatives of what was observed, in standard deviations of its noise, by each parameter
             in parts of what was thought possible.
-        names: (p,) of the parameters.
+        names: (p,) names of the parameters.
 
     Source: eigenvectors of the Fisher information, as in the profile of sloppy models (Gutenkunst et al. 2007).
     """
@@ -106,7 +106,7 @@ ADVICE: dict[str, tuple[str, str, str]] = {
     "contact.ang": (CAMERA, CAMERA, ANGLES),
     "contact.saturation": (CAMERA, CAMERA, "press against walls with wheels that turn unequally"),
 }
-"""What to record, where cells, encoders or a track were observed."""
+"""Data to record for each parameter, by the kind of observation: cells, encoders, or a track."""
 
 
 def advice_for(name: str, observe: Observe, partners: Sequence[str] = ()) -> str:

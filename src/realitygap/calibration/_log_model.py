@@ -19,7 +19,7 @@ LEAST_LAG = 1e-6
 """A lag below this is none [s]."""
 
 LEAST_ROOM = 1e-6
-"""Of the commands that a soft dead band leaves."""
+"""Minimum of 1 - soft dead band, by which commands are divided."""
 
 FIRST_TURN = 0.3
 """Standard deviation of the first heading, which positions alone show only later [rad]."""
@@ -34,7 +34,8 @@ class MotionLog:
 
     Attributes:
         time_s: (n,) ascending [s].
-        commands: (n, 2) of the left and right wheel, as shares of full speed, each until the next time.
+        commands: (n, 2) command of the left and the right wheel, as shares of full speed. Each lasts until the next
+            time.
         poses: (n, 3) x [m], y [m], heading [rad]; nan if not seen.
         encoders: (n, 2) distance of the left and right wheel since the start [m]; nan if not seen.
     """
@@ -45,24 +46,24 @@ class MotionLog:
     encoders: Floats
 
     def until(self, row: int) -> MotionLog:
-        """Return the same log with nothing seen from a row on."""
+        """Return the same log without observations from a row on."""
         poses, encoders = self.poses.copy(), self.encoders.copy()
         poses[row:], encoders[row:] = np.nan, np.nan
         return replace(self, poses=poses, encoders=encoders)
 
     @property
     def sees_poses(self) -> bool:
-        """Whether a position was seen at two times."""
+        """True if a position was observed at two times."""
         return int(np.isfinite(self.poses[:, 0]).sum()) > 1
 
     @property
     def sees_heading(self) -> bool:
-        """Whether a heading was seen."""
+        """True if a heading was observed."""
         return bool(np.isfinite(self.poses[:, 2]).any())
 
     @property
     def sees_wheels(self) -> bool:
-        """Whether encoders were seen at two times."""
+        """True if encoders were observed at two times."""
         return bool((np.isfinite(self.encoders).all(axis=1)).sum() > 1)
 
 
@@ -72,7 +73,7 @@ class Tracked:
 
     Attributes:
         poses: (m, n, 3) predicted before each time's own observation.
-        log_likelihood: (m,) of the poses.
+        log_likelihood: (m,) log likelihood of the poses.
     """
 
     poses: Floats
@@ -87,7 +88,7 @@ def wheel_steps(log: MotionLog, numbers: Mapping[str, Floats]) -> Floats:
 
     Args:
         log: Times and commands.
-        numbers: (m,) of `drive.*`.
+        numbers: (m,) values of `drive.*`.
     """
     at = {name.removeprefix("drive."): values[:, None] for name, values in numbers.items()}
     time = log.time_s
@@ -136,9 +137,9 @@ def track(
     """Filter the poses of a log.
 
     Args:
-        log: Of n times; rows without a position are predicted.
-        steps: (m, n - 1, 2) of `wheel_steps`.
-        numbers: (m,) of `drive.*`.
+        log: Log of n times. Rows without a position are predicted.
+        steps: (m, n - 1, 2) result of `wheel_steps`.
+        numbers: (m,) values of `drive.*`.
         noise: (m,) `travel_per_m`, `heading_per_m`, `heading_per_s`, `place` and `angle`.
     """
     m, n = steps.shape[:2]
@@ -239,8 +240,8 @@ def encoder_likelihood(log: MotionLog, steps: Floats, noise: Mapping[str, Floats
     """Return the log likelihood of the distances between encoder readings, shape (m,).
 
     Args:
-        log: Of n times.
-        steps: (m, n - 1, 2) of `wheel_steps`.
+        log: Log of n times.
+        steps: (m, n - 1, 2) result of `wheel_steps`.
         noise: (m,) `wheel_per_m`, of a distance, and `wheel`, of a reading [m].
     """
     rows = np.flatnonzero(np.isfinite(log.encoders).all(axis=1))
@@ -252,5 +253,5 @@ def encoder_likelihood(log: MotionLog, steps: Floats, noise: Mapping[str, Floats
 
 
 def seen_rows(log: MotionLog) -> Bools:
-    """Return whether anything was seen at each time, shape (n,)."""
+    """Return whether each time has an observation, (n,)."""
     return np.asarray(np.isfinite(log.poses[:, 0]) | np.isfinite(log.encoders).all(axis=1))

@@ -47,11 +47,11 @@ class MotionFit:
 
     Attributes:
         fitted: The parameters with 90 % intervals.
-        numbers: Of the robot by dotted name: the estimate.
-        draws: (d,) of each number in draws from the posterior, jointly.
-        method: How.
-        notes: What else there is to say.
-        evidence: What figures are drawn from.
+        numbers: Estimated numbers of the robot, by dotted name.
+        draws: (d,) samples of each number from the joint posterior.
+        method: Method of the fit.
+        notes: Notes on the fit.
+        evidence: Data of figures.
     """
 
     fitted: tuple[Fitted, ...]
@@ -86,14 +86,14 @@ def fit_motion(
     """Fit the drive of a robot to windows of trials in which it touched nothing.
 
     Args:
-        trials: As observed: with poses, with the way of the wheels, or both.
+        trials: Recorded trials with poses, with the distance of the wheels, or with both.
         simulate: Carries out trials in the arena, such as `SimEnsemble(...).replay`.
-        robot: On whose numbers the fit builds.
-        arena: Where it drove.
+        robot: Robot with the numbers that are not fitted.
+        arena: Arena of the trials.
         observe: Use no more than this of the trials.
-        prior: What is thought possible; `scribbler_prior` when not given.
+        prior: Prior of each parameter. Default: `scribbler_prior`.
         window: Commands from one observed pose to the next that is compared.
-        seed: Of the draws.
+        seed: Seed of the draws.
 
     Raises:
         ValueError: No trial, trials with commands of different lengths, or none in which the robot moved freely and
@@ -129,7 +129,7 @@ class DeadBand:
     weights: Floats
 
     def draws(self, rng: np.random.Generator, n: int) -> Floats:
-        """(n,) from its posterior."""
+        """Return draws from its posterior, (n,)."""
         part = rng.choice(len(self.weights), n, p=self.weights)
         return np.asarray(rng.uniform(self.edges[part], self.edges[part + 1]))
 
@@ -275,7 +275,7 @@ def _rms(off: Floats, seen: Bools) -> list[float]:
 def fitted_parameter(
     parameter: Parameter, estimate: float, draws: Floats, found: Identified, observe: Observe
 ) -> Fitted:
-    """A parameter with its 90 % interval, and advice where it is not identified."""
+    """Return a parameter with its 90 % interval, and with advice if it is not identified."""
     low, high = np.quantile(draws, [0.05, 0.95])
     return Fitted(
         name=parameter.name,

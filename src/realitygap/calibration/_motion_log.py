@@ -29,13 +29,13 @@ FREE = 0.01
 """Weight of the prior in a first search, in which the log alone decides what it can tell."""
 
 LEAST_CURVATURE = 0.03
-"""Of a log posterior on the standard scale, so that an interval is no wider than its prior's."""
+"""Minimum curvature of a log posterior on the standard scale, so that an interval is no wider than its prior's."""
 
 BEYOND = 1e12
 """Larger than what is minimized can be."""
 
 STEP = 1e-3
-"""Of finite differences, in standard deviations of the prior."""
+"""Step of finite differences, in standard deviations of the prior."""
 
 METHOD = (
     "Maximum a posteriori with a Cauchy prior around the robot file's numbers (Gelman et al. 2008); likelihood of the "
@@ -49,13 +49,13 @@ class Spread:
     """A parameter of a log with its prior.
 
     Attributes:
-        name: As in a calibration.
+        name: Name, the same as in a calibration.
         kind: plus: spread around the robot's own number; ratio: its logarithm is; size: only its absolute value
             counts.
         spread: Scale of the prior, chosen for a robot whose file is nearly right: a Cauchy distribution, whose tails
             let go of a file that is wrong (Gelman et al. 2008); with `is_normal`, the standard deviation.
-        unit: Of its values.
-        advice: What to record if it is not identified.
+        unit: Unit of its values.
+        advice: Data to record if it is not identified.
     """
 
     name: str
@@ -98,7 +98,7 @@ OWN_NOISE = (
     Spread("drive.heading_noise_per_m", "ratio", 1.0, "rad", "Record poses for longer.", is_normal=True),
 )
 SEEN_NOISE = {"place": 0.003, "angle": 0.01, "wheel": 0.0005, "wheel_per_m": 0.003}
-"""What errors of a camera and of encoders are near [m, rad, m, m]; a factor of e is one standard deviation."""
+"""Typical errors of a camera and of encoders [m, rad, m, m]. A factor of e is one standard deviation."""
 
 LEAST_NOISE = 0.002
 """Noise of the drive that a fit begins from, if the robot's file has less."""

@@ -1,4 +1,4 @@
-"""Trials that excite a robot's drive away from walls, and come back."""
+"""Trials that excite a robot's drive away from walls, and return to the start."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ def motion_plans(
 
     Args:
         arena: Trials begin in the middle of the largest free place on a grid in it, along its longer side.
-        robot: As its file has it.
-        n: How many trials; the first five are each of one kind.
-        first_number: Of the first trial.
+        robot: Robot with the numbers of its file.
+        n: Number of trials. Each of the first five is of another kind.
+        first_number: Number of the first trial.
 
     Raises:
         ValueError: There is no room for the robot to turn in place.

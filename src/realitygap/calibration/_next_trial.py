@@ -1,4 +1,4 @@
-"""Which trials would tell most: those after which least remains unknown of what is to be predicted.
+"""Selection of the most informative trials: those that leave the least uncertainty about a goal.
 
 Around what is known by now, what a trial shows is taken for linear in the parameters with normal noise, both learned
 from robots of the posterior. Then a trial adds its information to the precision of the parameters, whatever comes out.
@@ -18,11 +18,11 @@ from ._score import learn_compression
 
 
 def information_of(places: Floats, vectors: Vectors, finest: Vectors) -> Floats:
-    """(p, p) what a trial tells of the parameters: the Fisher information of its expected observations.
+    """Return the Fisher information of a trial's expected observations about the parameters, (p, p).
 
     Args:
-        places: (m, p) of robots of the posterior.
-        vectors: (m, d) what each shows in the trial.
+        places: (m, p) parameters of robots from the posterior.
+        vectors: (m, d) observations of each robot in the trial.
         finest: (d,) the least standard deviation of an entry.
     """
     weights = learn_compression(places, vectors, finest).of_means.astype(np.float64)
@@ -35,11 +35,11 @@ def next_trials(
     """Indices of the n candidates that together tell most, the one that tells most first.
 
     Args:
-        places: (m, p) of robots of the posterior.
-        informations: (p, p) of each candidate.
-        n: How many to take; a candidate may be taken again.
-        goal: (m, q) what is to be predicted, of each robot, such as the mean coverage of controllers that were not
-            tried: then its variance is to fall; the parameters' entropy when not given.
+        places: (m, p) parameters of robots from the posterior.
+        informations: (p, p) information of each candidate.
+        n: Number of trials to choose. A candidate may be chosen again.
+        goal: (m, q) quantities to predict for each robot, such as the mean coverage of controllers that were not
+            tried. The choice lowers their variance. Default: it lowers the entropy of the parameters.
 
     Raises:
         ValueError: There is no candidate.

@@ -27,16 +27,16 @@ PATH_STEPS = 5
 """Full-speed commands of a trial (section 2.2)."""
 
 REST_STEPS = 2
-"""Commands in which the robot comes to rest: a ruler finds it there, and so do a camera and the simulation."""
+"""Number of commands in which the robot comes to rest, so that a ruler, a camera, and the simulation find it there."""
 
 REPEATS = 5
-"""Of each of the two paths, where no budget says otherwise."""
+"""Default number of repeats of each of the two paths."""
 
 ROBOT_STEPS = 100
 """Commands of a trial on the paper's robot."""
 
 JYRO_STEP = 0.1
-"""What a full step is in the paper's simulation [m] (19.7 in are five)."""
+"""Length of a full step in the paper's simulation [m] (19.7 in are five)."""
 
 ENDS = (0.05, 0.95)
 
@@ -49,7 +49,7 @@ GAIN_SPREAD, UNEVEN_SPREAD, TRACK_SPREAD = 0.29, 0.115, 0.17
 STRAIGHT, TURNING = (1.0, 0.0), (0.0, 1.0)
 
 Simulate = Callable[[TrialRecord], Moved]
-"""How the simulated robot moves, without noise, in a trial with the same start and commands."""
+"""A function that simulates a trial with the same start and commands, without noise."""
 
 
 @dataclass(frozen=True)
@@ -58,10 +58,10 @@ class PathFit:
 
     Attributes:
         fitted: Parameters with intervals.
-        numbers: Of the robot, by dotted name.
-        draws: (n,) of each.
-        notes: What else there is to say.
-        evidence: What was measured.
+        numbers: Numbers of the robot, by dotted name.
+        draws: (n,) draws of each number.
+        notes: Notes on the fit.
+        evidence: Measured values.
     """
 
     fitted: tuple[Fitted, ...]
@@ -100,19 +100,19 @@ def fit_path(
     *,
     n_draws: int = 500,
 ) -> PathFit:
-    """Gains of the wheels and the track, from where paths end.
+    """Fit the gains of the wheels and the track from the ends of paths.
 
     Args:
-        trials: Of `path_plans`, with poses, the pose of their end, or encoders.
+        trials: Trials of `path_plans`, with poses, the pose of their end, or encoders.
         simulate: The robot on whose numbers the fit builds.
-        robot: The same as a description.
+        robot: Description of the simulated robot.
         rng: Random numbers.
-        n_draws: From the posterior.
+        n_draws: Number of draws from the posterior.
 
     Returns:
-        The fit: wheels' gains and track as scale factors of the simulated way and turn, so that lag and delay stay what
-        the robot's file says of them. Intervals are Student's, from the spread of repeats and the step to which was
-        read.
+        The fit: the wheels' gains and the track, as scale factors of the simulated distance and turn. So the lag and
+        the delay of the robot's file stay. Intervals are Student's, from the spread of repeats and the resolution of
+        the readings.
 
     Raises:
         ValueError: No trial drove straight at full speed, or the robot stood still in all that should have, or turned

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from ._simulate import Floats
 
 NEIGHBORS = 7
-"""Steps of the seen part with the most similar commands, whose mean motion is looked up."""
+"""Number of steps with the most similar commands whose mean motion is used."""
 ALIGNED_M = 0.3
 """Length of the path before the split that gives the heading there [m]."""
 LEAST_ALIGNED = 3
@@ -17,13 +17,13 @@ MOST_STEP_RAD = 1.0
 
 
 def look_up_motion(time_s: ArrayLike, commands: ArrayLike, poses: ArrayLike, split: int) -> Floats:
-    """Return positions of the unseen part of a log, by the motion in seen steps with similar commands.
+    """Return positions of the held-out part of a log, by the motion in fitted steps with similar commands.
 
     Args:
         time_s: (n,) ascending times [s].
         commands: (n, 2) commands of the left and right wheel.
         poses: (n, 2) x, y [m] or (n, 3) x, y, heading [rad]; nan if not seen.
-        split: First row that is not seen.
+        split: First row of the held-out part.
 
     Returns:
         (n - split, 2) positions [m].
@@ -45,13 +45,13 @@ def look_up_motion(time_s: ArrayLike, commands: ArrayLike, poses: ArrayLike, spl
 
 
 def drive_on(steps: Floats, poses: Floats, split: int) -> Floats:
-    """Return the positions of a body that moves by steps from the end of the seen part on, (n - split, 2) [m].
+    """Return the positions of a body that moves by steps from the end of the fitted part, (n - split, 2) [m].
 
     Args:
-        steps: (n - 1, 2) way ahead [m] and turn [rad] of each step.
-        poses: (n, 2) or (n, 3) poses; nan if not seen. Without headings, the heading at the split is the one that lays
-            the last part of the stepped path on the seen one.
-        split: First row that is not seen.
+        steps: (n - 1, 2) distance ahead [m] and turn [rad] of each step.
+        poses: (n, 2) or (n, 3) poses; nan if not seen. Without headings, the heading at the split is the one that
+            aligns the last part of the computed path with the observed one.
+        split: First row of the held-out part.
     """
     heading = np.concatenate([[0.0], np.cumsum(steps[:, 1])])
     middle = heading[:-1] + steps[:, 1] / 2

@@ -26,7 +26,7 @@ def draw_linear(rng: np.random.Generator, at: Floats, jacobian: Floats, off: Flo
     Args:
         rng: Random numbers.
         at: (p,) the draw before.
-        jacobian: (n, p) of the simulated.
+        jacobian: (n, p) derivatives of the simulated differences.
         off: (n,) differences at place 0.
     """
     curvature = jacobian.T @ jacobian
@@ -81,8 +81,8 @@ def walk(
     Args:
         rng: Random numbers.
         at: (q,) the draw before.
-        prior: Of noise.
-        log_likelihood: Of all numbers.
+        prior: Prior of the noise.
+        log_likelihood: Log likelihood of all numbers.
         reach: (q,) standard deviations of proposals; changed.
     """
     here, now = at.copy(), log_likelihood(at) + prior.log_density(at)
@@ -109,7 +109,7 @@ def sample_clusters(
     reach: float = 0.12,
     n: int = 300,
 ) -> Floats:
-    """(n_draws, p) places 0..1 that observations in clusters allow, for a model that is not smooth.
+    """Return places in 0 to 1 that observations in clusters allow, (n_draws, p), for a model that is not smooth.
 
     Places are looked for around the best so far, with a t distribution that each round fits anew (population Monte
     Carlo, Cappe et al. 2004). Each draw weighs the clusters anew (weighted likelihood bootstrap, Newton & Raftery
@@ -117,11 +117,11 @@ def sample_clusters(
 
     Args:
         rng: Random numbers.
-        center: (p,) where to begin.
-        log_likelihoods: (m, k) of each of k clusters at places (m, p).
-        n_draws: How many.
+        center: (p,) first place.
+        log_likelihoods: Function that returns the log likelihood of each of k clusters at places (m, p), (m, k).
+        n_draws: Number of draws.
         reach: Standard deviation to begin with.
-        n: At how many places in each round.
+        n: Number of places in each round.
     """
     p = len(center)
     spread = reach**2 * np.eye(p)

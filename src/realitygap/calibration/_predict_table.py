@@ -51,7 +51,7 @@ def look_up_readings(
     readings: ArrayLike,
     seen: NDArray[np.bool_],
 ) -> Floats:
-    """Return the mean of the nearest seen readings of the same sensor for each place, shape (n,).
+    """Return the mean of the nearest fitted readings of the same sensor for each place, shape (n,).
 
     Places are neighbors by the ranks of their distances and bearings. nan if no seen place is near.
 
@@ -60,7 +60,7 @@ def look_up_readings(
         distance_m: (n,) [m].
         bearing_rad: (n,) [rad].
         readings: (n,) 0 to 1.
-        seen: (n,) whether a reading is in the table that is looked up.
+        seen: (n,) True for the readings to look up.
     """
     which, values = np.asarray(sensor, np.int64), np.asarray(readings, np.float64)
     row, column = place_ranks(distance_m, bearing_rad)

@@ -1,4 +1,4 @@
-"""Whether a simulator can make what was observed, by the posterior predictive check, and how well it predicts trials.
+"""The posterior predictive check of a simulator against observations, and errors of predictions.
 
 With enough trials any robot differs from any simulator significantly, so what counts is a size: the share of the
 observations' variance that the fitted simulator neither predicts nor makes by chance.
@@ -40,8 +40,8 @@ class Misfit:
     """The part of one kind of observation that a fitted simulator cannot reproduce.
 
     Attributes:
-        kind: Of what was observed, such as turn.
-        share: Of its variance, what is neither predicted nor chance; may come out below 0.
+        kind: Kind of the observations, such as turn.
+        share: Share of their variance that is neither predicted nor chance; noise can make it negative.
         tolerated: Up to which share the fit counts as well specified.
         p: Share of robots from the posterior whose own trials are as far off.
     """
@@ -53,7 +53,7 @@ class Misfit:
 
     @property
     def is_too_large(self) -> bool:
-        """Whether the simulator cannot make what was observed."""
+        """True if the simulator cannot reproduce the observations."""
         return self.share > self.tolerated
 
 
@@ -67,10 +67,10 @@ def misfits(
     """Return the part of each kind of observation that robots of the posterior cannot reproduce.
 
     Args:
-        evidence: What was observed.
-        simulate: Carries the trials out anew.
+        evidence: Observations.
+        simulate: Function that simulates the trials.
         numbers: (m,) draws of the robot's numbers from the posterior, by dotted name.
-        key: Of the random numbers.
+        key: Key of the random numbers.
     """
     m = len(next(iter(numbers.values())))
     which = np.linspace(0, m - 1, N_PREDICTIVE).astype(int)
@@ -123,7 +123,7 @@ def prediction_errors(
         held_out: The trials to predict.
         every: All trials, held out or not: variances are theirs, because few trials vary little by chance.
         simulate: Runs the trials in simulation.
-        numbers: (m,) of the robot's numbers, by dotted name, for m robots.
+        numbers: (m,) values of the robot's numbers for m robots, by dotted name.
         kinds: Kinds of observation that count.
         key: Key of the random numbers.
     """

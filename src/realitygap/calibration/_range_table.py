@@ -31,13 +31,13 @@ NOISE = 0.05
 """Standard deviation of readings around the response that the prior is weighed against."""
 
 STEP = 1e-4
-"""Of finite differences, in standard deviations of the prior."""
+"""Step of finite differences, in standard deviations of the prior."""
 
 MOST_STEPS, MOST_DAMPING, ENOUGH = 200, 1e8, 1e-5
-"""Of least squares: a step that gains less than this share is the last."""
+"""Limits of least squares. A step that gains less than the share `ENOUGH` is the last."""
 
 LEAST_COSINE = 1e-3
-"""Of the angle at which a ray meets a wall; one that is flatter meets none."""
+"""Minimum cosine of the angle between a ray and the normal of a wall. A flatter ray meets no wall."""
 
 METHOD = (
     "Least squares of readings between 0 and 1 with a normal prior, response as in `sim`; distances that were set "
@@ -50,11 +50,11 @@ class Number:
     """A number of a range sensor with its prior.
 
     Attributes:
-        name: As in the robot's file.
+        name: Name, the same as in the robot's file.
         kind: ratio: its logarithm is normal around `middle`; plus: it is normal around the robot's own.
         spread: Standard deviation of the prior.
-        unit: Of its values.
-        advice: What to record if it is not identified.
+        unit: Unit of its values.
+        advice: Data to record if it is not identified.
     """
 
     name: str
@@ -111,7 +111,7 @@ def fit_range_table(
         robot: The robot with its nominal numbers; mounts, reach, rays and response stay.
         measured_from: The point that distances are measured from: the body's outline, its origin, or the sensor's
             mount. With "sensor", bearings count from the direction in which the sensor looks.
-        hold_out: Whether the fit leaves out every second place, like a chessboard over distances and bearings.
+        hold_out: True to leave out every second place, like a chessboard over distances and bearings.
         shared: Numbers that have one value for all sensors; the others differ.
         distance_sd_m: Standard deviation of the error of each distance, which all places at that distance share [m]; 0
             to take distances as they are written.
@@ -384,10 +384,10 @@ def wall_reading(
 
     Args:
         gap: (n,) distance from the mount to the wall [m].
-        bearing: (n,) of the wall, from the body's heading [rad].
-        numbers: Those of `NUMBERS` by name.
+        bearing: (n,) bearing of the wall from the body's heading [rad].
+        numbers: Values of `NUMBERS`, by name.
         reach: [m].
-        rays: How many.
+        rays: Number of rays.
     """
     part = np.linspace(-1.0, 1.0, rays) if rays > 1 else np.zeros(1)
     weights = 1.0 - 0.5 * part**2

@@ -17,12 +17,13 @@ def rays_of(sensor: RangeSensor, poses: Floats, arena: Arena) -> tuple[Floats, F
     """Return the lengths of the rays of a sensor, and the cosines at the obstacles that they meet.
 
     Args:
-        sensor: Of the robot.
+        sensor: Sensor of the robot.
         poses: (n, 3) x [m], y [m], heading [rad].
         arena: Round things count as polygons.
 
     Returns:
-        (n, rays) distances [m], at most the sensor's reach, and cosines between ray and normal, 1 where nothing is.
+        (n, rays) distances [m], at most the sensor's reach, and cosines between ray and normal, 1 if the ray meets
+        nothing.
     """
     x, y, heading = poses[:, None].T.transpose(0, 2, 1)
     cosine, sine = np.cos(heading), np.sin(heading)

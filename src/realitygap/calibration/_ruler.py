@@ -17,17 +17,17 @@ PROTRACTOR = math.radians(1.0)
 """Angles are read to the degree [rad]."""
 
 EXACT = 1e-6
-"""What a camera or an encoder is taken to tell lengths and angles to [m, rad]."""
+"""Resolution of lengths and angles of a camera or an encoder [m, rad]."""
 
 
 @dataclass(frozen=True)
 class Moved:
-    """From the start of a trial to its end.
+    """The motion from the start of a trial to its end.
 
     Attributes:
-        ahead, left: As seen from the start [m].
-        turned: To the left, with all full turns [rad].
-        length_step, angle_step: To what they were read [m, rad].
+        ahead, left: End, in the frame of the start [m].
+        turned: Turn to the left, including all full turns [rad].
+        length_step, angle_step: Resolution of the lengths and angles [m, rad].
     """
 
     ahead: float
@@ -38,7 +38,7 @@ class Moved:
 
     @property
     def way(self) -> float:
-        """Length of the arc that leads there; below 0 where that is behind the start [m]."""
+        """Length of the arc from the start to the end [m]; negative if the end is behind the start."""
         chord, half = math.hypot(self.ahead, self.left), self.turned / 2
         arc = chord * (half / math.sin(half) if 1e-9 < abs(half) < math.pi / 2 else 1.0)
         return math.copysign(arc, self.ahead)
@@ -60,21 +60,21 @@ def ruled(trial: TrialRecord) -> TrialRecord:
 
 
 def end_pose_of(trial: TrialRecord, ahead: float, left: float, turned: float) -> tuple[float, float, float]:
-    """The pose at the end of a trial, from what was measured as seen from its start [m, rad]."""
+    """Return the pose at the end of a trial, from measurements in the frame of its start [m, rad]."""
     x, y, heading = trial.start
     sine, cosine = math.sin(heading), math.cos(heading)
     return x + ahead * cosine - left * sine, y + ahead * sine + left * cosine, heading + turned
 
 
 def moved_by_camera(trial: TrialRecord) -> Moved:
-    """From a camera's poses; turns are counted where no command turns by half a turn or more."""
+    """Return the motion from a camera's poses. Turns are counted if no command turns by half a turn or more."""
     headings = np.unwrap(trial.poses[:, 2])
     x, y = trial.poses[-1, :2].tolist()
     return _seen_from(trial, x, y, float(headings[-1] - headings[0]), EXACT, EXACT)
 
 
 def moved_in(trial: TrialRecord) -> Moved | None:
-    """From the start of a trial to its end, by a camera or else by a ruler; None where neither was there."""
+    """Return the motion from the start of a trial to its end, by a camera or a ruler; None without either."""
     if len(trial.poses):
         return moved_by_camera(trial)
     if trial.end_pose is None:

@@ -14,7 +14,8 @@ from ._prior import Parameter
 from ._simulate import Bools, Floats
 
 JITTER, TRAVEL_PER_M, HEADING_PER_M, HEADING_PER_S, ACROSS_PER_M, PLACE, ANGLE, WHEEL_PER_M, WHEEL = range(9)
-"""What scatters: first the simulator's own numbers, as `MOTION_NOISE`, then what is not asked for."""
+"""Indices of the sources of scatter: first the simulator's own numbers, as in `MOTION_NOISE`, then nuisance
+parameters."""
 
 OBSERVER = (
     Parameter("skid.per_m", Distribution(uniform=(0.0, 0.1)), "m"),
@@ -23,7 +24,8 @@ OBSERVER = (
     Parameter("encoder.noise_per_m", Distribution(uniform=(0.0, 0.05)), "m"),
     Parameter("encoder.count", Distribution(uniform=(0.0, 0.01)), "m"),
 )
-"""Skids sideways, errors of a camera in a place and a heading, errors of encoders that grow with the way or do not."""
+"""Nuisance parameters: sideways skids, errors of a camera's place and heading, and errors of encoders, relative and
+fixed."""
 
 LEAST = np.array([3e-5, 3e-5, 3e-5, 3e-5, 3e-5]) ** 2
 """Variance of each channel in any case [m2, rad2]: single precision, and what no camera tells."""
@@ -38,11 +40,11 @@ class Scatter:
 
     Attributes:
         way: (w,) driven by the wheels, the mean of both [m].
-        wheel_way: (w, 2) of each [m].
+        wheel_way: (w, 2) distance of each wheel [m].
         moving_s: (w,) time in which a wheel turns [s].
-        chord: (w,) share of a way that its arc leads away: 1 straight on.
+        chord: (w,) length of the chord divided by that of the arc: 1 straight on.
         late: (w, 5, 5) covariance that early and late commands make, by the square of a second of jitter.
-        seen: (w, 5) whether a channel was observed.
+        seen: (w, 5) True if a channel was observed.
     """
 
     way: Floats
@@ -53,7 +55,7 @@ class Scatter:
     seen: Bools
 
     def variances(self, noise: Floats) -> Floats:
-        """(5, w) of the channels, without what lateness does."""
+        """Return the variances of the channels, (5, w), without the effect of late commands."""
         square = noise * noise
         own = np.empty((5, len(self.way)))
         own[0] = square[TRAVEL_PER_M] * self.way * self.chord**2 + 2 * square[PLACE]
@@ -67,7 +69,7 @@ class Scatter:
         return float(self.log_likelihoods(off, noise).sum())
 
     def log_likelihoods(self, off: Floats, noise: Floats) -> Floats:
-        """(w,) the same of each window."""
+        """Return the log likelihood of each window, (w,)."""
         root = self._root(noise)
         white = _solved(root, off.T)
         sizes = np.einsum("ccw->cw", root)
@@ -120,7 +122,7 @@ class NoisePrior:
 
     Attributes:
         low, high: (q,) ends.
-        is_ratio: (q,) whether ratios are as likely, and not differences.
+        is_ratio: (q,) True for a prior that is uniform in the logarithm.
     """
 
     low: Floats
@@ -129,7 +131,7 @@ class NoisePrior:
 
     @classmethod
     def of(cls, parameters: Sequence[Parameter]) -> NoisePrior:
-        """That of parameters."""
+        """Return the prior of parameters."""
         priors = [parameter.prior for parameter in parameters]
         return cls(
             np.array([prior.lowest for prior in priors]),
@@ -146,13 +148,13 @@ class NoisePrior:
         return np.clip(noise, self.low, self.high)
 
     def places(self, noise: Floats) -> Floats:
-        """(..., q) between the ends, 0..1, on the scale on which the prior is even."""
+        """Return places between the ends, 0 to 1, on the scale on which the prior is uniform, (..., q)."""
         low, high = self._ends()
         scaled = np.where(self.is_ratio, np.log(np.maximum(noise, 1e-300)), noise)
         return np.asarray((scaled - low) / (high - low))
 
     def at(self, places: Floats) -> Floats:
-        """(..., q) noise at such places; of the nearest end where they lie beyond."""
+        """Return the noise at places, (..., q). Places outside count as the nearest end."""
         low, high = self._ends()
         scaled = low + np.clip(places, 0.0, 1.0) * (high - low)
         return np.where(self.is_ratio, np.exp(scaled), scaled)

@@ -40,7 +40,7 @@ class Compression:
     of_variances: Vectors
 
     def __call__(self, vectors: Vectors) -> Floats:
-        """(m, 2 p) summaries of vectors (m, d)."""
+        """Return summaries of vectors (m, d), (m, 2 p)."""
         p = self.of_means.shape[1]
         made = np.zeros((len(vectors), 2 * p))
         for part in _parts(vectors.shape[1]):
@@ -55,7 +55,7 @@ def learn_compression(places: Floats, vectors: Vectors, finest: Vectors) -> Comp
     """Learn the compression from vectors and the parameters that produced them.
 
     Args:
-        places: (m, p) of the parameters, m well above p.
+        places: (m, p) values of the parameters, with m well above p.
         vectors: (m, d) made with them.
         finest: (d,) the least standard deviation of an entry.
     """

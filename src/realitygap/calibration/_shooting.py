@@ -40,13 +40,13 @@ class Problem:
     """Windows, and how they are simulated with parameters that are free while others keep their values.
 
     Attributes:
-        simulate: What carries out trials.
-        robot: On whose numbers it builds.
-        known: What is thought possible of parameters.
-        windows: What is to be met.
+        simulate: Simulator of the trials.
+        robot: Robot with the numbers that are not fitted.
+        known: Priors of parameters.
+        windows: Observed windows to reproduce.
         free: Parameters that are fitted.
         fixed: Values of others.
-        own: (p,) where the robot's own numbers lie between the ends of the free ones.
+        own: (p,) places of the robot's own numbers between the ends of the free ones.
         jitter: [s] of commands: early and late ones change what windows do in the mean, too.
     """
 
@@ -60,19 +60,19 @@ class Problem:
     jitter: float = 0.0
 
     def off(self, places: Floats) -> Floats:
-        """(m, w, 5) observed less simulated in the mean at places (m, p)."""
+        """Return the differences at places (m, p), observed minus mean simulated, (m, w, 5)."""
         if self.jitter == 0.0:
             return self._off(places)
         return np.stack([self.jittered(place, N_MEAN).mean(axis=0) for place in places])
 
     def jittered(self, place: Floats, n: int) -> Floats:
-        """(n, w, 5) the same of n robots at one place, whose commands come early or late, each as it happens."""
+        """Return the differences of n robots at one place whose commands are early or late at random, (n, w, 5)."""
         off = self.fixed_at(**{"drive.delay_jitter": self.jitter})._off(np.repeat(place[None], n, axis=0))
         off[..., 2] = off[:1, :, 2] + wrapped(off[..., 2] - off[:1, :, 2])
         return off
 
     def with_noise(self, places: Floats, key: int) -> Floats:
-        """(m, w, 5) the same with the noise that is among what is fixed; one key has the same noise at all places."""
+        """Return the differences with the fixed noise, (m, w, 5). A key gives the same noise at all places."""
         return self._off(places, key)
 
     def _off(self, places: Floats, same_noise: int | None = None) -> Floats:
@@ -82,7 +82,7 @@ class Problem:
         return differences(self.robot, self.windows, simulated, values)
 
     def slopes(self, place: Floats) -> Floats:
-        """(w, 5, p) derivatives of the differences by the places, from both sides where there is room."""
+        """Return derivatives of the differences by the places, central if there is room, (w, 5, p)."""
         high = np.minimum(place + STEP, 1.0)
         low = np.maximum(place - STEP, 0.0)
         ends = np.concatenate([place + np.diag(high - place), place - np.diag(place - low)])
@@ -92,7 +92,7 @@ class Problem:
         return np.asarray(np.nan_to_num(np.moveaxis(slopes, 0, -1)))
 
     def fixed_at(self, **values: float) -> Problem:
-        """The same with other fixed values."""
+        """Return the same problem with other fixed values."""
         return replace(self, fixed={**self.fixed, **values})
 
 
@@ -178,7 +178,7 @@ def _step(curvature: Floats, slope: Floats, here: Floats, damping: float) -> Flo
 def typical_noise(
     rng: np.random.Generator, scatter: Scatter, off: Floats, parameters: Sequence[Parameter], first: Floats
 ) -> Floats:
-    """The median of the noise's posterior where the motion is taken as known."""
+    """Return the median of the noise's posterior for a known motion."""
     prior = NoisePrior.of(parameters)
     here, reach = prior.inside(first), 0.3 * FIRST_NOISE
     density = partial(scatter.log_likelihood, off)
@@ -198,7 +198,7 @@ def draw_posterior(
     noise: Floats,
     noises: Sequence[Parameter],
 ) -> tuple[Floats, Floats]:
-    """Draws of places (d, p) and noise (d, q), in turn: the one where the other is known."""
+    """Draw places (d, p) and noise (d, q) in turn, each given the other."""
     prior = NoisePrior.of(noises)
     made = -slopes
     base = off + made @ place
@@ -215,7 +215,7 @@ def draw_posterior(
 
 
 def widening(scatter: Scatter, slopes: Floats, off: Floats, trial: Ints, noise: Floats) -> Floats:
-    """(p,) by how much intervals grow because trials differ by more than the noise says; 1 where they do not."""
+    """Return the factor by which variation between trials widens each interval, (p,); 1 if noise explains it."""
     rows = scatter.whitened(slopes, noise)
     left = scatter.whitened(off, noise)
     known = rows.reshape(-1, slopes.shape[-1])
@@ -226,14 +226,14 @@ def widening(scatter: Scatter, slopes: Floats, off: Floats, trial: Ints, noise: 
 def widening_of_noise(
     scatter: Scatter, off: Floats, trial: Ints, noise: Floats, parameters: Sequence[Parameter]
 ) -> Floats:
-    """(q,) the same of the places of the simulator's own noise.
+    """Return the factor for the places of the simulator's own noise, (q,).
 
     Channels that one late command moves are no independent witnesses of how late it was.
 
     Args:
-        scatter, off, trial: Of windows.
+        scatter, off, trial: Likelihood, differences, and trial of windows.
         noise: (n,) all of it.
-        parameters: (n,) likewise; the first q are the simulator's own.
+        parameters: (n,) parameters of the noise. The first q are the simulator's own.
     """
     prior, q = NoisePrior.of(parameters), len(MOTION_NOISE)
     here = prior.places(noise)

@@ -1,4 +1,4 @@
-"""Trials with poses as single commands: a robot is put back to where it was seen before each (multiple shooting)."""
+"""Trials with poses as single commands: a robot is put back to its observed pose before each (multiple shooting)."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ class Shots:
 
     Attributes:
         play: The trials, with poses as anchors.
-        poses: (k, t + 1, 3) x [m], y [m], heading [rad]; not a number where a trial had ended.
+        poses: (k, t + 1, 3) x [m], y [m], heading [rad]; nan after the end of a trial.
         moved: (k, t, 3) ahead [m], aside [m] and turn [rad], in the frame of the robot before the command.
-        known: (k, t) whether there was such a command, and the robot was seen before and after it.
-        touching: (k, t) whether the robot was near a wall before or after it.
-        stalled: (k, t) whether it knew before it that it stalls.
-        readings: (k, t, s) of its range sensors before it.
-        wheels: (k, t + 1, 2) way of each wheel since the start [m]; not a number where nothing tells.
+        known: (k, t) True if there was such a command, and the robot's pose is known before and after it.
+        touching: (k, t) True if the robot was near a wall before or after it.
+        stalled: (k, t) True if it reported a stall before it.
+        readings: (k, t, s) readings of its range sensors before it.
+        wheels: (k, t + 1, 2) distance of each wheel since the start [m]; nan if unknown.
     """
 
     play: Play
@@ -94,7 +94,7 @@ class Shooter:
     robot: RobotModel
 
     def moved(self, values: Mapping[str, Floats], key: int) -> Floats:
-        """(m, k, t, 3) what m robots do at each command; 0 where there was none."""
+        """Return the motion of m robots at each command, (m, k, t, 3); 0 if there was none."""
         before = self.shots.poses[None, :, :-1]
 
         def of(rehearsal: Rehearsal) -> Floats:
@@ -111,7 +111,7 @@ class Shooter:
         return off
 
     def stalls(self, values: Mapping[str, Floats], key: int) -> Floats:
-        """(k, t) the share of m robots that stall before each command."""
+        """Return the share of m robots that stall before each command, (k, t)."""
 
         def of(rehearsal: Rehearsal) -> NDArray[np.float32]:
             return rehearsal.stalled[:, :, :-1].astype(np.float32)

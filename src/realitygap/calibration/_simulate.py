@@ -22,27 +22,27 @@ class Rehearsed(Protocol):
 
     @property
     def poses(self) -> NDArray[np.floating[Any]]:
-        """(m, k, t + 1, 3) x [m], y [m], heading [rad], before the robot was put back."""
+        """Poses x [m], y [m], heading [rad], before the robot was put back, (m, k, t + 1, 3)."""
         ...
 
     @property
     def wheels(self) -> NDArray[np.floating[Any]]:
-        """(m, k, t + 1, 2) way of the left and the right wheel since the start [m]."""
+        """Distances of the left and the right wheel since the start [m], (m, k, t + 1, 2)."""
         ...
 
     @property
     def stalled(self) -> Bools:
-        """(m, k, t + 1) whether it was held up, before each command and after the last."""
+        """True if the robot was blocked, before each command and after the last, (m, k, t + 1)."""
         ...
 
     @property
     def cells(self) -> Bools:
-        """(m, k, c) whether each cell of the arena's grid is on its line."""
+        """True for each cell of the arena's grid on the robot's line, (m, k, c)."""
         ...
 
     @property
     def readings(self) -> NDArray[np.floating[Any]]:
-        """(m, k, t + 1, s) of the range sensors, 0..1."""
+        """Readings of the range sensors, 0 to 1, (m, k, t + 1, s)."""
         ...
 
 
@@ -66,10 +66,10 @@ class Simulate(Protocol):
             starts: (k, 3) x [m], y [m], heading [rad].
             commands: (k, t, 2) move and turn, -1..1.
             values: (m,) each, by dotted name.
-            key: Of the random numbers.
-            anchors: (k, t + 1, 3) where the robot is put back to before a command; not a number for nowhere.
-            keep: Of what every step is kept.
-            same_noise: Whether all sets draw the same random numbers; each its own otherwise.
+            key: Key of the random numbers.
+            anchors: (k, t + 1, 3) poses to which the robot is put back before a command; nan for none.
+            keep: Names of the values that are stored for each step.
+            same_noise: True if all sets draw the same random numbers. Otherwise each set draws its own.
         """
         ...
 
@@ -92,7 +92,7 @@ def motor_noise(robot: RobotModel) -> tuple[str, ...]:
 
 
 def padded_commands(trials: Sequence[TrialRecord]) -> Floats:
-    """(k, t, 2) the commands of trials, followed by standing where others are longer."""
+    """Return the commands of trials, (k, t, 2). Zeros fill shorter trials."""
     commands = np.zeros((len(trials), max(len(trial.commands) for trial in trials), 2))
     for row, trial in zip(commands, trials, strict=True):
         row[: len(trial.commands)] = trial.commands
@@ -100,5 +100,5 @@ def padded_commands(trials: Sequence[TrialRecord]) -> Floats:
 
 
 def starts_of(trials: Sequence[TrialRecord]) -> Floats:
-    """(k, 3) where trials begin; where poses were seen, there."""
+    """Return the starts of trials, (k, 3): observed poses, if there are any."""
     return np.array([trial.poses[0] if len(trial.poses) else trial.start for trial in trials], np.float64)

@@ -46,11 +46,11 @@ N_SHIFT = 100  # robots that show by how much noise moves the mean
 NOISE_FLOOR = np.array([1e-4, 1e-3])  # [m, rad]
 PARTS = {"drive.delay_jitter": 0.05, "drive.heading_noise_per_m": 0.05,
          "drive.heading_noise_per_s": 0.02, "drive.travel_noise_per_m": 0.01}  # fmt: skip
-"""How much of each kind of noise shows what it does."""
+"""Size of each kind of noise in the simulations that measure its effect."""
 
 
 def is_motion(name: str) -> bool:
-    """Whether a parameter decides how a robot moves in the mean, and can be told from the others.
+    """Return whether a parameter determines the mean motion of a robot and can be distinguished from the others.
 
     Slip cannot: what it takes from a wheel's way is as well taken from its gain.
     """
@@ -75,7 +75,7 @@ class MotionOfCommands:
         self.shift: Floats = np.zeros(3)  # by which noise moves the mean, likewise
 
     def fit(self, start: Floats, n: int) -> dict[str, Floats]:
-        """(n,) draws of each parameter, from places (p,) of `mean` on."""
+        """Return draws of each parameter, (n,), starting at places (p,) of `mean`."""
         places, off = self._best(self._scanned(start))
         if self.noise:
             noise = self._noise(places, off)
@@ -226,7 +226,7 @@ class MotionOfCommands:
 
 
 def values_at(parameters: Sequence[Parameter], places: Floats) -> dict[str, Floats]:
-    """(m,) values of parameters at places (m, p) in 0..1."""
+    """Return the values of parameters at places (m, p) in 0 to 1, (m,) each."""
     return {
         p.name: np.asarray(p.prior.of(np.clip(places[:, k], 0.0, 1.0 - 1e-9)))
         for k, p in enumerate(parameters)

@@ -13,7 +13,7 @@ ALIKE = 0.1
 
 
 def of_one_length(trials: Sequence[TrialRecord]) -> tuple[list[TrialRecord], str]:
-    """The most trials whose commands lasted about as long, and in words which were left out; empty where none was."""
+    """Return the largest group of trials with commands of about the same length, and a text on the others, or ""."""
     lengths = sorted(trial.step_s for trial in trials)
     if not lengths or lengths[-1] <= (1 + ALIKE) * lengths[0]:
         return list(trials), ""

@@ -22,7 +22,7 @@ MOVES, LAST_MOVES = 5, 20
 """Moves of each particle after a step, and once the temperature is that of the posterior."""
 
 LEAST_SCALE, MOST_SCALE = 0.05, 4.0
-"""Of a move, against 2.38 / sqrt(2 d) differences."""
+"""Minimum and maximum of the size of a move, relative to differences of two draws times 2.38 / sqrt(2 d)."""
 
 FINEST = 3.0
 """Powers of ten by which a short move is shorter, at most."""
@@ -33,7 +33,7 @@ MOST_STAGES = 200
 def sample_posterior(
     log_likelihood: Callable[[Array], Array], d: int, rng: np.random.Generator, m: int = 1000
 ) -> Array:
-    """(m, d) draws from the posterior under a uniform prior over the unit cube.
+    """Return draws from the posterior under a uniform prior over the unit cube, (m, d).
 
     Args:
         log_likelihood: (m, d) places in the cube to (m,) logarithms of the likelihood, finite.

@@ -23,8 +23,9 @@ class WheelWays:
     """Distances of wheels in w windows, averaged over the delay of commands.
 
     Attributes:
-        way: (w, 2) of both wheels, there and back added up [m]: the way until a command is heard, and the way after it.
-        moving_s: (w,) how long a wheel turns, in whole steps [s].
+        way: (w, 2) total distance of both wheels, forward and backward [m]: before a command takes effect, and after
+            it.
+        moving_s: (w,) time in which a wheel turns, in whole steps [s].
     """
 
     way: Floats
@@ -39,9 +40,10 @@ def wheel_ways(
     values: Mapping[str, Floats],
     jitter: float,
 ) -> WheelWays:
-    """With one set of parameters and a jitter [s], from what the wheels would drive without delay and lag.
+    """Compute the wheels' distances with one set of parameters and a jitter [s].
 
-    A wheel keeps its old target until the command is heard, and nears each exponentially, as in `kernels.sim.drive`.
+    They follow from the wheels' motion without delay and lag. A wheel keeps its old target until a command takes
+    effect, and approaches each target exponentially, as in `kernels.sim.drive`.
     """
     prompt = {**values, "drive.delay": np.zeros(1), "drive.lag": np.zeros(1)}
     numbers = dict.fromkeys(motor_noise(robot), np.zeros(1)) | robot_numbers(known, robot, prompt)

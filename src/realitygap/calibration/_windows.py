@@ -16,7 +16,8 @@ from ._step import step_of
 
 CLEAR_M = 0.006  # from walls: nearer, a camera's error could hide a touch
 CHANNELS = ("along", "across", "turn", "left", "right")
-"""Of a window: where the axle's middle ended, along and across the way [m]; turn [rad]; way of the wheels [m]."""
+"""Channels of a window: end of the axle's middle, along and across the direction [m]; turn [rad]; distance of the
+wheels [m]."""
 
 
 @dataclass(frozen=True)
@@ -24,14 +25,13 @@ class Windows:
     """w windows of some commands each, in k trials.
 
     Attributes:
-        trials: In which they are.
-        trial: (w,) which.
+        trials: Trials of the windows.
+        trial: (w,) index of the trial.
         first, last: (w,) rows of poses at its ends.
-        touching: (w,) whether the robot was near a wall at any row of it, or stalled.
-        seen: What was observed: (w, 3) poses before and after, (w, 2) way of the wheels [m]; not a number where
-            nothing was.
+        touching: (w,) True if the robot was near a wall at any row of it, or stalled.
+        seen: Observations: (w, 3) poses before and after, (w, 2) distance of the wheels [m]; nan if not observed.
         commands: (k, t, 2).
-        anchors: (k, t + 1, 3) poses where windows begin.
+        anchors: (k, t + 1, 3) poses at the starts of windows.
         step_s: [s].
     """
 
@@ -63,7 +63,7 @@ class Simulated:
 
 
 def wrapped(angle: Floats) -> Floats:
-    """The same angles from -pi to pi [rad]."""
+    """Return the same angles between -pi and pi [rad]."""
     return np.asarray(np.remainder(angle + np.pi, 2 * np.pi) - np.pi)
 
 
@@ -100,12 +100,12 @@ def make_windows(trials: Sequence[TrialRecord], robot: RobotModel, arena: Arena,
 
 
 def outline_of(robot: RobotModel) -> Floats:
-    """(p, 2) points around the body [m]."""
+    """Return points around the body, (p, 2) [m]."""
     return np.array([point for part in robot.body for point in part.outline()])
 
 
 def is_near(poses: Floats, outline: Floats, arena: Arena) -> Bools:
-    """(n,) whether the body at each pose is near a wall; False where the pose is not known."""
+    """Return whether the body at each pose is near a wall, (n,); False if the pose is unknown."""
     cos, sin = np.cos(poses[:, 2:]), np.sin(poses[:, 2:])
     x = poses[:, :1] + outline[:, 0] * cos - outline[:, 1] * sin
     y = poses[:, 1:2] + outline[:, 0] * sin + outline[:, 1] * cos
@@ -127,7 +127,7 @@ def simulate_windows(
     values: Mapping[str, Floats],
     same_noise: int | None = None,
 ) -> Simulated:
-    """Each window from where the robot was seen at its beginning, with each of m sets of parameters.
+    """Simulate each window from the robot's observed pose at its beginning, with each of m sets of parameters.
 
     Without noise, where the values have none; with the same for all sets, where a key is given.
     """
@@ -153,7 +153,7 @@ def simulate_windows(
 def differences(
     robot: RobotModel, windows: Windows, simulated: Simulated, values: Mapping[str, Floats]
 ) -> Floats:
-    """(m, w, 5) what was observed less what was simulated, by `CHANNELS`; not a number where nothing was observed.
+    """Return observed minus simulated values, by `CHANNELS`, (m, w, 5); nan if not observed.
 
     Of the middle of the axle, which is where wheels put it whatever the heading does; half of an error of the turn is
     taken out of the direction of the way, as that much of it is expected.

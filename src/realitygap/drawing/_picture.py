@@ -95,10 +95,10 @@ class Picture:
     """Shapes in a rectangle, one unit as long across as up; it shows itself in notebooks.
 
     Attributes:
-        title: what it is.
-        description: what is to be seen, for those who cannot see it.
-        left, bottom, right, top: the rectangle, in the shapes' unit.
-        shapes: from the hindmost to the foremost.
+        title: Title.
+        description: Text that describes the picture for readers who cannot see it.
+        left, bottom, right, top: Rectangle, in the unit of the shapes.
+        shapes: Shapes from back to front.
     """
 
     title: str
@@ -110,13 +110,13 @@ class Picture:
     shapes: tuple[Shape, ...]
 
     def to_svg(self, width: float = 480.0) -> str:
-        """The picture as one `svg` element on a ground of its own, so that it can be read on any page.
+        """Return the picture as one `svg` element with its own background, so that it is legible on any page.
 
         Args:
-            width: of the picture [pt]; its height follows.
+            width: Width of the picture [pt]; its height follows.
 
         Raises:
-            ValueError: the rectangle is empty.
+            ValueError: The rectangle is empty.
         """
         across, up = self.right - self.left, self.top - self.bottom
         if not (across > 0 and up > 0):

@@ -25,16 +25,16 @@ class BehaviorDistance:
     """A distance of two behaviors.
 
     Attributes:
-        name: what study files call it.
-        compares: what of a trial it looks at: the cells that it visited, or the position where it ended.
-        needs_order: whether it matters in which order cells were visited first; a drawing on squared paper, scored by
-            hand, does not say.
-        is_metric: whether, of what it compares, 0 means equal, order of the two does not matter, and no way over a
-            third is shorter.
-        unit: of the number: cells, m, or 1 for a share.
-        cost: steps that one distance takes, of behaviors of n and m cells in a grid of c.
-        description: what it is, in a sentence.
-        source: who described it.
+        name: Name in study files.
+        compares: Part of a trial that it compares: the visited cells, or the final position.
+        needs_order: True if the order of first visits matters. A drawing on squared paper, scored by hand, does not
+            show this order.
+        is_metric: True if it is a metric: 0 only for equal behaviors, symmetric, and never longer than the path over
+            a third behavior.
+        unit: Unit: cells, m, or 1 for a share.
+        cost: Number of steps to compute one distance between behaviors of n and m cells in a grid of c cells.
+        description: Definition in a sentence.
+        source: Publication that describes it.
     """
 
     name: DistanceName
@@ -58,14 +58,14 @@ class BehaviorDistance:
         """Return the distance of each behavior to each of the others.
 
         Args:
-            behaviors: n lists of cells, numbered columns * row + column, in the order in which they were visited; of
-                a cell that comes again only the first visit counts. Where positions are compared: (n, 2) [m].
-            others: m of them; those of `behaviors` where none are given.
+            behaviors: n lists of cells, numbered columns * row + column, in the order of visits. Only the first visit
+                of a cell counts. For a distance of positions: (n, 2) [m].
+            others: m behaviors of the same form. Default: `behaviors`.
             columns, rows: Size of the grid.
-            sort: How `paper` sorts cells.
+            sort: Order in which `paper` sorts cells.
 
         Returns:
-            (n, m) float64, in the distance's unit. Two that visit nothing are equal.
+            (n, m) float64, in the distance's unit. Two behaviors without cells are equal.
 
         Raises:
             TypeError: A cell that is not a whole number.
@@ -89,8 +89,8 @@ DISTANCES: dict[str, BehaviorDistance] = {
             is_metric=True,
             unit="cells",
             cost="n + m + c",
-            description="The distances of the cells at equal places of the two sorted lists, added up; each cell "
-            "that only the longer list has counts with the largest distance in the grid.",
+            description="Sum of the distances between the cells at equal places of the two sorted lists. Each "
+            "surplus cell of the longer list counts with the largest distance in the grid.",
             source="Rosenzweig & Remy, section 2.4.",
         ),
         BehaviorDistance(
@@ -100,7 +100,7 @@ DISTANCES: dict[str, BehaviorDistance] = {
             is_metric=True,
             unit="cells",
             cost="n + m",
-            description="The same, with the cells in the order in which they were visited first.",
+            description="As `paper`, but with the cells in the order of first visits.",
             source="Rosenzweig & Remy, section 5: “by not sorting the behaviors”.",
         ),
         BehaviorDistance(
@@ -110,7 +110,7 @@ DISTANCES: dict[str, BehaviorDistance] = {
             is_metric=True,
             unit="1",
             cost="c / 31",
-            description="Of the cells that either visited, the share that one of the two visited alone.",
+            description="Number of cells that only one of the two visited, divided by the number that either visited.",
             source="Jaccard (1912), New Phytologist 11(2), 37-50; a metric: Levandowsky & Winter (1971), Nature "
             "234, 34-35.",
         ),
@@ -121,7 +121,7 @@ DISTANCES: dict[str, BehaviorDistance] = {
             is_metric=True,
             unit="cells",
             cost="c / 31",
-            description="How many cells one of the two visited alone.",
+            description="Number of cells that only one of the two visited.",
             source="Hamming (1950), Bell System Technical Journal 29(2), 147-160.",
         ),
         BehaviorDistance(
@@ -131,7 +131,7 @@ DISTANCES: dict[str, BehaviorDistance] = {
             is_metric=True,
             unit="m",
             cost="1",
-            description="How far apart the two ended, in a straight line.",
+            description="Straight distance between the two final positions.",
             source="Lehman & Stanley (2011): where a trial in a maze ends.",
         ),
         BehaviorDistance(
@@ -141,8 +141,8 @@ DISTANCES: dict[str, BehaviorDistance] = {
             is_metric=True,
             unit="cells",
             cost="n m",
-            description="The fewest cells to put in, leave out or put for another to make one list, in the order of "
-            "first visits, the other.",
+            description="Smallest number of cells to insert, delete, or replace that turns one list, in the order of "
+            "first visits, into the other.",
             source="Levenshtein (1966), Soviet Physics Doklady 10(8), 707-710.",
         ),
         BehaviorDistance(
@@ -152,9 +152,9 @@ DISTANCES: dict[str, BehaviorDistance] = {
             is_metric=True,
             unit="1",
             cost="n m",
-            description="The two lists, in the order of first visits, are aligned at the least cost d: a cell against "
-            "another costs their distance in cells, a cell against a gap 1. Of that 2 d / (n + m + d): 0 where they "
-            "are equal, 1 where nothing is aligned.",
+            description="Normalized cost of aligning the two lists, in the order of first visits. A pair of cells "
+            "costs their distance in cells, and a cell without a partner costs 1. With the smallest total cost d, "
+            "the distance is 2 d / (n + m + d): 0 for equal lists, 1 if no cells are paired.",
             source="Needleman & Wunsch (1970), J. Mol. Biol. 48(3), 443-453, with costs in place of scores; the share, "
             "a metric: Li & Liu (2007), IEEE TPAMI 29(6), 1091-1095. Proposed by Rosenzweig & Remy, section 5.",
         ),
@@ -174,10 +174,10 @@ _KINDS = {
 
 
 def behavior_distance(name: str) -> BehaviorDistance:
-    """The distance of that name.
+    """Return the distance of this name.
 
     Raises:
-        ValueError: There is none.
+        ValueError: There is no such distance.
     """
     if name not in DISTANCES:
         raise ValueError(f"Unknown distance {name!r}. {did_you_mean(name, DISTANCES)}")

@@ -20,44 +20,49 @@ from ._distances import DISTANCES, CellOrder, Cells, DistanceName, measure_of, p
 class NoveltySettings(Settings):
     """The settings of novelty: its measure and its archive.
 
-    `paper`: Rosenzweig & Remy, section 2.4: a short archive whose oldest behavior is replaced; novelty is the
-    mean distance to it. `lehman-stanley`: Lehman & Stanley (2011): the mean distance to the k nearest in
-    population and archive, which takes what exceeds a moving threshold. Both with any distance of behaviors.
+    `paper` (Rosenzweig & Remy, section 2.4) has a short archive, whose oldest behavior is replaced. Novelty is the
+    mean distance to the archive. With `lehman-stanley` (Lehman & Stanley, 2011), novelty is the mean distance to the
+    k nearest behaviors in population and archive. A behavior enters this archive if its novelty exceeds a moving
+    threshold. Both work with any distance of behaviors.
     """
 
-    kind: Literal["paper", "lehman-stanley"] = Field("paper", description="Which novelty search.")
+    kind: Literal["paper", "lehman-stanley"] = Field("paper", description="Kind of novelty search.")
     distance: DistanceName = Field(
         "paper",
-        description="How different two behaviors are: the paper's distance of sorted cells, or another of those that "
-        "realitygap audit-distance draws. ordered, edit and alignment need the order in which cells were visited.",
+        description="Distance between two behaviors: the paper's distance of sorted cells, or another one that "
+        "realitygap audit-distance draws. ordered, edit and alignment need the order of visits.",
     )
     sort: CellOrder = Field(
         "x-then-y",
-        description="paper's distance: how the cells of a behavior are sorted. The paper does not say; it names cells "
-        "(0,0) and (11,5), pairs that Python sorts by x first.",
+        description="Order of the cells in the distance 'paper'. The paper does not state it. It names cells (0,0) and "
+        "(11,5), pairs that Python sorts by x first.",
     )
     archive_size: int = Field(
         8,
         ge=1,
         le=100_000,
-        description="paper: behaviors in the archive, which is filled first. Not printed.",
+        description="paper: number of behaviors in the archive. The archive is filled before any is replaced. The "
+        "paper does not state the number.",
     )
     enter: Literal["above-all", "above-least"] = Field(
         "above-all",
-        description="paper: who replaces the oldest behavior: one more novel than all in the archive ('more novel than "
-        "the other behaviors in the archive'), or than the least novel.",
+        description="paper: condition for a behavior to replace the oldest one. above-all: it is more novel than all "
+        "in the archive ('more novel than the other behaviors in the archive'). above-least: it is more novel than the "
+        "least novel one.",
     )
-    neighbors: int = Field(15, ge=1, le=100_000, description="lehman-stanley: k (2011: 15).")
+    neighbors: int = Field(
+        15, ge=1, le=100_000, description="lehman-stanley: number k of nearest behaviors (2011: 15)."
+    )
     threshold: float = Field(
         6.0,
         ge=0,
-        description="lehman-stanley: novelty from which on a behavior enters at first, in the unit of the distance: to "
-        "be given with any other than the paper's.",
+        description="lehman-stanley: novelty above which a behavior enters at first, in the unit of the distance. "
+        "Required with any distance other than the paper's.",
     )
     patience: int = Field(
         2500,
         ge=1,
-        description="lehman-stanley: evaluations without an entry after which the threshold falls by 5 %.",
+        description="lehman-stanley: number of evaluations without an entry after which the threshold falls by 5 %.",
     )
 
     @model_validator(mode="after")
@@ -73,13 +78,13 @@ class NoveltySettings(Settings):
 
     @model_serializer(mode="wrap")
     def _leave_out_what_was_not_there(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """The paper's distance is not named, so that conditions from before there was another keep their hash."""
+        """Leave out the paper's distance, so that conditions from before there was another keep their hash."""
         values: dict[str, Any] = handler(self)
         return {key: value for key, value in values.items() if (key, value) != ("distance", "paper")}
 
 
 def largest_cell_distance(columns: int, rows: int) -> float:
-    """The largest distance of two cells of a grid [cells], the paper's padding."""
+    """Return the largest distance between two cells of a grid [cells], the paper's padding."""
     return math.hypot(columns - 1, rows - 1)
 
 
@@ -91,15 +96,15 @@ def sorted_cells_distance(
     rows: int = 6,
     sort: CellOrder = "x-then-y",
 ) -> float:
-    """The paper's distance of two behaviors [cells].
+    """Return the paper's distance between two behaviors [cells].
 
-    The sum of the distances of the cells at equal places of the two sorted lists; each cell that only the
-    longer one has counts with the largest distance in the grid.
+    It is the sum of the distances between the cells at equal places of the two sorted lists. Each surplus cell of the
+    longer list counts with the largest distance in the grid.
 
     Args:
         one, other: Cells, numbered columns * row + column; order and repeats do not matter.
         columns, rows: Size of the grid.
-        sort: By which coordinate first.
+        sort: Order of the cells: by x first, or by y first.
 
     Raises:
         TypeError: A cell that is not a whole number.
@@ -113,9 +118,9 @@ def sorted_cells_distance(
 class PaperArchive:
     """The paper's novelty: mean distance to a short archive whose oldest behavior is replaced.
 
-    While there is room, the behaviors of a generation go into the archive first, in order; then each
-    individual is compared with it, itself left out. Afterwards one that is more novel than the archived ones
-    (whose novelty is their mean distance to one another) replaces the oldest, in the order of individuals.
+    While there is room, the behaviors of a generation first enter the archive, in order. Then each individual is
+    compared with all archived behaviors except its own. The novelty of an archived behavior is its mean distance to
+    the others. In the order of individuals, each one that is more novel than the archived ones replaces the oldest.
 
     Source: Rosenzweig & Remy, section 2.4; size, filling and formula are not printed there and are ours.
     """
@@ -141,14 +146,14 @@ class PaperArchive:
         return self._columns, self._rows
 
     def update(self, behaviors: Sequence[Cells] | ArrayLike) -> NDArray[np.float64]:
-        """Novelty of one generation, which the archive then takes in.
+        """Return the novelty of each individual of a generation, and update the archive.
 
         Args:
-            behaviors: n lists of visited cells, in the order of individuals, or what else the distance of the
-                settings compares (`BehaviorDistance.distances`).
+            behaviors: n behaviors in the order of individuals: lists of visited cells, or positions if the distance
+                of the settings compares them (`BehaviorDistance.distances`).
 
         Returns:
-            (n,) float64, in the unit of the distance [cells]; 0 where there is nothing to compare with.
+            (n,) float64, in the unit of the distance; 0 if there is nothing to compare with.
 
         Raises:
             TypeError: A cell that is not a whole number.
@@ -166,7 +171,7 @@ class PaperArchive:
 
 
 def euclidean(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
-    """Straight distance of two behaviors that are points."""
+    """Return the straight distance between two behaviors that are points."""
     return float(np.linalg.norm(one - other))
 
 
@@ -191,10 +196,10 @@ class NearestArchive:
         """Make an empty archive.
 
         Args:
-            distance: Of two behaviors, (d,) each.
-            k: Neighbors to average over, >= 1; all of them while there are fewer.
-            threshold: Novelty from which on a behavior enters at first.
-            patience: Evaluations.
+            distance: Function that returns the distance between two behaviors, (d,) each.
+            k: Number of neighbors to average over, at least 1; all of them while there are fewer.
+            threshold: Novelty above which a behavior enters at first.
+            patience: Number of evaluations without an entry after which the threshold falls.
 
         Raises:
             ValueError: k < 1.
@@ -219,20 +224,20 @@ class NearestArchive:
 
     @property
     def threshold(self) -> float:
-        """The novelty from which on a behavior enters now."""
+        """The novelty above which a behavior enters now."""
         return float(self._threshold[0])
 
     def update(self, behaviors: ArrayLike) -> NDArray[np.float64]:
-        """Novelty of one generation, of which the novel ones then enter.
+        """Return the novelty of each individual of a generation, and add the novel ones to the archive.
 
         Args:
-            behaviors: (n, d), one row per individual, in their order.
+            behaviors: (n, d), one row per individual, in order.
 
         Returns:
-            (n,) float64, in the unit of the distance; 0 where there is nothing to compare with.
+            (n,) float64, in the unit of the distance; 0 if there is nothing to compare with.
 
         Raises:
-            ValueError: Not two-dimensional, a value that is not finite, or another d than before.
+            ValueError: The array is not two-dimensional, a value is not finite, or d differs from the archive's.
         """
         rows = np.asarray(behaviors, np.float64)
         if rows.ndim != 2 or not np.isfinite(rows).all():

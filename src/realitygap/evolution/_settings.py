@@ -23,86 +23,97 @@ class NeatSettings(Settings):
 
     The marks in the descriptions: *EC02*, the paper (Evolutionary Computation 10(2), with its section);
     *C++*, Stanley's own release 1.2.1, where it is the only source; *JAIR04*, Stanley & Miikkulainen (2004),
-    appendix. Where neither says, the choice is ours and said to be.
+    appendix. If none of them settles a choice, it is ours, and the description says so.
 
-    What is fixed: a genome is node genes and connection genes; structures that arise twice in a generation
-    get the same innovation numbers and are forgotten after it (EC02 3.2); a split leaves the old gene
-    disabled, with weight 1 into the new node and the old weight out of it (3.1); fitness is shared within a
-    species, whose share of the children is its mean fitness (3.3); the whole population is replaced (3.3),
-    and its size is exact, by largest remainder (ours: C++ gives what is missing to the largest species). A
-    link out of an output node counts as recurrent (C++).
+    These rules have no setting. A genome is a list of node genes and a list of connection genes. Structures that
+    arise twice in a generation get the same innovation numbers, which are forgotten after it (EC02 3.2). A split
+    leaves the old gene disabled, with weight 1 into the new node and the old weight out of it (3.1). Fitness is
+    shared within a species. A species gets children in proportion to its mean fitness (3.3). The whole population
+    is replaced (3.3). Its size is exact, by largest remainder (ours: C++ gives the missing children to the largest
+    species). A link out of an output node counts as recurrent (C++).
 
-    Differs from C++: no traits; a new link's weight is drawn anew also when another genome made the same
-    link in the generation; no "severe" half in weight mutation; no worst species marked for removal every 30
-    generations; interspecies mating takes the champion of a species drawn uniformly.
+    Differs from C++: no traits; the weight of a new link is sampled even if another genome made the same link in
+    the generation; no "severe" half in weight mutation; no worst species marked for removal every 30 generations;
+    interspecies mating takes the champion of a species drawn uniformly.
     """
 
-    settings: str = Field("default", description="The named set that fills in what is not given.")
+    settings: str = Field(
+        "default", description="Named set that gives the value of each setting that is not given."
+    )
     population: int = Field(
         150, ge=2, le=1_000_000, description="Individuals in each generation (EC02 4.1: 150)."
     )
-    generations: int = Field(100, ge=1, le=1_000_000, description="Generations, the first one counted.")
+    generations: int = Field(
+        100, ge=1, le=1_000_000, description="Number of generations, including the first."
+    )
 
     recurrent: bool = Field(
         False,
-        description="Whether links may lead back. A recurrent network makes one pass a step, in which each node "
-        "sees the others as they were a step before (C++).",
+        description="Allow recurrent links. A recurrent network makes one pass per step. In it, each node gets the "
+        "values that the other nodes had one step before (C++).",
     )
     activation: Literal["tanh", "sigmoid", "identity"] = Field(
         "sigmoid",
-        description="Of hidden and output nodes, of slope * x. EC02 4.1: sigmoid, 1 / (1 + exp(-4.9 x)). "
-        "tanh reaches -1..1; tanh(2.45 x) is that sigmoid stretched to it. identity is x, whatever the slope.",
+        description="Function of slope * x that hidden and output nodes compute. EC02 4.1: sigmoid, "
+        "1 / (1 + exp(-4.9 x)). tanh has the range -1 to 1; tanh(2.45 x) is that sigmoid stretched to this range. "
+        "identity is x and ignores the slope.",
     )
     activation_slope: float = Field(4.9, gt=0, le=100, description="Slope of the activation (EC02 4.1: 4.9).")
     node_bias: bool = Field(
         False,
-        description="Whether each output and hidden node has a bias of its own that mutates as weights do, as in "
-        "neat-python. EC02 has a constant input instead.",
+        description="Give each output and hidden node its own bias, which mutates like a weight, as in neat-python. "
+        "EC02 has a constant input instead.",
     )
     bias_value: float = Field(
         1.0,
-        description="Value of the constant input, where the task has one (EC02: 1; double pole in C++: 0.5).",
+        description="Value of the constant input, if the task has one (EC02: 1; double pole in C++: 0.5).",
     )
 
     start_hidden: int = Field(
         0,
         ge=0,
         le=1000,
-        description="Hidden nodes at the start, each wired from all inputs and to all outputs (EC02 3.4: 0; without "
-        "growth, 4.4: 10).",
+        description="Number of hidden nodes at the start. Each is wired from all inputs and to all outputs (EC02 3.4: "
+        "0; without growth, 4.4: 10).",
     )
     start_topology: Literal["full", "layer", "random"] = Field(
         "full",
-        description="'full': all start with the same links. 'layer': so do they, but of the inputs only the constant "
-        "one is wired to the outputs directly. 'random': each starts with 0 to all of the hidden nodes, drawn "
-        "uniformly, and with 30 % of the links, those between hidden nodes too (C++; EC02 4.4, for comparison).",
+        description="Links of the first genomes. 'full': each input is wired to each output. 'layer': only the "
+        "constant input is. 'random': each genome has from 0 to all of the hidden nodes, drawn uniformly. Each link, "
+        "also between hidden nodes, is made with a chance of 30 % (C++; EC02 4.4, for comparison).",
     )
     initial_weight: float = Field(
         5.0,
         ge=0,
         le=100,
-        description="First weights, and those of new links, are uniform within +- this (C++: 1).",
+        description="Largest size of a weight at the start and of a new link. Such weights are uniform within +- this "
+        "(C++: 1).",
     )
     mutate_weights: float = Field(
-        1.0, ge=0, le=1, description="Share of mutated children whose weights are (EC02 4.1: 0.8)."
+        1.0, ge=0, le=1, description="Share of mutated children whose weights mutate (EC02 4.1: 0.8)."
     )
     replace_weight: float = Field(
         0.1,
         ge=0,
         le=1,
-        description="Of those, share of weights that are drawn anew (EC02 4.1: 0.1); the others are moved.",
+        description="Share of weights that are replaced in a child whose weights mutate (EC02 4.1: 0.1). The others "
+        "are moved.",
     )
     weight_step: float = Field(
-        1.0, ge=0, le=100, description="A weight moves uniformly within +- this (EC02: not given; C++: 2.5)."
+        1.0,
+        ge=0,
+        le=100,
+        description="Largest step of a moved weight. Steps are uniform within +- this (EC02: not given; C++: 2.5).",
     )
     replaced_weight: float = Field(
         8.0,
         ge=0,
         le=100,
-        description="A weight drawn anew is uniform within +- this (EC02: not given; C++: as the step).",
+        description="Largest size of a replaced weight. Such weights are uniform within +- this (EC02: not given; "
+        "C++: equal to the step).",
     )
     weight_limit: float = Field(
-        8.0, gt=0, le=1e6, description="A weight that is mutated stays within +- this (C++: 8)."
+        8.0, gt=0, le=1e6, description="Largest size of a weight after a mutation (C++: 8)."
     )
 
     add_node: float = Field(
@@ -115,15 +126,18 @@ class NeatSettings(Settings):
         description="Share of mutated children that add a link (EC02 4.1: 0.05; 0.3 in large populations).",
     )
     add_link_tries: int = Field(
-        20, ge=1, le=10_000, description="Pairs of nodes tried before giving up (C++: 20)."
+        20,
+        ge=1,
+        le=10_000,
+        description="Number of node pairs to try before a child gets no new link (C++: 20).",
     )
     structural_mutations: Literal["one", "independent"] = Field(
         "independent",
-        description="'one': a child with a new node or link gets no other mutation (C++). 'independent': node, "
-        "link and weights are drawn apart, as in neat-python.",
+        description="'one': a child with a new node or link gets no other mutation (C++). 'independent': node, link, "
+        "and weight mutations are drawn independently, as in neat-python.",
     )
     split_bias_links: bool = Field(
-        False, description="Whether links out of the constant input may be split (C++: no)."
+        False, description="Allow a split of links out of the constant input (C++: no)."
     )
     reenable: float = Field(
         0.2,
@@ -137,73 +151,81 @@ class NeatSettings(Settings):
         0.5,
         ge=0,
         le=1,
-        description="Share of children of two parents (EC02 4.1: 25 % come from mutation alone). Where both draws "
-        "name the same one, as in a species with a single parent, the child comes from mutation alone.",
+        description="Share of children with two parents (EC02 4.1: 25 % come from mutation alone). If both draws pick "
+        "the same parent, as in a species with a single parent, the child comes from mutation alone.",
     )
     crossover_only: float = Field(
-        0.0, ge=0, le=1, description="Share of the children of two parents that are not mutated (C++: 0.2)."
+        0.0, ge=0, le=1, description="Share of children with two parents that are not mutated (C++: 0.2)."
     )
     average_weights: float = Field(
         0.2,
         ge=0,
         le=1,
-        description="Share of crossovers in which matching weights are averaged, in place of one "
-        "being chosen (EC02: 0; C++ and JAIR04: 0.4).",
+        description="Share of crossovers that average matching weights instead of choosing one of the two (EC02: 0; "
+        "C++ and JAIR04: 0.4).",
     )
     interspecies: float = Field(
         0.001, ge=0, le=1, description="Share of crossovers with another species (EC02 4.1: 0.001)."
     )
     equal_parents: Literal["mix", "smaller"] = Field(
         "mix",
-        description="Disjoint and excess genes of equally fit parents: by coin from both (EC02, figure 4), or those "
-        "of the smaller genome (C++). A gene that would close a cycle is left out.",
+        description="Disjoint and excess genes of equally fit parents. 'mix': a coin decides on each gene of both "
+        "(EC02, figure 4). 'smaller': those of the smaller genome (C++). A gene that would close a cycle is left out.",
     )
     stay_disabled: float = Field(
         0.75,
         ge=0,
         le=1,
-        description="Chance that a gene disabled in either parent is so in the child (EC02 4.1: 0.75).",
+        description="Chance that a gene disabled in either parent is disabled in the child (EC02 4.1: 0.75).",
     )
     disabled_rule: Literal["coin", "inherit"] = Field(
         "coin",
-        description="Otherwise it is on ('coin': exactly that chance), or as in the parent it came from ('inherit', "
-        "C++: 0.875 where one parent has it disabled, 1 where both have).",
+        description="State of such a gene in the remaining cases. 'coin': enabled. 'inherit': as in the parent that it "
+        "came from (C++). With the default chance it is then disabled in 0.875 of the cases if one parent has it "
+        "disabled, and always if both have.",
     )
 
-    excess_coefficient: float = Field(1.0, ge=0, le=1e6, description="c1 of the distance (EC02 4.1: 1).")
-    disjoint_coefficient: float = Field(1.0, ge=0, le=1e6, description="c2 of the distance (EC02 4.1: 1).")
+    excess_coefficient: float = Field(
+        1.0, ge=0, le=1e6, description="c1 of the compatibility distance (EC02 4.1: 1)."
+    )
+    disjoint_coefficient: float = Field(
+        1.0, ge=0, le=1e6, description="c2 of the compatibility distance (EC02 4.1: 1)."
+    )
     weight_coefficient: float = Field(
         0.4,
         ge=0,
         le=1e6,
-        description="c3 of the distance (EC02 4.1: 0.4). Genomes without a gene in common are never compatible, unless "
-        "it is 0; with all three at 0 there is one species.",
+        description="c3 of the compatibility distance (EC02 4.1: 0.4). Genomes without a gene in common are never "
+        "compatible, unless c3 is 0. If c1, c2, and c3 are 0, there is one species.",
     )
     normalize_genes: Literal["never", "large", "always"] = Field(
         "never",
-        description="Whether excess and disjoint genes are divided by the larger genome's size: never (C++, JAIR04), "
-        "from 20 genes on (EC02 3.3 allows 1 below), or always.",
+        description="Division of the numbers of excess and disjoint genes by the size of the larger genome. 'never' "
+        "(C++, JAIR04), 'large': from 20 genes on (EC02 3.3 allows 1 below), or 'always'.",
     )
     threshold: float = Field(
         3.0, gt=0, le=1e6, description="Distance below which genomes are compatible (EC02 4.1: 3)."
     )
     assign: Literal["first", "nearest"] = Field(
         "first",
-        description="A genome joins the first compatible species (EC02 3.3), or the nearest (neat-python).",
+        description="Species that a genome joins: the first compatible one (EC02 3.3), or the nearest (neat-python).",
     )
     representative: Literal["random", "champion"] = Field(
         "random",
-        description="Who stands for a species: a random member of the generation before (EC02 3.3), or its champion "
-        "(C++).",
+        description="Genome with which others are compared: a random member of the species in the generation before "
+        "(EC02 3.3), or its champion (C++).",
     )
     target_species: int = Field(
         10,
         ge=0,
         le=1_000_000,
-        description="Species that a moving threshold aims at; 0 keeps it fixed (EC02). JAIR04: 10.",
+        description="Number of species that a moving threshold aims at. 0: the threshold is fixed (EC02). JAIR04: 10.",
     )
     threshold_step: float = Field(
-        0.3, ge=0, le=1e6, description="How far the threshold moves in a generation, never below 0.3 (C++)."
+        0.3,
+        ge=0,
+        le=1e6,
+        description="Change of a moving threshold per generation. The threshold stays at 0.3 or above (C++).",
     )
 
     survival: float = Field(
@@ -217,39 +239,41 @@ class NeatSettings(Settings):
         6,
         ge=1,
         le=1_000_000,
-        description="The champion is copied unchanged in species of this many (EC02 4.1: more than five).",
+        description="Minimum size of a species whose champion is copied unchanged (EC02 4.1: more than five).",
     )
     champion_counts: Literal["members", "offspring"] = Field(
-        "offspring", description="Many members (EC02), or many children to come (C++)."
+        "offspring",
+        description="Size that counts for this: members of the species (EC02), or its children in the next generation "
+        "(C++).",
     )
     stagnation: int = Field(
         15,
         ge=1,
         le=1_000_000,
-        description="Generations without a better best fitness after which a species is "
-        "stagnant (EC02 4.1: 15).",
+        description="Number of generations without a better best fitness after which a species is stagnant "
+        "(EC02 4.1: 15).",
     )
     stagnation_factor: float = Field(
         0.01,
         ge=0,
         le=1,
-        description="What a stagnant species' fitness is multiplied by (EC02: 0, no children; C++: 0.01).",
+        description="Factor for the fitness of a stagnant species (EC02: 0, no children; C++: 0.01).",
     )
     best_species_spared: bool = Field(
         True,
-        description="Whether the species with the fittest individual is never called stagnant (EC02: no).",
+        description="Never treat the species with the fittest individual as stagnant (EC02: no).",
     )
     population_stagnation: int = Field(
         20,
         ge=1,
         le=2**31 - 1,
-        description="After more generations than this without a better best fitness only the "
-        "two best species have children (EC02 3.3: 20).",
+        description="Number of generations without a better best fitness after which only the two best species have "
+        "children (EC02 3.3: 20).",
     )
     negative_fitness: Literal["shift", "clip"] = Field(
         "shift",
-        description="Sharing needs fitness that is not negative: lift all by the lowest ('shift', ours), or make "
-        "negative ones 0.0001 ('clip', C++).",
+        description="Treatment of negative fitness, which sharing cannot use. 'shift': raise all values by the lowest "
+        "(ours). 'clip': replace negative values by 0.0001 (C++).",
     )
 
     @model_validator(mode="before")
@@ -269,14 +293,14 @@ class NeatSettings(Settings):
 
     @classmethod
     def named(cls, name: str, **changes: Any) -> NeatSettings:
-        """A named set of settings, some of them changed; the same as `NeatSettings(settings=name, **changes)`.
+        """Return a named set of settings with changes, like `NeatSettings(settings=name, **changes)`.
 
         Args:
             name: 'default', 'stanley-2002', 'rosenzweig-remy' or 'rosenzweig-remy-neat-python'.
             changes: Settings by name.
 
         Raises:
-            ValueError: No such set, a second name for it, or a setting that is unknown or cannot be.
+            ValueError: The set is unknown or named twice, or a setting is unknown or out of range.
         """
         if "settings" in changes:
             raise ValueError(
@@ -289,12 +313,12 @@ class NeatSettings(Settings):
     def rules(
         self, n_inputs: int, n_outputs: int, *, bias_input: int = -1, drives_wheels: bool = False
     ) -> NeatRules:
-        """The settings in the form that the kernels read.
+        """Return the settings in the form that the kernels read.
 
         Args:
-            n_inputs, n_outputs: Nodes, the constant input counted.
-            bias_input: Which input is constant; -1 where none is.
-            drives_wheels: Whether the outputs are wheel speeds, left and right, instead of move and turn.
+            n_inputs, n_outputs: Number of nodes, including the constant input.
+            bias_input: Index of the constant input; -1 if there is none.
+            drives_wheels: True if the outputs are wheel speeds, left and right, instead of move and turn.
         """
         # a whole number that was given for one with a fraction would compile the kernels a second time
         same: dict[str, Any] = {

@@ -14,7 +14,8 @@ from ._estimate import CONFIDENCE
 from ._side import GapSide, Values
 
 Statistic = Callable[[Values, Values], Values]
-"""Of (b, c, r) trials in simulation and (b, c, q) on the target: (b,)."""
+"""A function of trials in simulation (b, c, r) and on the target (b, c, q) that returns a number for each sample,
+(b,)."""
 
 SMALLEST_N = 5
 """Fewer controllers give no interval: by the expansion for small n it would end beyond all resamples."""
@@ -31,7 +32,7 @@ def resampled(
     *,
     smooth: bool = False,
 ) -> Iterator[tuple[Values, Values]]:
-    """Samples as they could have come out, in blocks: (b, c, r) of the source and (b, c, q) of the target.
+    """Yield resamples in blocks: (b, c, r) of the source and (b, c, q) of the target.
 
     Controllers are drawn, both their means together; then trials of each, by residuals. Means of few trials spread
     more than controllers do, and drawing trials anew would add that noise a second time. So means are first drawn
@@ -41,10 +42,10 @@ def resampled(
     Args:
         source: The simulator's trials.
         target: The target's.
-        n_resamples: How many samples.
+        n_resamples: Number of resamples.
         rng: Draws them.
-        smooth: Whether means drawn twice are moved a little apart, with the covariance kept: for statistics of ranks,
-            of which a controller drawn twice makes ties that no new sample has.
+        smooth: True to move means that were drawn twice slightly apart, with their covariance. Statistics of ranks
+            need this, because a controller drawn twice makes ties that no new sample has.
 
     Source: Davison & Hinkley (1997), Bootstrap Methods and their Application, section 3.8, for two levels and the
     need to shrink. Differs: the two sides are shrunk together, by the linear map that gives their covariance the
@@ -72,7 +73,7 @@ def _smoothed(means: Values, latent: Values, rng: np.random.Generator) -> Values
 
 
 def shrunk_means(source: GapSide, target: GapSide) -> Values:
-    """(c, 2) means of controllers on both sides, with the covariance that they would have without noise."""
+    """Return means of controllers on both sides with the covariance that they would have without noise, (c, 2)."""
     means = np.stack([source.means, target.means], axis=1)
     if source.n < 2:
         return means
@@ -119,7 +120,7 @@ def bootstrap(
     *,
     smooth: bool = False,
 ) -> dict[str, Values]:
-    """(b,) each statistic of the same resamples; arguments as in `resampled`."""
+    """Return each statistic of the same resamples, (b,); arguments as in `resampled`."""
     found: dict[str, list[Values]] = {name: [] for name in statistics}
     for one, other in resampled(source, target, n_resamples, rng, smooth=smooth):
         for name, statistic in statistics.items():
@@ -128,7 +129,7 @@ def bootstrap(
 
 
 def bootstrap_mean(values: Values, n_resamples: int, rng: np.random.Generator) -> Values:
-    """(b,) mean of (n,) values, one a controller, of which n are drawn again."""
+    """Return the means of resamples, (b,), for values (n,), one of each controller."""
     return np.asarray(values[rng.integers(0, len(values), (n_resamples, len(values)))].mean(axis=1))
 
 

@@ -1,4 +1,4 @@
-"""Whether the simulator keeps the order of controllers, and how much of it noise hides."""
+"""The rank correlation of simulator and target over controllers, and the effect of noise on it."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Rng = np.random.Generator
 
 
 def spearman(one: Values, other: Values) -> Values:
-    """(b,) Spearman's rank correlation of b pairs of samples; nan where one of the two has all values alike.
+    """Return Spearman's rank correlation of b pairs of samples, (b,); nan if all values of one sample are equal.
 
     Args:
         one: (b, c) and
@@ -31,7 +31,7 @@ def spearman(one: Values, other: Values) -> Values:
 
 
 def halves(values: Values, rng: Rng) -> tuple[Values, Values]:
-    """(b, c) means of one random half of the trials and of another, floor(r / 2) each.
+    """Return the means of two random halves of the trials, floor(r / 2) each, (b, c).
 
     Args:
         values: (b, c, r), r at least 2.
@@ -54,14 +54,14 @@ def lengthened(correlation: Values, times: float) -> Values:
 
 
 def reliability(values: Values, rng: Rng, splits: int = SPLITS) -> Values:
-    """(b,) how well the means of r trials keep the order of controllers when all trials are made again [0..1].
+    """Return the reliability of the means of r trials: their rank correlation with those of new trials, 0 to 1, (b,).
 
     The rank correlation between halves, mean of `splits` random ones, lengthened to r trials.
 
     Args:
         values: (b, c, r), r at least 2.
         rng: Draws the halves.
-        splits: How many.
+        splits: Number of random splits.
     """
     between = [spearman(*halves(values, rng)) for _ in range(splits)]
     size = values.shape[2] // 2
@@ -86,7 +86,7 @@ def attenuated(correlation: float, source: float, target: float) -> float:
 
 
 def trials_for_reliability(found: float, trials: int, wanted: float) -> int | None:
-    """Trials of each controller that would give the wanted reliability, by Spearman & Brown; None where none would."""
+    """Return the number of trials of each controller for a reliability, by Spearman & Brown; None if none does."""
     if found <= 0:
         return None
     return int(np.ceil(trials * wanted * (1 - found) / (found * (1 - wanted)) - 1e-9))

@@ -12,7 +12,7 @@ class CoverageMaps:
     """Shares of trials that cross each cell.
 
     Attributes:
-        source: (n_cells,) in simulation [0..1].
+        source: (n_cells,) share of trials in simulation that visit a cell [0..1].
         target: (n_cells,) on the target.
     """
 
@@ -21,12 +21,12 @@ class CoverageMaps:
 
     @property
     def difference(self) -> Values:
-        """(n_cells,) target less simulator [-1..1]."""
+        """Difference of the maps, target minus simulator, (n_cells,) [-1..1]."""
         return self.target - self.source
 
 
 def coverage_maps(source: GapSide, target: GapSide) -> CoverageMaps | None:
-    """The maps of both sides, all controllers counting alike; None where cells are not known on both."""
+    """Return the maps of both sides with equal weights of controllers; None if the cells of a side are unknown."""
     if not (len(source.cells) and len(target.cells)):
         return None
     one, other = (side.cells.mean(axis=(0, 1)) for side in (source, target))

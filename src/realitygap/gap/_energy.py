@@ -15,7 +15,7 @@ ALPHA = 0.05
 
 
 def energy_distances(source: Values, target: Values) -> Values:
-    """(c,) energy distance between both sides of each controller: `2 E|X - Y| - E|X - X'| - E|Y - Y'|`.
+    """Return the energy distance between both sides for each controller, (c,): `2 E|X - Y| - E|X - X'| - E|Y - Y'|`.
 
     Args:
         source: (c, r, d) behaviors, such as visited cells as 0 and 1: then distances are roots of the number of
@@ -23,7 +23,7 @@ def energy_distances(source: Values, target: Values) -> Values:
         target: (c, q, d).
 
     Returns:
-        Without bias: 0 on average where both sides have the same distribution, and then often below 0.
+        The unbiased estimate. It is 0 on average if both sides have the same distribution, and then often negative.
 
     Raises:
         ValueError: One trial on a side: there are no distances within it.
@@ -44,7 +44,7 @@ def energy_test(
         source: (c, r, d) and
         target: (c, q, d).
         rng: Draws the permutations.
-        permutations: How many, beside the observed one.
+        permutations: Number of permutations, in addition to the observed order.
 
     Source: permutation within strata; the observed one counts (Phipson & Smyth 2010).
     """

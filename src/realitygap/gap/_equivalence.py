@@ -23,13 +23,13 @@ class Equivalence:
 
     Attributes:
         difference: Mean difference.
-        low: Lower end of its interval of 90 %, which lies within the margin where equivalence is shown.
+        low: Lower end of its 90 % interval. Equivalence is shown if the interval lies within the margin.
         high: Upper end.
         p: The larger of both p; nan without a margin.
-        equivalent: Whether it is shown; None without a margin.
-        power: How often so many controllers show it where there is no difference; nan without a margin.
-        needed: Controllers that show it in 80 of 100 studies where there is no difference; None where no number up to
-            100,000 does, or without a margin.
+        equivalent: True if it is shown; None without a margin.
+        power: Probability that this number of controllers shows it if there is no difference; nan without a margin.
+        needed: Number of controllers that shows it in 80 of 100 studies if there is no difference. None if no number
+            up to 100,000 does, or without a margin.
     """
 
     difference: float
@@ -42,10 +42,10 @@ class Equivalence:
 
 
 def prove_equivalence(differences: Values, margin: float | None) -> Equivalence:
-    """Whether the mean of differences, one a controller, lies within the margin to both sides.
+    """Test whether the mean of differences, one of each controller, lies within the margin on both sides.
 
     Args:
-        differences: (c,) of means, target less source; c at least 2.
+        differences: (c,) differences of means, target minus source; c is at least 2.
         margin: Above 0, in their unit; None for the interval alone.
 
     Raises:
@@ -102,7 +102,7 @@ def equivalence_power(margin: float, spread: float, n: int, difference: float = 
 def controllers_for_margin(
     margin: float, spread: float, difference: float = 0.0, power: float = POWER
 ) -> int | None:
-    """The fewest controllers that show equivalence so often; None where 100,000 do not."""
+    """Return the smallest number of controllers that shows equivalence with this power; None if 100,000 do not."""
     return fewest(lambda n: equivalence_power(margin, spread, n, difference), power)
 
 

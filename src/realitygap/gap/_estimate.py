@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 CONFIDENCE = 0.95
-"""Of all intervals but those of equivalence, which are of 90 % because its test has two sides of 5 %."""
+"""Level of all intervals except those of equivalence, which have 90 % because its test has two sides of 5 %."""
 
 
 @dataclass(frozen=True)
@@ -14,13 +14,13 @@ class Estimate:
     """A measured number.
 
     Attributes:
-        estimate: The number; None where n cannot carry it.
-        low: Lower end of its interval; None where there is none.
+        estimate: The number; None if n is too small for it.
+        low: Lower end of its interval; None if there is no interval.
         high: Upper end.
         n: Controllers behind it.
-        refused: Why there is no number or no interval, and how many trials or controllers would give one; empty
-            where there are both.
-        more: What else belongs to it, such as `p` or `margin`.
+        refused: Reason for a missing number or interval, with the required number of trials or controllers; empty if
+            both exist.
+        more: Related values, such as `p` or `margin`.
     """
 
     estimate: float | None
@@ -36,7 +36,7 @@ class Estimate:
         return cls(None, None, None, n, why, dict(more))
 
     def to_dict(self) -> dict[str, Any]:
-        """As `--json` prints it: estimate, low, high, n, and what else belongs to it."""
+        """Return a dictionary as in the output of `--json`: estimate, low, high, n, and related values."""
         values: dict[str, Any] = {"estimate": self.estimate, "low": self.low, "high": self.high, "n": self.n}
         if self.refused:
             values["refused"] = self.refused

@@ -8,7 +8,7 @@ from ._side import Values
 
 
 def mean_difference(source: Values, target: Values) -> Values:
-    """(b,) mean over controllers of the difference of means, target less source.
+    """Return the mean over controllers of the difference of means, target minus source, (b,).
 
     Args:
         source: (b, c, r) and
@@ -18,7 +18,7 @@ def mean_difference(source: Values, target: Values) -> Values:
 
 
 def square_differences(source: Values, target: Values) -> Values:
-    """(b, c) unbiased estimate of the square of each controller's true difference; below 0 where noise has it so.
+    """Return unbiased estimates of the square of each controller's true difference, (b, c), which may be negative.
 
     The square of a difference of means is too large by the variance of both means, which is taken out:
     d² - s²/r - t²/q. A controller without a gap gives 0 on average.
@@ -38,12 +38,12 @@ def square_differences(source: Values, target: Values) -> Values:
 
 
 def rms_of(squares: Values) -> Values:
-    """Root of a mean square; 0 where it is below: an unbiased mean square may be, a distance may not."""
+    """Return the root of a mean square; 0 for a negative one, which an unbiased estimate may be."""
     return np.asarray(np.sqrt(np.maximum(squares, 0.0)))
 
 
 def shares_above(source: Values, target: Values) -> Values:
-    """(c,) how likely a trial of each controller on the target is above one in simulation; ties count half.
+    """Return the probability that a trial on the target is above one in simulation, (c,); ties count half.
 
     Args:
         source: (c, r) and

@@ -1,4 +1,4 @@
-"""Means with intervals by t, where a handful of values is all there is."""
+"""Means with intervals by t, for a handful of values."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ from ._rms_interval import rms_interval
 from ._side import GapSide, Values
 
 SEED = 7
-"""Of every random draw in a measure, so that the same trials give the same numbers."""
+"""Seed of every random draw in a measure, so that the same trials give the same numbers."""
 
 RESAMPLES = 2_000
 
@@ -28,7 +28,7 @@ LEAST_RELIABILITY = 0.2
 """Less is noise above all: a correlation over a ceiling so low can be anything."""
 
 WANTED_RELIABILITY = 0.5
-"""For which it is said how many trials it takes."""
+"""Reliability for which the required number of trials is reported."""
 
 _FEW_SPLITS = 6
 """Halves in each resample, whose number makes up for how few they are."""
@@ -48,10 +48,10 @@ def measure_gap(
     Args:
         source: The simulator's; row k is controller k.
         target: The target's, of the same controllers; the number of trials may differ.
-        margin: Of equivalence in level, in units of quality; without one there is no test of it.
-        misspecified: Whether a check found that the simulator cannot make what was observed.
-        resamples: Of the bootstrap.
-        seed: Of all random draws.
+        margin: Margin of equivalence in level, in units of quality. Without one, equivalence is not tested.
+        misspecified: True if a check showed that the simulator cannot reproduce the observations.
+        resamples: Number of resamples of the bootstrap.
+        seed: Seed of all random draws.
 
     Returns:
         All measures. What n cannot carry is refused there, with the n that would.

@@ -21,7 +21,7 @@ SIMULATED = 2_000
 """Studies that are simulated to check a number: the interval of a power of 0.8 is then ±0.02."""
 
 SHORT_OF = 0.02
-"""By how much the lower end of that interval may be below the power that was asked for."""
+"""Largest amount by which the lower end of that interval may be below the requested power."""
 
 _MOST_PAIRS = 2_000_000
 """Controllers in all studies that are simulated for a correlation: beyond 1,000 controllers there are fewer studies."""
@@ -32,9 +32,9 @@ class Needed:
     """The number of controllers needed, for a number of trials of each on each platform.
 
     Attributes:
-        trials: Of each controller on each platform.
-        controllers: None where 100,000 would not do.
-        power: How often simulated studies of this size find it.
+        trials: Number of trials of each controller on each platform.
+        controllers: Number of controllers; None if 100,000 are not enough.
+        power: Share of simulated studies of this size that detect the effect.
         low: Lower end of its interval of 95 %.
         high: Upper end.
     """
@@ -55,9 +55,9 @@ def spread_of_differences(spread: float, noise: float, trials: int) -> float:
     """Standard deviation over controllers of the difference of means.
 
     Args:
-        spread: Of the true differences.
+        spread: Standard deviation of the true differences.
         noise: Standard deviation of one trial about its controller's mean, on both platforms.
-        trials: Of each controller on each platform.
+        trials: Number of trials of each controller on each platform.
     """
     return math.sqrt(spread**2 + 2 * noise**2 / trials)
 
@@ -69,9 +69,9 @@ def plan_effect(
 
     Args:
         effect: Mean difference to find, in units of quality.
-        spread, noise, trials: As in `spread_of_differences`.
-        power: How often it shall be found.
-        seed: Of the simulated studies.
+        spread, noise, trials: Arguments of `spread_of_differences`.
+        power: Statistical power: the probability of detecting the effect.
+        seed: Seed of the simulated studies.
 
     Source: Cohen (1988), chapter 2, by the noncentral t distribution.
     """
@@ -91,7 +91,7 @@ def detectable_difference(n: int, *, spread: float, noise: float, trials: int, p
 
     Args:
         n: Number of controllers, 2 or more.
-        spread, noise, trials: As in `spread_of_differences`.
+        spread, noise, trials: Arguments of `spread_of_differences`.
         power: Probability of detecting it.
 
     Raises:
@@ -115,7 +115,7 @@ def detectable_difference(n: int, *, spread: float, noise: float, trials: int, p
 def plan_margin(
     margin: float, *, spread: float, noise: float, trials: int, power: float = 0.8, seed: int = 1
 ) -> Needed:
-    """Controllers with which TOST at 5 % shows equivalence where there is no difference; as `plan_effect`."""
+    """Return the controllers with which TOST at 5 % shows the equivalence of equal means; as `plan_effect`."""
     check_plan(power, margin=margin)
     _check(noise=noise + spread)
     sd = spread_of_differences(spread, noise, trials)
@@ -139,10 +139,11 @@ def plan_correlation(
     Args:
         correlation: The true one, of controllers without noise.
         least: Above which it shall be shown; below `correlation`.
-        reliability: Of the means of both platforms with so many trials [0..1]; both correlations are seen through it.
-        trials: Of each controller on each platform.
-        power: How often it shall be shown.
-        seed: Of the simulated studies.
+        reliability: Reliability of the means of both platforms with this number of trials [0..1]. It lowers both
+            observed correlations.
+        trials: Number of trials of each controller on each platform.
+        power: Statistical power: the probability of showing it.
+        seed: Seed of the simulated studies.
 
     Source: Fisher's transformation with the standard error of Bonett & Wright (2000), Psychometrika 65(1), 23-28,
     for Spearman's correlation.

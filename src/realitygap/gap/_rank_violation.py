@@ -17,7 +17,7 @@ _BLOCK = 4_000_000
 
 
 def mean_maximum_rank_violation(source: Values, target: Values) -> Values:
-    """(b,) mean over controllers of the largest difference on the target to one that the simulator orders otherwise.
+    """Return the mean over controllers of the largest violation of the target's order, (b,).
 
     For each controller i the largest `|target_i - target_j|` over all j with (source_i < source_j) differing from
     (target_i < target_j); 0 where the simulator orders all as the target does. It is in the unit of the *target's*
@@ -85,12 +85,12 @@ def _left_out(violations: Values) -> Values:
 
 
 def rank_violation_floor(target: Values, rng: Rng, splits: int = SPLITS) -> Values:
-    """(b,) the violation of one random half of the target's trials by the other: what noise alone makes of it.
+    """Return the violation of one random half of the target's trials by the other, (b,), which noise alone causes.
 
     Args:
         target: (b, c, q), q at least 2.
         rng: Draws the halves.
-        splits: How many, of which the mean is taken.
+        splits: Number of random splits, of which the mean is taken.
     """
     found = [mean_maximum_rank_violation(*halves(target, rng)) for _ in range(splits)]
     return np.asarray(np.mean(found, axis=0))

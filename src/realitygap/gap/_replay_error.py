@@ -15,14 +15,14 @@ from ._side import Values
 
 @dataclass(frozen=True)
 class ReplayError:
-    """The same commands from the same start on both sides, m trials of t steps.
+    """Error between the same commands from the same start on both sides, in m trials of t steps.
 
     Attributes:
         distance: (m, t + 1) between the target's robot and the simulated one after each step [m].
         heading: (m, t + 1) between their headings [rad, 0..pi].
         noise_distance: (m, t + 1) between two replays in simulation, which noise alone drives apart [m].
-        noise_heading: (m, t + 1) likewise [rad].
-        controllers: (m,) which controller's each trial is.
+        noise_heading: (m, t + 1) error of the heading between replays with other noise [rad].
+        controllers: (m,) index of each trial's controller.
     """
 
     distance: Values
@@ -42,7 +42,7 @@ class ReplayError:
         return self._mean(self.distance[:, -1])
 
     def to_dict(self) -> dict[str, Any]:
-        """As plain values: after each step the mean over controllers, with its interval."""
+        """Return plain values: after each step, the mean over controllers with its interval."""
         values: dict[str, Any] = {"trials": self.n, "n": len(np.unique(self.controllers))}
         for name in ("distance", "heading", "noise_distance", "noise_heading"):
             found = [self._mean(step) for step in getattr(self, name).T]
@@ -65,8 +65,8 @@ def replay_error(
 
     Args:
         observed: (m, t + 1, 3) x [m], y [m], heading [rad] on the target.
-        replayed: (k, m, t + 1, 3) of k replays with noise of their own, k at least 2.
-        controllers: (m,) which controller's each trial is; each another one's when not given.
+        replayed: (k, m, t + 1, 3) poses of k replays, each with its own noise; k is at least 2.
+        controllers: (m,) index of each trial's controller. Default: each trial has another controller.
 
     Returns:
         The mean over replays. Of the noise: between each replay and the next.

@@ -19,9 +19,9 @@ class Measure(NamedTuple):
 
     Attributes:
         name: The attribute of `GapResult`.
-        row: What a terminal calls it, in at most 32 letters.
-        title: What a page calls it.
-        meaning: In words; `{score}` is what trials were scored by.
+        row: Name in a terminal, at most 32 letters.
+        title: Name on a page.
+        meaning: Meaning in words; `{score}` is replaced by the score of trials.
     """
 
     name: str
@@ -95,7 +95,7 @@ SHOWN: tuple[Measure, ...] = (
 _LATE = ("a12", "energy_ends")  # after the others in JSON
 
 MEASURES = tuple(each.name for each in SHOWN if each.name not in _LATE)
-"""The names of measures that come first in JSON, each with estimate, low, high and n."""
+"""Names of the measures that come first in JSON, each with estimate, low, high, and n."""
 
 
 @dataclass(frozen=True)
@@ -107,25 +107,25 @@ class GapResult:
     Attributes:
         source: Name of the simulator.
         target: Name of the target.
-        labels: Of both: SIM, TWIN, EMULATED or REAL.
-        trials: Of each controller on both.
+        labels: Labels of both: SIM, TWIN, EMULATED or REAL.
+        trials: Number of trials of each controller on both.
         rms: Root mean square over controllers of the difference of means, the variance of noise taken out.
         level: Mean over controllers of the difference of means.
-        a12: How likely a trial on the target is above one of the same controller in simulation.
+        a12: Probability that a trial on the target is above one of the same controller in simulation.
         srcc: Spearman's correlation of means over controllers.
-        srcc_disattenuated: The same, over the noise ceiling.
+        srcc_disattenuated: The rank correlation divided by the noise ceiling.
         noise_ceiling: The correlation that noise alone leaves of a perfect one.
         mmrv: Mean maximum rank violation of the simulator's order, in units of the target's quality.
-        mmrv_floor: That of one half of the target's trials by the other half.
+        mmrv_floor: The violation of one half of the target's trials by the other half.
         energy: Energy distance of behaviors (visited cells), mean over controllers; `more` has its p.
         equivalence: The level with the 90 % interval of TOST; `more` has margin, p and whether they are equivalent.
-        energy_ends: Energy distance of the places where trials end [m]; refused where nobody saw them.
-        misspecified: Whether the simulator cannot make what was observed; None where nobody checked.
-        luck: What champions lose on fresh seeds where they were selected; refused where none was selected.
-        reevolved: Champions evolved and tried on the target less champions evolved and tried in simulation; refused
-            where none were.
-        notes: What else there is to say.
-        score: What trials were scored by, with its unit, such as `way along walls [m]`.
+        energy_ends: Energy distance of the final positions of trials [m]; refused if they are unknown.
+        misspecified: True if the simulator cannot reproduce the observations; None without a check.
+        luck: Loss of champions on fresh seeds on the platform that selected them; refused if no champion was selected.
+        reevolved: Champions evolved and tried on the target minus champions evolved and tried in simulation; refused
+            if there are none.
+        notes: Notes on the result.
+        score: Score of trials, with its unit, such as `distance along walls [m]`.
     """
 
     source: str
@@ -158,7 +158,7 @@ class GapResult:
 
     @property
     def excludes_no_gap(self) -> bool:
-        """Whether the interval of the RMS gap begins above 0."""
+        """True if the interval of the RMS gap begins above 0."""
         return self.rms.low is not None and self.rms.low > 0
 
     @property
@@ -186,7 +186,7 @@ class GapResult:
         )
 
     def to_json(self) -> str:
-        """As text."""
+        """Return the result as JSON."""
         return json.dumps(self.to_dict(), indent=2)
 
 

@@ -11,7 +11,7 @@ from ._estimate import CONFIDENCE
 from ._side import Values
 
 LEAST_RATIO = 1.5
-"""The upper end takes the mean square to be at least so many standard errors: a logarithm has no scale near 0."""
+"""Minimum of the mean square in standard errors for the upper end, because a logarithm has no scale near 0."""
 
 
 def rms_interval(

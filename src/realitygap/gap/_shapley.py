@@ -11,15 +11,15 @@ from ._side import Values
 
 
 def coalitions(n: int) -> list[tuple[bool, ...]]:
-    """All 2^n choices of n groups: in or not; number k has group g where bit g of k is set."""
+    """Return all 2^n choices of n groups. Choice k includes group g if bit g of k is set."""
     return [tuple(bool(k >> g & 1) for g in range(n)) for k in range(2**n)]
 
 
 def shapley_values(worth: Values) -> Values:
-    """(b, g) what each of g groups adds on average over all orders of bringing them in.
+    """Return what each of g groups adds on average over all orders of adding them, (b, g).
 
     Args:
-        worth: (b, 2^g) of each choice of groups, in the order of `coalitions`.
+        worth: (b, 2^g) value of each choice of groups, in the order of `coalitions`.
 
     Returns:
         The values, whose sum over groups is the worth of all less that of none.

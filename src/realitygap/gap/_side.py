@@ -15,11 +15,11 @@ class GapSide:
     """c controllers, each tried r times on one platform.
 
     Attributes:
-        name: Of the platform, as the user named it.
+        name: Name of the platform, as the user gave it.
         label: SIM, TWIN, EMULATED or REAL.
         values: (c, r) quality of each trial, such as coverage 0..1.
-        cells: (c, r, n_cells) bool, the cells that each trial crossed; no rows where they are not known.
-        ends: (c, r, 2) where each trial ended [m]; no rows where nobody saw it.
+        cells: (c, r, n_cells) bool, True for the cells that each trial crossed; no rows if they are unknown.
+        ends: (c, r, 2) final position of each trial [m]; no rows if they are unknown.
     """
 
     name: str
@@ -54,12 +54,12 @@ class GapSide:
 
     @property
     def means(self) -> Values:
-        """(c,) mean quality of each controller."""
+        """Return the mean quality of each controller, (c,)."""
         return np.asarray(self.values.mean(axis=1))
 
     @property
     def noise(self) -> Values:
-        """(c,) variance of each of these means that the noise of trials makes; 0 where there is one trial."""
+        """Return the part of the variance of each mean that is noise of trials, (c,); 0 if there is one trial."""
         if self.trials < 2:
             return np.zeros(self.n)
         return np.asarray(self.values.var(axis=1, ddof=1) / self.trials)

@@ -25,11 +25,11 @@ class Why:
 
     Attributes:
         parts: Names of the parts.
-        falls: By how much each lets the RMS gap fall: its Shapley value. Below 0 where it makes the gap larger.
-        numbers: How many numbers of each part the fit changes; a part without any carries nothing.
+        falls: Amount by which each part lowers the RMS gap: its Shapley value. Negative if it makes the gap larger.
+        numbers: Number of numbers of each part that the fit changes. A part without any explains nothing.
         before: RMS gap with the defaults.
-        after: With the whole fit.
-        change: By how much the whole fit makes it larger.
+        after: RMS gap with the whole fit.
+        change: Amount by which the whole fit makes it larger.
     """
 
     parts: tuple[str, ...]
@@ -72,7 +72,7 @@ class Why:
         )
 
     def to_dict(self) -> dict[str, Any]:
-        """As plain values."""
+        """Return plain values."""
         falls = zip(self.parts, self.falls, self.numbers, strict=True)
         return {
             "before": self.before.to_dict(),
@@ -112,13 +112,13 @@ def explain_gap(
             fit, in the order of `coalitions`: row 0 for the estimate, the others for draws from its posterior.
         squares: (1 + d, 2^g, c) unbiased squares of the true differences (`square_differences`).
         parts: Names of the g parts.
-        numbers: How many numbers the fit changes in each.
-        resamples: Of the bootstrap.
-        seed: Of its draws.
+        numbers: Number of numbers that the fit changes in each part.
+        resamples: Number of resamples of the bootstrap.
+        seed: Seed of its draws.
 
     Returns:
-        Shapley values. Their intervals have controllers drawn anew, and with each sample of them a draw from the
-        posterior. The intervals of the RMS gap are those of `rms_interval`, with the variance over the posterior.
+        Shapley values. For their intervals, controllers are resampled, each time with a draw from the posterior. The
+        intervals of the RMS gap are those of `rms_interval`, with the variance over the posterior.
     """
     rng = np.random.default_rng(seed)
     n_draws, _, c = squares.shape

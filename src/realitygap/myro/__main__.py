@@ -69,7 +69,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--seeds", type=_seeds, help="run it on a simulated robot once for each seed, as 1-10 or 1,5,7"
     )
-    parser.add_argument("--limit", type=_duration, help="stop it after so many seconds on the robot's clock")
+    parser.add_argument(
+        "--limit", type=_duration, help="stop it after this number of seconds on the robot's clock"
+    )
     parser.add_argument("--json", action="store_true", help="with --seeds: print the results as JSON")
     return parser
 

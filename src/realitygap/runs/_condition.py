@@ -58,29 +58,29 @@ class Condition(Settings):
     )
     selection: Selection = Field(
         "coverage",
-        description="What decides who has children: coverage (the paper's objective NEAT) or, with another task, "
-        "fitness by it; novelty; or nothing: random tries as many unrelated networks, the control that the paper "
-        "lacks.",
+        description="Rule that selects parents. coverage: the paper's objective NEAT. fitness: the fitness of another "
+        "task. novelty: novelty search. random: no selection. As many unrelated networks are tried, a control that the "
+        "paper lacks.",
     )
     platform: str = Field(
         "jyro",
-        description="What the networks are tried on: jyro, the paper's simulation; sim, a robot simulated with its "
-        "outline, contact, motors and sensors (sim:FILE is one of a file); twin:FILE, pseudo-reality in MuJoCo; "
-        "scribbler, the robot; or a platform that another package adds.",
+        description="Platform that drives the networks. jyro: the paper's simulation. sim: a robot simulated with its "
+        "outline, contact, motors, and sensors (sim:FILE: the robot of a file). twin:FILE: pseudo-reality in MuJoCo. "
+        "scribbler: the robot. Other packages can add platforms.",
     )
     noise: float = Field(
         0.1,
         ge=0,
         le=10,
-        description="Level a: each reading is moved by a * U(-1, 1) before the largest is taken "
-        "(section 2.3: 0.1, 0.5, 0.8). On a robot or a twin 0: its readings are noisy by themselves; on sim, 0 when "
-        "not given, it comes on top of the robot's own noise.",
+        description="Noise level a. a * U(-1, 1) is added to each reading before the largest is taken (section 2.3: "
+        "0.1, 0.5, 0.8). A robot and a twin allow only 0, because their own readings are noisy. On sim, the default is "
+        "0, and the level adds to the robot's own noise.",
     )
-    seed: int = Field(1, ge=0, le=2**63 - 1, description="Of the study's random numbers.")
+    seed: int = Field(1, ge=0, le=2**63 - 1, description="Seed of the study's random numbers.")
     pair: bool = Field(
         True,
-        description="Whether the conditions of a study draw the same random numbers, which narrows the "
-        "difference between them.",
+        description="Use the same random numbers for all conditions of a study. This narrows the intervals of their "
+        "differences.",
     )
     arena: ArenaSettings = ArenaSettings()
     task: Annotated[SerializeAsAny[Settings], BeforeValidator(as_task)] = CoverageTask()
@@ -278,7 +278,7 @@ class Condition(Settings):
 
     @property
     def is_physical(self) -> bool:
-        """Whether its trials are driven by a robot, and scored into a ledger."""
+        """True if a robot drives its trials and their scores go to a ledger."""
         return self.on.is_physical
 
     @property
@@ -288,7 +288,7 @@ class Condition(Settings):
 
     @property
     def coverage(self) -> CoverageTask | None:
-        """Its task where that is coverage; None where it is another."""
+        """Its task if that is coverage; otherwise None."""
         return self.task if isinstance(self.task, CoverageTask) else None
 
     @property
@@ -305,20 +305,20 @@ class Condition(Settings):
 
     @property
     def placed_arena(self) -> Arena:
-        """Its arena, with what its platform's settings say of the arena's numbers; of what is drawn, the centers."""
+        """Its arena with the numbers that its platform's settings give. A drawn number has its center."""
         arena = self.arena.arena()
         changed = self.on.arena_numbers
         return arena.with_numbers(changed) if changed else arena
 
     def arena_of(self, trial: Trajectory) -> Arena:
-        """Its arena with what was drawn for a trial."""
+        """Return its arena with the numbers that were drawn for a trial."""
         drawn = dict(zip(trial.drawn_names, trial.drawn, strict=True))
         changed = {name: value for name, value in drawn.items() if name.startswith("arena.")}
         return self.placed_arena.with_numbers(changed) if changed else self.placed_arena
 
     @property
     def records_behavior(self) -> bool:
-        """Whether its distance of behaviors compares what is in no other column: where trials end."""
+        """True if its distance of behaviors compares final positions, which need their own column."""
         return self.selection == "novelty" and DISTANCES[self.novelty.distance].compares != "cells"
 
     @property
@@ -328,12 +328,12 @@ class Condition(Settings):
 
     @property
     def genome_columns(self) -> tuple[str, ...]:
-        """Columns of its rows that have the genomes of a trial."""
+        """Columns of its rows that hold the genomes of a trial."""
         return ("genome", "partners") if self.arena.networks == "each" else ("genome",)
 
     @property
     def network_inputs(self) -> tuple[str, ...]:
-        """Names of what its networks see, in order."""
+        """Names of the inputs of its networks, in order."""
         if self.controller.inputs:
             return self.controller.inputs
         if self.coverage is None:
@@ -342,7 +342,7 @@ class Condition(Settings):
 
     @property
     def has_bias_input(self) -> bool:
-        """Whether its networks have the constant input."""
+        """True if its networks have the constant input."""
         return "bias" in self.network_inputs
 
     @property

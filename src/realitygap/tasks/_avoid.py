@@ -18,29 +18,29 @@ from ._trajectories import Trajectories
 
 
 class AvoidTask(StepTask):
-    """Floreano & Mondada's product V (1 - sqrt(dv)) (1 - i), its mean over steps, 0 to 1.
+    """Floreano & Mondada's product V (1 - sqrt(dv)) (1 - i), as its mean over steps, 0 to 1.
 
-    V is the mean of the wheels' speeds without their signs and dv half of their difference with them, both as parts of
-    full speed, and i the largest reading of the range sensors after the step. The wheels' speeds are those asked for:
-    left = move - turn, right = move + turn, each within -1 to 1.
+    V is the mean of the absolute wheel speeds, and dv is half of the absolute difference of the signed speeds. Both are
+    parts of full speed. i is the largest reading of the range sensors after the step. The speeds are the commanded
+    ones: left = move - turn, right = move + turn, each within -1 to 1.
 
-    Source: Floreano & Mondada (1994), "Automatic creation of an autonomous agent". Differs: a network with NEAT's
-    structure in place of theirs, a mean over steps in place of their sum, and speeds as asked for, not as measured.
+    Source: Floreano & Mondada (1994), "Automatic creation of an autonomous agent". Differs: a network by NEAT instead
+    of theirs, a mean over steps instead of a sum, and commanded instead of measured speeds.
     """
 
     kind: Literal["avoid"] = Field("avoid", description="Obstacle avoidance.")
     inputs: Inputs = ("range.0", "range.1", "bias")
     backward: bool = Field(
         True,
-        description="Whether driving backward counts as driving forward does, as published; going to and fro in one "
-        "place then pays, too. Without it V is the mean of the wheels' speeds, and at least 0.",
+        description="Count driving backward like driving forward, as published. Then going to and fro in one place "
+        "pays, too. If false, V is the mean of the wheels' speeds, and at least 0.",
     )
 
     observe: ClassVar[Observe] = "readings"
     score_name: ClassVar[str] = "avoidance score"
 
     def fitness(self, trajectories: Trajectories, arena: Arena) -> NDArray[np.float64]:
-        """(n,) the product, 0 (still, turning on the spot or pressed to a wall) to 1 (straight on in the open)."""
+        """Return the scores, (n,): 0 (still, turning on the spot, or pressed to a wall) to 1 (straight in the open)."""
         scores = np.empty(len(trajectories))
         arrays = trajectories.arrays
         ranges = np.array(

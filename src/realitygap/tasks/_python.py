@@ -1,4 +1,4 @@
-"""A task of one's own: a function of a Python file."""
+"""A custom task: a function of a Python file."""
 
 from __future__ import annotations
 
@@ -27,15 +27,15 @@ PYTHON = "python:"
 
 
 class PythonTask(Settings):
-    """A function of a Python file that says what trials are worth.
+    """A function of a Python file that scores trials.
 
-    `kind = "python:FILE.py:function"` names it. The function gets `Trajectories` of n trials and returns n numbers,
-    more for what is better. One that Numba compiled (`numba.njit`) gets the kernels' own arrays, `TraceArrays`, the
-    length of a step [s] and an array of n numbers to write to: nothing is converted for it. The text of the file is
-    part of the condition, its folder is not: results stay with the function that they were computed with.
+    `kind = "python:FILE.py:function"` names it. The function gets `Trajectories` of n trials and returns n numbers. A
+    better trial has a higher number. A function compiled by Numba (`numba.njit`) gets the kernels' own arrays,
+    `TraceArrays`, without conversion, the length of a step [s], and an array of n numbers to write to. The text of the
+    file is part of the condition, but its folder is not. So results belong to the function that computed them.
 
-    The settings are data. Making a task, copying it, or reading it back from a folder of results runs nothing and opens
-    no file: `from_file` reads a file, and only what `allowed` returns runs it.
+    The settings are data. Making a task, copying it, or reading it back from a folder of results runs no code and opens
+    no file. `from_file` reads a file, and only the task that `allowed` returns runs the code.
     """
 
     kind: str = Field(
@@ -45,13 +45,13 @@ class PythonTask(Settings):
         ("obstacle", "stall", "time"),
         min_length=1,
         max_length=256,
-        description="What networks see, in order: obstacle, stall, time, bias, range.K, light.K, line.K, bump.K, "
+        description="Inputs of networks, in order: obstacle, stall, time, bias, range.K, light.K, line.K, bump.K, "
         "encoder.K, goal_sector.K, goal_distance, last_move, last_turn.",
     )
     observe: Observe = Field(
         "track",
-        description="The least that an observer has to see of a robot's trial for the function to score it: readings, "
-        "cells, encoders or track.",
+        description="Minimum observation level of a robot's trial that the function can score: readings, cells, "
+        "encoders, or track.",
     )
     source: str = Field(
         "",
@@ -101,7 +101,7 @@ class PythonTask(Settings):
 
     @property
     def may_run(self) -> bool:
-        """Whether it has the permission to run its code."""
+        """True if it has the permission to run its code."""
         return self._may_run
 
     @property
@@ -111,27 +111,27 @@ class PythonTask(Settings):
 
     @property
     def name(self) -> str:
-        """As `[task] kind` has it."""
+        """Name of the task, the same as `[task] kind`."""
         return self.kind
 
     @property
     def needs_trace(self) -> bool:
-        """Always: nobody knows what the function looks at."""
+        """Always True, because the function may read any part of a trial."""
         return True
 
     @property
     def score_name(self) -> str:
-        """The name of the score in figures."""
+        """Name of the score in figures."""
         return f"score of {self.function_name}"
 
     @property
     def score_range(self) -> tuple[float, float]:
-        """The least and the greatest score that there can be."""
+        """Minimum and maximum of the score."""
         return (-math.inf, math.inf)
 
     @model_serializer(mode="wrap")
     def _without_default_observation(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Conditions that observe all keep their hashes."""
+        """Leave out the default of `observe`, so that older conditions keep their hashes."""
         values: dict[str, Any] = handler(self)
         if self.observe == "track":
             values.pop("observe", None)
@@ -139,29 +139,29 @@ class PythonTask(Settings):
 
     @property
     def file(self) -> str:
-        """The file's path as it was given."""
+        """Path of the file, as given."""
         return self.kind.removeprefix(PYTHON).rpartition(":")[0]
 
     @property
     def function_name(self) -> str:
-        """The function's name."""
+        """Name of the function."""
         return self.kind.rpartition(":")[2]
 
     def function(self) -> Callable[..., Any]:
         """Run the file's text and return its function.
 
         Raises:
-            TaskError: The task may not run code, the text cannot be run, or it has no such function.
+            TaskError: The task may not run code, the file's code fails, or the file has no such function.
         """
         if not self._may_run:
             raise TaskError(not_allowed(self))
         return _load(self.source, self.file, self.function_name)
 
     def fitness(self, trajectories: Trajectories, arena: Arena) -> NDArray[np.float64]:
-        """(n,) what the function says.
+        """Return the scores that the function computes, (n,).
 
         Raises:
-            TaskError: It may not run, it failed, or it did not return n finite numbers.
+            TaskError: The task may not run code, the function failed, or it did not return n finite numbers.
         """
         function, n = self.function(), len(trajectories)
         try:
@@ -219,7 +219,7 @@ def not_allowed(task: PythonTask) -> str:
 
 @functools.lru_cache(maxsize=32)
 def _load(source: str, file: str, name: str) -> Callable[..., Any]:
-    """A function of a file's text.
+    """Run the text of a file and return a function of it.
 
     Raises:
         TaskError: The text cannot be run, or has no such function.

@@ -31,7 +31,7 @@ class Task(Protocol):
         needs_trace: Whether `fitness` looks at single steps; where it does not, the arrays of steps have no rows.
         observe: How much an observer has to see of a trial so that it can be scored.
         score_range: The least and the greatest score that there can be; infinite where there is no limit.
-        score_name: What figures call the score, with its unit, such as `coverage` or `way along walls [m]`.
+        score_name: What figures call the score, with its unit, such as `coverage` or `distance along walls [m]`.
     """
 
     @property

@@ -25,27 +25,27 @@ WALL_SIDES = {"left": 1.0, "right": -1.0}
 class WallTask(StepTask):
     """A task that rewards the distance driven along walls that are near and on one side of the robot [m].
 
-    A step counts with its part along the nearest wall or obstacle: forward with that on the right side, backward with
-    it on the wrong one. So going to and fro, or round in a circle, adds up to nothing.
+    A step counts with its component along the nearest wall or obstacle. The sign is positive if the robot moves with
+    the wall on `side`, and negative in the other direction. So going to and fro, or in a circle, adds up to 0.
 
     Source: ours.
     """
 
     kind: Literal["wall"] = Field("wall", description="Wall following.")
     inputs: Inputs = ("range.0", "range.1", "bias")
-    side: Literal["left", "right"] = Field("right", description="Where the robot has the wall.")
+    side: Literal["left", "right"] = Field("right", description="Side of the robot on which the wall is.")
     within: float = Field(
-        0.15, gt=0, le=100, description="Nearer than this to the robot's origin is near [m]."
+        0.15, gt=0, le=100, description="Largest distance of a near wall from the robot's origin [m]."
     )
 
     score_name: ClassVar[str] = "distance along walls [m]"
     score_range: ClassVar[tuple[float, float]] = (-math.inf, math.inf)
 
     def check_arena(self, arena: Arena, drawn: Iterable[str] = ()) -> None:
-        """Refuse an arena in which there is nothing to go along, or not at one place.
+        """Refuse an arena without walls and obstacles, or one in which they move between trials.
 
         Args:
-            arena: Where.
+            arena: Arena of the trials.
             drawn: Names of the numbers that are drawn for each trial.
 
         Raises:
@@ -54,8 +54,8 @@ class WallTask(StepTask):
         moved = [name for name in drawn if name.startswith(("arena.wall.", "arena.obstacle."))]
         if moved:
             raise TaskError(
-                f"Task 'wall' wants walls and obstacles at one place in all trials, and {moved[0]} is drawn. Set it to "
-                "a number."
+                f"Task 'wall' needs walls and obstacles at the same place in all trials, but {moved[0]} is drawn. Set "
+                "it to a number."
             )
         if not arena.walls and not arena.obstacles:
             raise TaskError(
@@ -64,7 +64,7 @@ class WallTask(StepTask):
             )
 
     def fitness(self, trajectories: Trajectories, arena: Arena) -> NDArray[np.float64]:
-        """(n,) [m], below 0 where the robot went the wrong way round.
+        """Return the scores, (n,) [m]. A score is below 0 if the robot kept the wall on the other side.
 
         Raises:
             TaskError: The arena has neither walls nor obstacles, or they are drawn.

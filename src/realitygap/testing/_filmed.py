@@ -33,22 +33,22 @@ WALL_M = 0.04  # thickness
 
 @dataclass(frozen=True)
 class FilmedCamera:
-    """How a camera stands, and what it does to pictures.
+    """Pose of a camera and defects of its pictures.
 
     Attributes:
-        width: Of pictures [px].
-        height: Likewise.
-        focal: Focal length, in widths.
-        off_center: Of the optical axis [px].
-        distortion: k1, k2, p1, p2, k3.
+        width: Width of pictures [px].
+        height: Height of pictures [px].
+        focal: Focal length, in widths of the picture.
+        off_center: Distance of the optical axis from the picture's middle, x and y [px].
+        distortion: Distortion coefficients k1, k2, p1, p2, k3.
         above: Height over the floor [m].
-        beside: x and y from the arena's middle [m].
-        looks_at: x and y from the arena's middle of the point in the picture's middle [m].
-        turned: About its axis [rad].
-        exposure_s: How long a picture is exposed.
-        blur_px: Standard deviation of what is out of focus.
+        beside: Position of the camera, x and y from the arena's middle [m].
+        looks_at: Point of the floor in the picture's middle, x and y from the arena's middle [m].
+        turned: Rotation about its axis [rad].
+        exposure_s: Exposure time of a picture [s].
+        blur_px: Standard deviation of the blur [px].
         noise: Standard deviation of gray values, of 255.
-        uneven: How much darker one side is, 0..1.
+        uneven: Strength of the uneven brightness across a picture, 0 to 1.
     """
 
     width: int = 1280

@@ -1,4 +1,4 @@
-"""What any robot has to do, tried out on one."""
+"""A check that a robot keeps the contract of all robots."""
 
 from __future__ import annotations
 
@@ -20,24 +20,24 @@ from realitygap.robots import (
 GOOD = (Command(0.0, 0.0), Command(0.3, 0.0), Command(-0.3, 0.0), Command(0.0, 0.3), Command(0.2, -0.2))
 BAD = (Command(1.01, 0.0), Command(0.0, -2.0), Command(math.nan, 0.0), Command(0.0, math.inf))
 STEP_SLACK_S = 1.0
-"""How much longer than `step_s` a command may take, for a slow link [s]."""
+"""Time by which a command may exceed `step_s`, for a slow link [s]."""
 
 
 class RobotContractError(RealityGapError):
-    """A robot does not keep the contract; the text lists how, and what to do."""
+    """A robot does not keep the contract. The message lists the problems and how to fix them."""
 
 
 def check_robot(robot: Robot, *, noise: float = 0.0) -> None:
-    """Hold a robot to the contract of `realitygap.robots.Robot`: reset, read, drive and stop it, and close it.
+    """Check a robot against the contract of `realitygap.robots.Robot`: reset, read, drive, stop, and close it.
 
-    A physical robot moves: a few centimeters ahead and back, and turns to both sides. Put it on the floor.
+    A physical robot moves a few centimeters ahead and back, and turns to both sides. Put it on the floor.
 
     Args:
-        robot: Open; closed afterwards.
-        noise: How far noise may carry a reading beyond 0..1.
+        robot: Open robot. The check closes it.
+        noise: Largest distance of a noisy reading from the range 0 to 1.
 
     Raises:
-        RobotContractError: It does not keep it; all that was found is listed with what to do.
+        RobotContractError: The robot does not keep the contract. The message lists all problems and how to fix them.
     """
     _Check(robot, noise).carry_out()
 
@@ -61,7 +61,7 @@ class _Check:
                 raise
             except Exception as error:
                 self.problems.append(
-                    f"{type(error).__name__} came out of it ({error}); raise RobotError where the robot fails."
+                    f"It raised {type(error).__name__} ({error}); raise RobotError if the robot fails."
                 )
         if self.problems:
             name = type(self.robot).__name__
@@ -113,7 +113,7 @@ class _Check:
                 raise _LeaveError
         except _LeaveError:
             caught = True
-        self.expect(caught, "__exit__ swallows exceptions; return None from it.")
+        self.expect(caught, "__exit__ suppresses exceptions; return None from it.")
         self.closed()
 
     def trial(self) -> None:
@@ -154,11 +154,11 @@ class _Check:
             except ValueError:
                 continue
             self.problems.append(
-                f"drive({command}) was carried out; call realitygap.robots.check_command, which raises ValueError."
+                f"drive({command}) moved the robot; call realitygap.robots.check_command, which raises ValueError."
             )
 
     def observation(self, when: str) -> None:
-        """Look once; of each thing that may be wrong with it, the first time is said."""
+        """Observe once. Report each kind of problem only the first time."""
         seen = self.robot.observe()
         if not isinstance(seen, Observation):
             self.once("type", False, f"observe() {when} gave a {type(seen).__name__}; return an Observation.")
@@ -180,7 +180,7 @@ class _Check:
         self.once("stalled", isinstance(seen.stalled, bool), said)
 
     def once(self, what: str, is_so: bool, problem: str) -> None:
-        """As `expect`, but of each kind only the first problem."""
+        """Work like `expect`, but report only the first problem of each kind."""
         if what not in self.said:
             self.expect(is_so, problem)
         if not is_so:

@@ -25,13 +25,13 @@ INKS = {
 
 @dataclass(frozen=True)
 class Difficulty:
-    """How much goes wrong on paper and on the way to the picture; 1 is an ordinary bad day.
+    """Strength of the defects of a photographed sheet; 1 is an ordinary bad day.
 
     Attributes:
-        ink: Fading, skipping, colors other than their names'.
-        paper: Creases, waves, and how little of the print is seen.
-        light: Shadows, uneven light, tint.
-        camera: Tilt, lens, blur, noise, compression.
+        ink: Fading, skipping, and unusual colors.
+        paper: Creases, waves, and a faint print.
+        light: Shadows, uneven light, and tint.
+        camera: Tilt, lens, blur, noise, and compression.
     """
 
     ink: float = 1.0
@@ -47,7 +47,7 @@ def to_linear(color: ArrayLike) -> Floats:
 
 
 def ink_colors(names: Sequence[str], rng: np.random.Generator, spread: float) -> Floats:
-    """(n, 3) optical density of each pen's ink: its name's, and somewhat another maker's."""
+    """Return the optical density of each pen's ink, (n, 3): the one of its name, varied as between makers."""
     typical = -np.log(to_linear([INKS[name] for name in names]))
     scale = np.exp(0.12 * spread * rng.normal(size=(len(names), 1)))
     tint = np.exp(0.1 * spread * rng.normal(size=(len(names), 3)))
@@ -62,7 +62,7 @@ def resampled(path: NDArray[np.float64], spacing: float = 0.001) -> NDArray[np.f
 
 
 def smooth_noise(n: int, scale: float, rng: np.random.Generator) -> NDArray[np.float64]:
-    """(n,) noise of deviation about 1 that changes over so many entries."""
+    """Return noise of standard deviation about 1 that changes over `scale` entries, (n,)."""
     knots = rng.normal(size=max(4, int(n / scale) + 4))
     return np.interp(np.arange(n) / scale, np.arange(len(knots)), knots)
 

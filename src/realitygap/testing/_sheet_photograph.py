@@ -196,7 +196,7 @@ def _distorted(
 
 
 def _creases(shape: tuple[int, int], rng: np.random.Generator, hard: Difficulty) -> Floats:
-    """How bright folds and the planes between them are."""
+    """Return the brightness of folds and of the planes between them, (h, w)."""
     y, x = np.mgrid[0 : shape[0] : 4, 0 : shape[1] : 4].astype(np.float32)
     bright = np.ones(x.shape, np.float32)
     for _ in range(rng.poisson(2.5 * hard.paper)):
@@ -212,7 +212,7 @@ def _creases(shape: tuple[int, int], rng: np.random.Generator, hard: Difficulty)
 
 
 def _waves(shape: tuple[int, int], rng: np.random.Generator, hard: Difficulty) -> tuple[Floats, Floats]:
-    """How far paper that does not lie flat seems moved [texels]."""
+    """Return the apparent displacement of paper that does not lie flat, x and y, (h, w) each [texels]."""
     import cv2
 
     height = cv2.resize(
@@ -224,7 +224,7 @@ def _waves(shape: tuple[int, int], rng: np.random.Generator, hard: Difficulty) -
 
 
 def _light(shape: tuple[int, ...], rng: np.random.Generator, hard: Difficulty) -> Floats:
-    """(h, w, 3) how much light falls on what each pixel sees."""
+    """Return the light on the part of the sheet that each pixel shows, (h, w, 3)."""
     import cv2
 
     height, width = shape

@@ -39,7 +39,7 @@ class Fitted(Settings):
     high: float = Field(description="Upper end of the 90 % interval.")
     prior_low: float = Field(description="Lower end of the prior.")
     prior_high: float = Field(description="Upper end of the prior.")
-    identified: bool = Field(description="Whether the observations narrow the parameter down from its prior.")
+    identified: bool = Field(description="True if the observations narrow the parameter down from its prior.")
     unit: str = Field("", description="Unit, such as m/s.")
     advice: str = Field(
         "", description="Observations that would identify the parameter, if it is not identified."
@@ -132,7 +132,7 @@ class Calibration(Settings):
     draws: dict[str, tuple[float, ...]] = Field(
         {}, description="The same numbers in each draw from the posterior; all of one length."
     )
-    misspecified: bool = Field(False, description="Whether the simulator cannot reproduce the observations.")
+    misspecified: bool = Field(False, description="True if the simulator cannot reproduce the observations.")
     misspecification_p: float = Field(
         1.0, description="P value of the posterior predictive check; 1 without one (path, motion, contact)."
     )

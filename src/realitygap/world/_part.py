@@ -1,4 +1,4 @@
-"""Convex outlines with rounded corners: what bodies and obstacles are made of."""
+"""Convex outlines with rounded corners, of which bodies and obstacles are made."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ STRAIGHT = (
 class Corner(Settings):
     """A corner of an outline."""
 
-    x: Number = Field(description="Ahead of the origin [m].")
-    y: Number = Field(description="Left of the origin [m].")
+    x: Number = Field(description="Distance ahead of the origin [m].")
+    y: Number = Field(description="Distance to the left of the origin [m].")
 
 
 class Part(Settings):
@@ -38,11 +38,11 @@ class Part(Settings):
         (Corner(x=0.0, y=0.0),),
         min_length=1,
         max_length=MOST_CORNERS,
-        description="Its corners [x, y] in order, counter-clockwise, before they are grown; one for a disc, two for a "
-        "bar with round ends. A file may say box = [length, width] instead, its outer size.",
+        description="Corners [x, y] in counter-clockwise order, before they are grown: one for a disc, two for a bar "
+        "with round ends. A file may give the outer size box = [length, width] instead.",
     )
     radius: NotNegative = Field(
-        0.0, description="By how much it is grown to all sides, which rounds its corners [m]."
+        0.0, description="Radius by which it is grown to all sides, which rounds its corners [m]."
     )
 
     @model_validator(mode="before")
@@ -59,20 +59,20 @@ class Part(Settings):
 
     @property
     def corners(self) -> Points:
-        """(c, 2) its corners x, y [m] before they are grown."""
+        """Corners x, y before they are grown, (c, 2) [m]."""
         return tuple((corner.x, corner.y) for corner in self.corner)
 
     def outline(self, *, step: float = math.pi / 16) -> Points:
-        """(p, 2) points around it [m], rounded corners as short lines, counter-clockwise.
+        """Return points around it, counter-clockwise, (p, 2) [m]. Rounded corners become short lines.
 
         Args:
-            step: The largest angle between two points of a rounded corner [rad].
+            step: Largest angle between two points of a rounded corner [rad].
         """
         return rounded(self.corners, self.radius, step=step)
 
 
 def box_as_corners(values: Any) -> Any:
-    """Values with `box`, an outer length and width, replaced by the corners it has after the radius is taken away."""
+    """Return values in which corners replace `box`, an outer length and width from which the radius is subtracted."""
     if not isinstance(values, dict) or "box" not in values:
         return values
     rest = {key: value for key, value in values.items() if key != "box"}

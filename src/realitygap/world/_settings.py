@@ -32,8 +32,8 @@ class ArenaSettings(Settings):
 
     preset: str = Field(
         "paper",
-        description="The arena by name. paper: 42 x 24 in, cells of 3 in, the inner 12 x 6 reachable (section 2.1). "
-        "`realitygap show arena` draws it and the others: arena files have the list.",
+        description="Name of the arena. paper: 42 x 24 in, cells of 3 in, the inner 12 x 6 reachable (section 2.1). "
+        "`realitygap show arena` draws arenas. The page on arena files lists them.",
     )
     read: dict[str, Any] | None = Field(
         None,
@@ -43,44 +43,44 @@ class ArenaSettings(Settings):
     )
     file: str = Field(
         "",
-        description="In place of a name: a file of your own, TOML or SVG, beside the study file. The results hold the "
-        "arena itself.",
+        description="Your own arena file, TOML or SVG, instead of a name. The path is relative to the study file. The "
+        "results include the arena itself.",
     )
     start: StartName | Annotated[list[float], Field(min_length=3, max_length=3)] = Field(
         "corner",
-        description="Where trials begin: a name, or [x, y, heading] in meters and radians from +x, "
-        "counter-clockwise. corner: (0.1905, 0.1905) facing +x, a cell's center; center: the arena's center, on a "
-        "junction of cells, which belongs to the upper right one; left: middle of the left side, on a border of "
-        "cells, which belongs to the upper one. The paper says only that it is always the same. Names go with the "
-        "paper's arena; any other begins where its file says.",
+        description="Start of trials: a name, or [x, y, heading] in meters and radians from +x, counter-clockwise. "
+        "corner: (0.1905, 0.1905) facing +x, the center of a cell. center: the arena's center, on a junction of cells; "
+        "it counts for the upper right cell. left: middle of the left side, on a border of cells; it counts for the "
+        "upper cell. The paper states only that the start is always the same. Names are only for the paper's arena. "
+        "The file of another arena gives its start.",
     )
 
     robots: int = Field(
         1,
         ge=1,
         le=MOST_ROBOTS,
-        description="Robots that are in the arena at once, on platform sim. They collide, and their range sensors see "
-        "each other. Coverage counts the cells that any of them visits; other tasks score each robot, and count the "
-        "mean.",
+        description="Number of robots that are together in the arena, on platform sim. They collide, and their range "
+        "sensors see each other. Coverage counts the cells that any of them visits. Other tasks score each robot and "
+        "use the mean.",
     )
     other_starts: list[Annotated[list[float], Field(min_length=3, max_length=3)]] = Field(
         default_factory=list,
-        description="Starts of the robots after the first, [x, y, heading] each. Not given: each at the center of the "
-        "cell that has most room, facing as the first does.",
+        description="Starts of the robots after the first, [x, y, heading] each. Default: each robot starts at the "
+        "center of the cell with the most room, with the heading of the first robot.",
     )
 
     networks: Literal["one", "each"] = Field(
         "one",
-        description="Networks of several robots. one: all have the same network, whose fitness is that of "
-        "the team. each: every robot has another network of the generation. Each network drives once in each place, "
-        "with partners that are drawn. Its fitness is the mean of these trials (Waibel, Keller & Floreano 2009: "
-        "homogeneous and heterogeneous teams with team-level selection).",
+        description="Networks of several robots. one: all robots have the same network, whose fitness is that of the "
+        "team. each: every robot has another network of the generation. Each network drives once from each start, with "
+        "random partners. Its fitness is the mean of these trials (Waibel, Keller & Floreano 2009: homogeneous and "
+        "heterogeneous teams with team-level selection).",
     )
 
     @model_validator(mode="before")
     @classmethod
     def _reads_its_file(cls, values: Any) -> Any:
-        """Begin where the file says, and keep what stood in it and its bare name, which is the same everywhere."""
+        """Take the start from the file, and store its content and its bare name, which is the same everywhere."""
         if not isinstance(values, Mapping):
             return values
         values = dict(values)
@@ -143,7 +143,7 @@ class ArenaSettings(Settings):
 
     @model_serializer(mode="wrap")
     def _without_what_is_not_there(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Settings that came later are left out where they change nothing: conditions keep their hashes."""
+        """Leave out newer settings that have their defaults, so that older conditions keep their hashes."""
         values: dict[str, Any] = handler(self)
         unused: dict[str, Any] = {
             "file": "",
@@ -163,7 +163,7 @@ class ArenaSettings(Settings):
         )
 
     def arena(self) -> Arena:
-        """The arena, with the starts of all robots."""
+        """Return the arena with the starts of all robots."""
         arena = self._arena_alone()
         if self.robots == 1:
             return arena
@@ -181,12 +181,12 @@ class ArenaSettings(Settings):
 
 
 def _arena_of(preset: str, read: Mapping[str, Any] | None) -> Arena:
-    """The arena as it was read, or that of the name."""
+    """Return the arena that was read from a file, or the one of this name."""
     return Arena.from_dict(dict(read)) if read is not None else load_arena(preset)
 
 
 def _read(file: str) -> Arena | None:
-    """The arena of a file; None where it cannot be read, which the field's own check says."""
+    """Return the arena of a file; None if it cannot be read, which the field's own check reports."""
     try:
         return load_arena(_as_path(file))
     except DescriptionError:
@@ -194,5 +194,5 @@ def _read(file: str) -> Arena | None:
 
 
 def _as_path(file: str) -> Path:
-    """A path that no name of an arena can be taken for."""
+    """Return a path that is not mistaken for the name of an arena."""
     return Path(file) if file not in arena_names() else Path.cwd() / file

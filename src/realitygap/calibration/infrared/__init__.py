@@ -1,1 +1,1 @@
-"""The calibration of infrared range sensors: where the robot stands, the likelihood of readings, and the fit."""
+"""The calibration of infrared range sensors: the robot's placements, the likelihood of readings, and the fit."""

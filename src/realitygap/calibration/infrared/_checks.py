@@ -1,4 +1,4 @@
-"""Whether readings are as independent as a fit takes them to be, and whether the fit can make them."""
+"""Tests of the assumption that readings are independent, and of the fit itself."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ import numpy as np
 from ._readings import Array, Placement
 
 SHUFFLES = 999
-"""Of a permutation test."""
+"""Number of shuffles of a permutation test."""
 
 REPLICATES = 300
-"""Of a posterior predictive check."""
+"""Number of simulated data sets of a posterior predictive check."""
 
 CERTAIN = 0.05
 """A p value from which on readings are taken to be independent."""
@@ -24,13 +24,13 @@ class Independence:
     """The dependence of readings on each other.
 
     Attributes:
-        placements: In how many placements the robot stood.
-        correlation: Of consecutive readings, over placements.
-        correlation_p: That readings in another order have as much of it.
+        placements: Number of placements of the robot.
+        correlation: Correlation of consecutive readings, over placements.
+        correlation_p: P value: the share of shuffled readings with at least this correlation.
         between: Part of the variance at one distance that lies between placements.
-        between_p: That readings shuffled over placements have as much of it.
-        readings: How many.
-        effective: As many independent ones tell as much.
+        between_p: P value: the share of readings shuffled over placements with at least this part.
+        readings: Number of readings.
+        effective: Number of independent readings with the same information.
     """
 
     placements: int
@@ -116,10 +116,10 @@ def _intraclass(rows: list[Array]) -> float:
 
 
 def predictive_check(probabilities: Array, counts: Array, rng: np.random.Generator) -> tuple[float, float]:
-    """Whether readings drawn from the fit are as far from it as those that were read.
+    """Test whether readings drawn from the fit differ from it as much as the recorded ones.
 
     Args:
-        probabilities: (m, p, b) of each bin at each placement, for m draws from the posterior.
+        probabilities: (m, p, b) probability of each bin at each placement, for m draws from the posterior.
         counts: (p, b) readings in each bin.
         rng: Random numbers.
 

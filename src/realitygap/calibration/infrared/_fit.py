@@ -20,13 +20,13 @@ from ._readings import Array, Placement, refuse_response
 from ._scales import BATTERY, Scale
 
 LEAST_PLACEMENTS = 3
-"""Below which the correlation of readings cannot be told from their placement."""
+"""Minimum number of placements with which the correlation of readings is distinguished from their placement."""
 
 ENDS = (0.05, 0.95)
-"""Of the 90 % interval."""
+"""Ends of the 90 % interval."""
 
 IDENTIFIED = 1 / 3
-"""A parameter is identified where its interval is narrower than this part of what was thought possible."""
+"""A parameter is identified if its interval is narrower than this part of its prior."""
 
 NO_WALL = "{} never had a wall in view. Place the robot so that this sensor faces one."
 """The advice for a sensor that looked away from the wall in all placements."""
@@ -42,13 +42,13 @@ class SensorFit:
     """The fit to the readings of a sensor.
 
     Attributes:
-        name: Of the sensor, such as range.0.
-        fitted: Its parameters.
+        name: Name of the sensor, such as range.0.
+        fitted: Parameters of the sensor.
         numbers: The estimate by dotted name.
-        draws: (n,) of each, by dotted name.
-        independence: Of its readings.
-        p: Of the posterior predictive check.
-        misfit: Share of the readings that are not where the fit has them, beyond chance.
+        draws: (n,) draws of each parameter, by dotted name.
+        independence: Test of the independence of its readings.
+        p: P value of the posterior predictive check.
+        misfit: Share of the readings that differ from the fit, beyond chance.
         curve: Distances to a wall ahead [m], mean, and ends of the 90 % band of readings.
     """
 
@@ -70,14 +70,14 @@ def fit_sensor(
     *,
     n_draws: int = 500,
 ) -> SensorFit:
-    """Fit a sensor to what it read where the robot stood.
+    """Fit a sensor to its readings at placements of the robot.
 
     Args:
-        robot: On whose numbers the fit builds; its response, reach, cone and pulses stay.
-        number: Of its range sensor.
-        placements: At least one.
+        robot: Robot with the numbers that are not fitted: response, reach, cone, and pulses.
+        number: Number of its range sensor.
+        placements: Placements with readings, at least one.
         rng: Random numbers.
-        n_draws: From the posterior.
+        n_draws: Number of draws from the posterior.
 
     Raises:
         ValueError: No readings, or a sensor whose response is no infrared one.

@@ -20,11 +20,11 @@ class LorentzReadings(MixtureReadings):
     The noise of `sim` is even; here it is normal with the same standard deviation.
 
     Args:
-        placements: Where, and what was read.
-        reach: Of the sensor [m].
+        placements: Placements with their readings.
+        reach: Reach of the sensor [m].
         peak: Distance at which a reading is largest [m]; it is not fitted.
         cone: Angle from the middle ray to the outer ones [rad].
-        weight: Of a reading: below 1 where readings tell less than as many independent ones.
+        weight: Weight of a reading: below 1 if readings have less information than as many independent ones.
     """
 
     def __init__(

@@ -46,9 +46,9 @@ class MixtureReadings:
     """Infrared readings at placements.
 
     Args:
-        placements: Where, and what was read.
-        reach: Of the sensor [m].
-        weight: Of a reading: below 1 where readings tell less than as many independent ones.
+        placements: Placements with their readings.
+        reach: Reach of the sensor [m].
+        weight: Weight of a reading: below 1 if readings have less information than as many independent ones.
         sensor: The sensor whose scales and compression these are; by default one that sees `REACH` far and does not
             compress.
     """
@@ -89,19 +89,19 @@ class MixtureReadings:
 
     @property
     def bins(self) -> Array:
-        """(b,) what each bin of readings stands for: 0, parts of what is between, 1."""
+        """Value of each bin of readings, (b,): 0, parts of the range between, and 1."""
         return np.concatenate([[0.0], (self._edges[1:] + self._edges[:-1]) / 2, [1.0]])
 
     def binned(self, readings: Array) -> NDArray[np.int64]:
-        """(b,) how many readings in each bin."""
+        """Return the number of readings in each bin, (b,)."""
         place = np.searchsorted(self._edges, np.clip(readings, 0.0, 1.0))
         return np.bincount(place, minlength=len(self._edges) + 1)
 
     def probabilities(self, values: Array) -> Array:
-        """(m, p, b) of each bin at each placement.
+        """Return the probability of each bin at each placement, (m, p, b).
 
         Args:
-            values: (m, d) of the parameters, in the order of `scales`.
+            values: (m, d) values of the parameters, in the order of `scales`.
         """
         return self._at(self.places, values)
 
@@ -123,7 +123,7 @@ class MixtureReadings:
         return np.asarray((1.0 - STRAY) * mixed + STRAY / mixed.shape[2])
 
     def log_likelihood(self, values: Array, stray: float = STRAY) -> Array:
-        """(m,) of (m, d) parameters, with a probability of any reading at all."""
+        """Return the log likelihood of parameters (m, d), (m,). A reading of any value has the probability `stray`."""
         which, readings, counts = self._rows
         half = self.step / 2
         upper = np.where(readings >= 1.0, np.inf, self._light(readings + half))
@@ -154,7 +154,7 @@ class MixtureReadings:
     def quantiles(
         self, values: Array, distances: Array, cosines: Array, shares: Array
     ) -> tuple[Array, Array]:
-        """(q,) means and (s, q) quantiles of readings at (q, rays) distances [m], over (m, d) parameters."""
+        """Return means (q,) and quantiles (s, q) of readings at distances (q, rays) [m], over parameters (m, d)."""
         blank = [Placement(each, np.empty(0), cosines=c) for each, c in zip(distances, cosines, strict=True)]
         chances = self._at(Places.of(blank, self.places.reach), values).mean(axis=0)
         summed = np.cumsum(chances, axis=1)

@@ -22,10 +22,10 @@ class PulseReadings:
     """Counts of pulses at placements.
 
     Args:
-        placements: Where, and what was read.
-        reach: Of the sensor [m].
+        placements: Placements with their readings.
+        reach: Reach of the sensor [m].
         pulses: Sent for one reading.
-        weight: Of a reading: below 1 where readings tell less than as many independent ones.
+        weight: Weight of a reading: below 1 if readings have less information than as many independent ones.
         sensor: The sensor whose scales these are; by default one that sees `REACH` far.
     """
 
@@ -49,19 +49,19 @@ class PulseReadings:
 
     @property
     def bins(self) -> Array:
-        """(b,) what each bin of readings stands for."""
+        """Value of each bin of readings, (b,)."""
         return np.arange(self.pulses + 1) / self.pulses
 
     def binned(self, readings: Array) -> NDArray[np.int64]:
-        """(b,) how many readings of each count."""
+        """Return the number of readings of each count, (b,)."""
         counts = np.clip(np.rint(np.asarray(readings) * self.pulses), 0, self.pulses).astype(np.int64)
         return np.bincount(counts, minlength=self.pulses + 1)
 
     def probabilities(self, values: Array) -> Array:
-        """(m, p, b) of each count at each placement.
+        """Return the probability of each count at each placement, (m, p, b).
 
         Args:
-            values: (m, d) of the parameters, in the order of `scales`.
+            values: (m, d) values of the parameters, in the order of `scales`.
         """
         return self._at(self.places, values)
 
@@ -99,7 +99,7 @@ class PulseReadings:
         return np.asarray((1.0 - stray) * mixed + stray / (self.pulses + 1))
 
     def log_likelihood(self, values: Array, stray: float = STRAY) -> Array:
-        """(m,) of (m, d) parameters, with a probability of any reading at all."""
+        """Return the log likelihood of parameters (m, d), (m,). A reading of any value has the probability `stray`."""
         which, counts = np.nonzero(
             self.counts
         )  # most placements have one reading: few counts of all were read
@@ -115,7 +115,7 @@ class PulseReadings:
     def quantiles(
         self, values: Array, distances: Array, cosines: Array, shares: Array
     ) -> tuple[Array, Array]:
-        """(q,) means and (s, q) quantiles of readings at (q, rays) distances [m], over (m, d) parameters."""
+        """Return means (q,) and quantiles (s, q) of readings at distances (q, rays) [m], over parameters (m, d)."""
         blank = [Placement(each, np.empty(0), cosines=c) for each, c in zip(distances, cosines, strict=True)]
         chances = self._at(Places.of(blank, self.places.reach), values).mean(axis=0)
         summed = np.cumsum(chances, axis=1)

@@ -1,4 +1,4 @@
-"""Readings of one range sensor of a robot that stands before walls."""
+"""Readings of one range sensor of a robot in front of walls."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ SLANTED = 0.9
 
 
 def refuse_response(robot: RobotModel, number: int, response: str) -> None:
-    """Return where a range sensor is an infrared one.
+    """Raise an error if a range sensor is not an infrared one.
 
     Raises:
         ValueError: It is another.
@@ -42,9 +42,9 @@ class Placement:
     Attributes:
         distances: (rays,) along the sensor's rays to what is nearest [m], at most its reach.
         readings: (n,) one after the other, 0..1.
-        battery_v: [V]; nan where it is not known.
-        cosines: (rays,) between each ray and the normal of what it meets; 1 for all where it is faced.
-        place: Which one was meant, equal for placements of one; by `distances` where nothing is said.
+        battery_v: Battery voltage [V]; nan if unknown.
+        cosines: (rays,) cosine between each ray and the normal of its wall; 1 for all if the wall is faced.
+        place: Index of the place, equal for placements at the same place. Default: `distances` decide.
     """
 
     distances: Array
@@ -66,9 +66,9 @@ class Places:
     Attributes:
         distances: (p, rays) [m].
         near: (p,) the least of each [m].
-        weights: (rays,) of the lobe; they add up to 1.
-        volts: (p,) battery less its mean; 0 where it is not known.
-        reach: Of the sensor [m].
+        weights: (rays,) weights of the lobe; their sum is 1.
+        volts: (p,) battery voltage minus its mean; 0 if unknown.
+        reach: Reach of the sensor [m].
         cosines: (p, rays) between each ray and the normal of what it meets.
     """
 
@@ -81,7 +81,7 @@ class Places:
 
     @classmethod
     def of(cls, placements: list[Placement], reach: float) -> Places:
-        """Those of placements."""
+        """Return the arrays of placements."""
         distances = np.array([placement.distances for placement in placements], np.float64)
         volts = np.array([placement.battery_v for placement in placements], np.float64)
         mean = volts[np.isfinite(volts)].mean() if np.isfinite(volts).any() else 0.0
@@ -95,17 +95,17 @@ class Places:
 
     @property
     def battery_varied(self) -> bool:
-        """Whether the battery can be told from everything else."""
+        """True if the battery varied enough to identify its effect."""
         return float(np.ptp(self.volts)) > SAME_V
 
     @property
     def slanted(self) -> bool:
-        """Whether walls were met at such angles that what they send back at a slant shows."""
+        """True if walls were met at such angles that the weaker reflection at a slant is visible."""
         return float(self.cosines.min()) < SLANTED
 
     @property
     def slants_varied(self) -> bool:
-        """Whether incidence can be told from amplitude: walls were met at several angles, some of them slanted."""
+        """True if incidence can be distinguished from amplitude: walls at several angles, some of them slanted."""
         met = self.distances < self.reach
         most = np.where(met, self.cosines, 0.0).max(axis=0)
         least = np.where(met, self.cosines, 1.0).min(axis=0)
@@ -114,7 +114,7 @@ class Places:
     def response(
         self, amplitude: Array, decay: Array, per_volt: Array, incidence: Array
     ) -> tuple[Array, Array]:
-        """(m, p) what comes back, not limited, and the distance that decides what is missed, for (m,) parameters.
+        """Return the unlimited response, (m, p), and the distance that determines misses, for parameters (m,).
 
         As kernels/sim/ranges.py.
         """
@@ -131,6 +131,6 @@ class Places:
 
 
 def logistic(far: Array, most: Array, at: Array, width: Array) -> Array:
-    """(m, p) a probability that rises with distance, at (m, p) or (1, p) distances [m]."""
+    """Return a probability that rises with distance, (m, p), at distances (m, p) or (1, p) [m]."""
     past = (far - at[:, None]) / width[:, None]
     return np.asarray(most[:, None] / (1.0 + np.exp(-np.clip(past, -500.0, 500.0))))

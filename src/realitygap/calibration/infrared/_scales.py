@@ -18,11 +18,11 @@ class Scale:
     """One parameter between two limits.
 
     Attributes:
-        name: As a robot's file has it.
-        low, high: What is thought possible.
+        name: Name, the same as in a robot's file.
+        low, high: Limits of the prior.
         kind: even: each value is as likely before anything was recorded; ratio: each ratio is.
-        unit: Of its values.
-        advice: What to record where it is not identified.
+        unit: Unit of its values.
+        advice: Data to record if it is not identified.
     """
 
     name: str
@@ -111,6 +111,6 @@ def scaled(scale: Scale, sensor: RangeSensor) -> Scale:
 
 
 def column(scales: tuple[Scale, ...], values: Array, scale: Scale, own: float = 0.0) -> Array:
-    """(m,) the values of one parameter among (m, d) of all; the sensor's own number if it is none of them."""
+    """Return the values of one parameter, (m,), among those of all, (m, d), or the sensor's own number."""
     names = [each.name for each in scales]
     return values[:, names.index(scale.name)] if scale.name in names else np.full(len(values), own)

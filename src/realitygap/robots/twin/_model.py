@@ -110,7 +110,7 @@ class TwinMotors(Settings):
         1, description="Front of the robot: 1 is the end with caster and Fluke (+x), -1 the other end."
     )
     stepped: bool = Field(
-        True, description="Whether speed has the 12 steps of an S2 and rises by at most one step in 20 ms."
+        True, description="Quantize speed to the 12 steps of an S2. It rises by at most one step in 20 ms."
     )
     lag: Annotated[float, Field(ge=0, le=2)] = Field(
         0.03, description="Time constant with which a wheel approaches its commanded speed [s]."
@@ -343,8 +343,8 @@ class TwinOddities(Settings):
         le=1000,
         description="Number of commands for which a reading is kept before the sensor is read again.",
     )
-    inverted: bool = Field(False, description="Whether sensors answer 1 - reading.")
-    swapped: bool = Field(False, description="Whether the wheels' cables are swapped.")
+    inverted: bool = Field(False, description="True if sensors answer 1 - reading.")
+    swapped: bool = Field(False, description="True if the cables of the wheels are swapped.")
     patch: TwinPatch | None = Field(None, description="A sticky spot of floor. Left out if there is none.")
 
 

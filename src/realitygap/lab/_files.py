@@ -1,9 +1,11 @@
-"""No file outside the lab's folder is named by a study that is begun at a page."""
+"""Files of the lab's folder: those that pages list, and a refusal of all names that lead outside it."""
 
 from __future__ import annotations
 
+import contextlib
 import re
-from collections.abc import Iterator
+import stat
+from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import Any
 from urllib.parse import parse_qsl
@@ -24,6 +26,30 @@ _EMULATORS_FILES = ("arena", "state", "twin")
 _PYTHON = "python:"
 """A platform from a file, which is not imported here."""
 _PROSE = ("title", "note", "published_source", "change")
+
+
+def last_change(path: Path) -> float | None:
+    """Return when a plain file or a folder was changed [s]; None if it is a link or something else, or unreadable."""
+    try:
+        status = path.lstat()
+    except OSError:
+        return None
+    is_usable = stat.S_ISREG(status.st_mode) or stat.S_ISDIR(status.st_mode)
+    return status.st_mtime if is_usable else None
+
+
+def plain_files(folder: Path, endings: Collection[str]) -> list[Path]:
+    """Return the plain files of a folder with one of these endings, the last one changed first.
+
+    Links, folders, pipes, and files that cannot be read are left out: pages do not open them.
+    """
+    found = []
+    with contextlib.suppress(OSError):
+        for path in folder.iterdir():
+            changed = last_change(path) if path.suffix.lower() in endings else None
+            if changed is not None and not path.is_dir():
+                found.append((-changed, path))
+    return [path for _, path in sorted(found)]
 
 
 def refuse_files_outside(root: Path, text: str) -> None:

@@ -20,7 +20,7 @@ from ._calibration_job import CalibrationJob
 from ._checks import Checks
 from ._counts import Counts
 from ._drawer import Drawer
-from ._files import refuse_camera, refuse_outside, refuse_platform, refuse_port
+from ._files import plain_files, refuse_camera, refuse_outside, refuse_platform, refuse_port
 from ._gap_job import GapJob
 from ._hand import Hand
 from ._job import Job
@@ -314,8 +314,8 @@ class Lab:
 
     def gap_reports(self) -> list[str]:
         """Return the names of the reports of gaps, the last one first."""
-        files = sorted((self.root / "gaps").glob("*.html"), key=lambda file: -file.stat().st_mtime)
-        return [file.stem for file in files if self.gap_page(file.stem) == file][:MOST_REPORTS]
+        reports = plain_files(self.root / "gaps", (".html",))
+        return [path.stem for path in reports if self.gap_page(path.stem) == path][:MOST_REPORTS]
 
     # calibrations
 

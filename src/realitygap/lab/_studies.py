@@ -92,22 +92,23 @@ class Studies:
 
     def names(self) -> list[str]:
         """Return the names of all studies, the last one changed first."""
+        found = []
         with contextlib.suppress(OSError):
-            found = [
-                entry
-                for entry in self.root.iterdir()
-                if re.match(NAME_PATTERN, entry.name)
-                and (entry / "study.json").is_file()
-                and self._is_within(entry)
-            ]
-            return [entry.name for entry in sorted(found, key=_changed, reverse=True)]
-        return []
+            for path in self.root.iterdir():
+                changed = _changed(path) if self.has(path.name) else None
+                if changed is not None:
+                    found.append((changed, path.name))
+        return [name for _, name in sorted(found, reverse=True)]
 
     def has(self, name: str) -> bool:
         """Return whether there is a study of this name."""
         path = self.root / name
-        is_name = re.fullmatch(NAME_PATTERN, name) is not None
-        return is_name and (path / "study.json").is_file() and self._is_within(path)
+        if re.fullmatch(NAME_PATTERN, name) is None:
+            return False
+        try:
+            return (path / "study.json").is_file() and path.resolve().parent == self.root
+        except (OSError, RuntimeError):  # a folder that cannot be entered, or links in a circle
+            return False
 
     def path(self, name: str) -> Path:
         """The folder of a study.
@@ -150,7 +151,8 @@ class Studies:
         try:
             return _state(name, self.results(name))
         except (RealityGapError, OSError, KeyError, TypeError, ValueError) as error:
-            return StudyState(name, title=name, problem=str(error) or repr(error))
+            problem = (str(error) or repr(error)).replace(f"{self.root}{os.sep}", "")
+            return StudyState(name, title=name, problem=problem)
 
     def states(self) -> list[StudyState]:
         """Return the recent states of all studies."""
@@ -174,12 +176,13 @@ class Studies:
         """Return the names that are most like a name, at most three."""
         return difflib.get_close_matches(name, self.names(), n=3, cutoff=0.0)
 
-    def _is_within(self, path: Path) -> bool:
-        return path.resolve().parent == self.root
 
-
-def _changed(path: Path) -> float:
-    return max((path / "study.json").stat().st_mtime, path.stat().st_mtime)
+def _changed(path: Path) -> float | None:
+    """Return when a study was changed [s]; None if it is not there any more."""
+    try:
+        return max((path / "study.json").stat().st_mtime, path.stat().st_mtime)
+    except OSError:
+        return None
 
 
 def _state(name: str, folder: ResultsFolder) -> StudyState:

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from ._files import plain_files
 from ._job import Job
 
 ENDINGS = (".mp4", ".mov", ".avi", ".mkv", ".webm")
 
 
 def videos_in(root: Path) -> list[str]:
-    """Names of the videos that lie in the lab's folder."""
-    with contextlib.suppress(OSError):
-        return sorted(each.name for each in root.iterdir() if each.suffix.lower() in ENDINGS)
-    return []
+    """Return the names of the videos in the lab's folder."""
+    return sorted(path.name for path in plain_files(root, ENDINGS))
 
 
 class VideoJob(Job):

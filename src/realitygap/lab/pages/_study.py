@@ -16,6 +16,7 @@ from realitygap.lab._access import FOREIGN_HEADERS
 from realitygap.lab._counted import counted
 from realitygap.lab._counts import Counts
 from realitygap.lab._figure_cache import read_thumbnail
+from realitygap.lab._files import plain_files
 from realitygap.lab._lab import Lab
 from realitygap.lab._standing import Standing
 from realitygap.lab._study_job import StudyJob
@@ -142,7 +143,7 @@ def _open(lab: Lab, name: str) -> _Opened | None:
         counts = lab.counts(name) if standing.has_robot else None
     if counts is not None:
         counts.look()
-    files = sorted(path.name for path in lab.root.glob("*.toml"))[:MOST_FILES]
+    files = sorted(path.name for path in plain_files(lab.root, (".toml",)))[:MOST_FILES]
     watcher = lab.watcher(name)
     if standing.n_done or standing.n_driven_done:  # saved figures are on the page from the start
         watcher.look((standing.n_done, standing.n_driven_done), is_running=standing.word in _GROWING)

@@ -49,6 +49,19 @@ def test_gap_is_measured_with_its_progress_and_mistakes_are_shown_at_their_field
     page.get_by_text("Rank correlation", exact=True).wait_for()
     for trials in (2, 3):  # one interval for each report
         page.get_by_text(f"{trials} trials", exact=True).wait_for()
+    terms = page.locator(".lab-facts dt", has_text=re.compile("^Rank correlation$"))
+    assert re.fullmatch(r"-?\d\.\d{3} \[-?\d\.\d{3}, -?\d\.\d{3}\]", terms.locator("+ dd").inner_text())
+    scatter = page.locator(".lab-scatter svg")
+    words = page.locator(".lab-scatter .lab-curves-words")
+    assert scatter.locator("rect").count() == 10
+    scatter.locator("rect").nth(4).hover()
+    words.get_by_text(re.compile(r".+: \d\.\d{3} ± \d\.\d{3} on sim \(SIM\), .* on jyro \(SIM\)")).wait_for()
+    scatter.focus()
+    read = set()
+    for _ in range(10):
+        page.keyboard.press("ArrowRight")
+        read.add(words.inner_text().partition(":")[0])
+    assert len(read) >= 6  # from the one at which the pointer was
     page.frame_locator("iframe").get_by_text("jyro").first.wait_for()
     assert len(read_observations(lab.root / "gaps" / "first.jsonl").trials) == 30
     assert (lab.root / "gaps" / "first.html").is_file()

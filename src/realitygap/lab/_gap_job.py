@@ -25,6 +25,7 @@ class GapJob(Job):
         verdict: Verdict of the last report; empty before the first one.
         measures: Name and value of each measure of the last report.
         intervals: Trials of each controller, and the RMS gap with its interval, of each report that has one.
+        pairs: Scores of each controller on both sides, as `pairs_of` returns them; empty before the first report.
         n_reports: Number of reports so far.
     """
 
@@ -39,6 +40,7 @@ class GapJob(Job):
         self.verdict = ""
         self.measures: list[tuple[str, str]] = []
         self.intervals: list[tuple[int, float, float, float]] = []
+        self.pairs: dict[str, Any] = {}
         self.n_reports = 0
         super().__init__({"work": "gap", **order}, root, changed)
 
@@ -66,6 +68,7 @@ class GapJob(Job):
 
     def _on_measured(self, message: dict[str, Any]) -> None:
         self.verdict, self.measures = message["verdict"], message["measures"]
+        self.pairs = message["pairs"]
         if message["rms"] is not None:
             estimate, low, high = message["rms"]
             self.intervals = [*self.intervals, (message["trials"], estimate, low, high)]

@@ -6,9 +6,12 @@ import threading
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from realitygap import _special as special
 from realitygap.gap import Estimate
 from realitygap.report import write_gap_report
-from realitygap.study import gap_between
+from realitygap.study import GapStudy, gap_between
 
 from ._channel import Channel, Message
 
@@ -44,7 +47,38 @@ def _measure(channel: Channel, values: dict[str, Any], page: Path, kept: Path) -
         result = found.study.result
         measures = [(title, _words(getattr(result, name))) for name, title in MEASURES.items()]
         rms = None if result.rms.low is None else [result.rms.estimate, result.rms.low, result.rms.high]
-        channel.say("measured", trials=trials, verdict=result.verdict, measures=measures, rms=rms)
+        channel.say(
+            "measured",
+            trials=trials,
+            verdict=result.verdict,
+            measures=measures,
+            rms=rms,
+            pairs=pairs_of(found.study),
+        )
+
+
+def pairs_of(gap: GapStudy) -> dict[str, Any]:
+    """Return the mean score of each controller on both sides, with half its interval of 95 %."""
+    sides = (gap.source, gap.target)
+    reaches = [
+        float(special.stdtrit(side.trials - 1, 0.975)) * np.sqrt(side.noise)
+        if side.trials > 1
+        else np.zeros(side.n)
+        for side in sides
+    ]
+    return {
+        "sides": [f"{side.name} ({side.label})" for side in sides],
+        "score": gap.result.score,
+        "points": [
+            {
+                "name": each.name,
+                "isChampion": each.kind == "champion",
+                "means": [float(side.means[k]) for side in sides],
+                "reaches": [float(reach[k]) for reach in reaches],
+            }
+            for k, each in enumerate(gap.controllers)
+        ],
+    }
 
 
 def _words(estimate: Estimate) -> str:

@@ -22,6 +22,7 @@ from ._frame import framed, hint, section, text_of, visitor_of
 from ._new import CALIBRATED
 from ._notices import attempt
 from ._part import Part, watching
+from ._scatter import Scatter
 
 
 def add_gap(lab: Lab) -> None:
@@ -228,8 +229,17 @@ class _Page:
                     ui.label(title)
                 with ui.element("dd"):
                     ui.label(words)
-        if len(job.intervals) > 1:
-            _show_intervals(job.intervals)
+        with ui.element("div").classes("lab-panels-two"):
+            with ui.column().classes("lab-panel"):
+                section("Controllers on both platforms")
+                Scatter(**job.pairs)
+                hint(
+                    "Crosses are 95 % intervals of the means. Circles are champions, squares unrelated networks. "
+                    "On the line there is no gap."
+                )
+            if len(job.intervals) > 1:
+                with ui.column().classes("lab-panel"):
+                    _show_intervals(job.intervals)
         address = f"/gaps/{job.name}?v={n_reports}"
         ui.link("Open report", address, new_tab=True)
         ui.element("iframe").props(f'src="{address}" title="Report of the gap"').classes("lab-report")

@@ -16,7 +16,10 @@ from urllib.request import Request, urlopen
 
 import pytest
 
-from .served import FOR_CHILDREN, LOG, begin
+from realitygap.lab import _child
+
+from .forked_children import FOR_CHILDREN, Forking
+from .served import LOG, begin
 
 playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright: uv sync --extra dev")
 
@@ -54,17 +57,23 @@ if "realitygap.lab._work" in sys.orig_argv:
 
 
 class RunningLab:
-    """A lab of a folder; `address` is that of its first page, `cookie` what lets a browser in."""
+    """A lab of a folder; `address` is that of its first page, `cookie` what lets a browser in.
 
-    def __init__(self, root: Path) -> None:
+    Args:
+        root: The folder.
+        is_forking: Whether its child processes are forked instead of new Pythons.
+    """
+
+    def __init__(self, root: Path, *, is_forking: bool = True) -> None:
         self.root = root
+        self._is_forking = is_forking
         self.address = ""
         self.token = ""
         self._port = 0
         self._process: BaseProcess | None = None
 
     def start(self) -> None:
-        self._process, printed = begin(self.root, self._port)
+        self._process, printed = begin(self.root, self._port, is_forking=self._is_forking)
         self.address, _, self.token = printed.partition("?token=")
         self._port = int(self.address.rstrip("/").rpartition(":")[2])
 
@@ -122,13 +131,23 @@ class RunningLab:
         return (self.root.parent / LOG).read_text("utf-8")
 
 
+NEW_PYTHONS = pytest.mark.parametrize("lab", ["new Pythons"], indirect=True)
+"""Marks a test whose lab starts its child processes as it does for a user."""
+
+
 @pytest.fixture
-def lab(tmp_path: Path) -> Iterator[RunningLab]:
-    running = RunningLab(tmp_path / "studies")
+def lab(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[RunningLab]:
+    running = RunningLab(tmp_path / "studies", is_forking=not hasattr(request, "param"))
     running.start()
     yield running
     running.stop()
     assert "Traceback" not in running.said
+
+
+@pytest.fixture
+def forked_children(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have child processes of the lab's parts in this process be forked."""
+    monkeypatch.setattr(_child, "subprocess", Forking())
 
 
 @pytest.fixture(scope="package")

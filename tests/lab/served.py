@@ -18,15 +18,14 @@ from fastapi import FastAPI  # noqa: F401
 from nicegui import app, ui
 
 import realitygap.lab.pages  # noqa: F401
-from realitygap.lab import open_lab
+from realitygap.lab import _child, open_lab
 from realitygap.lab._counts import Counts
 from tests.forks import fork_context
 
+from .forked_children import FOR_CHILDREN, Forking
+
 LOG = "lab.log"
 """What a lab says to its terminal, beside its folder."""
-
-FOR_CHILDREN = "modules"
-"""Folder beside the lab's: a `sitecustomize.py` in it changes the lab's child processes."""
 
 BEAT_S = 0.01
 _lags = [0.0]
@@ -67,13 +66,15 @@ async def slow_counts() -> None:
     Counts.score = score_slowly  # type: ignore[method-assign]
 
 
-def serve(root: Path, port: int, told: Connection) -> None:
+def serve(root: Path, port: int, told: Connection, is_forking: bool) -> None:
     """Serve the lab of a folder; say its address."""
     os.environ.pop("PYTEST_CURRENT_TEST", None)  # of which NiceGUI thinks that it is under test itself
     sys.stdout = sys.stderr = (root.parent / LOG).open("a", buffering=1, encoding="utf-8")
     os.dup2(sys.stderr.fileno(), 2)
     os.environ["PYTHONPATH"] = str(root.parent / FOR_CHILDREN)
     faulthandler.enable(sys.stderr)
+    if is_forking:
+        _child.subprocess = Forking(root.parent / LOG)  # type: ignore[attr-defined]
 
     def tell(line: str) -> None:
         if line.startswith("Open "):
@@ -83,11 +84,17 @@ def serve(root: Path, port: int, told: Connection) -> None:
         open_lab(root, port=port, show=False, tell=tell)
 
 
-def begin(root: Path, port: int) -> tuple[BaseProcess, str]:
-    """Begin to serve; the process, and its address."""
+def begin(root: Path, port: int, *, is_forking: bool = True) -> tuple[BaseProcess, str]:
+    """Begin to serve; the process, and its address.
+
+    Args:
+        root: The lab's folder.
+        port: Of the lab.
+        is_forking: Whether the lab's child processes are forked; a new Python takes seconds of a processor.
+    """
     context = fork_context()
     here, there = context.Pipe(duplex=False)
-    process = context.Process(target=serve, args=(root, port, there))
+    process = context.Process(target=serve, args=(root, port, there, is_forking))
     process.start()
     there.close()
     try:

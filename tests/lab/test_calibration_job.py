@@ -27,7 +27,7 @@ def answer(job: CalibrationJob, **values: Any) -> None:
     assert job.answer(job.ask["number"], **values)
 
 
-def test_somebody_is_led_through_measures_and_stops_for_now(tmp_path: Path):
+def test_somebody_is_led_through_measures_and_stops_for_now(tmp_path: Path, forked_children: None):
     with serve_tcp(Emulator("s2"), speed=20) as server:
         order = {
             "kind": "path",

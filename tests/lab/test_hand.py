@@ -24,7 +24,16 @@ def wait_for(is_so: Callable[[], bool], seconds: float = 60.0) -> None:
 
 
 @pytest.fixture
-def hand(tmp_path: Path) -> Iterator[Hand]:
+def hand(tmp_path: Path, forked_children: None) -> Iterator[Hand]:
+    yield from connected(tmp_path)
+
+
+@pytest.fixture
+def hand_in_new_python(tmp_path: Path) -> Iterator[Hand]:
+    yield from connected(tmp_path)
+
+
+def connected(tmp_path: Path) -> Iterator[Hand]:
     hand = Hand({"port": PORT}, tmp_path, lambda: None)
     wait_for(lambda: hand.senses is not None or hand.is_over)
     assert hand.outcome is None
@@ -100,7 +109,8 @@ def test_a_robot_that_is_not_there_is_told_in_words(tmp_path):
     assert "/dev/no-such-port" in str(hand.outcome)
 
 
-def test_its_process_ends_with_the_lab(hand):
+def test_its_process_ends_with_the_lab(hand_in_new_python):
+    hand = hand_in_new_python
     hand._child._process.stdin.close()  # as when the lab is killed
     wait_for(lambda: hand.is_over)
     assert hand._child._process.wait() in INTERRUPTED

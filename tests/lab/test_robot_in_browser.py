@@ -8,7 +8,7 @@ import pytest
 
 from realitygap.emulator import Emulator, serve_tcp, why_not
 
-from .conftest import PHONE
+from .conftest import NEW_PYTHONS, PHONE
 
 pytestmark = pytest.mark.slow
 
@@ -56,6 +56,7 @@ def test_it_drives_while_the_handle_is_held_and_stands_when_it_is_let_go(visit):
     page.get_by_text("Standing", exact=True).wait_for()
 
 
+@NEW_PYTHONS
 def test_it_stands_when_the_page_goes_away(visit):
     page = visit("robot")
     connect(page)

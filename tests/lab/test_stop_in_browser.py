@@ -114,7 +114,7 @@ class Motors:
         return self.moved_s - pressed
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def emulated() -> Iterator[tuple[str, str]]:
     """The port and the witness of an emulated robot in a process of its own."""
     command = ["-m", "realitygap", "emulate", "scribbler", "--tcp", "0", "--witness", "0", "--quiet"]

@@ -7,7 +7,7 @@ import pytest
 from realitygap.records import ResultsFolder
 from realitygap.study import parse_study, run_study
 
-from .conftest import DESKTOP, OUTAGE, PHONE, open_advanced
+from .conftest import DESKTOP, NEW_PYTHONS, OUTAGE, PHONE, open_advanced
 from .robot_study import make_study
 
 TINY = """
@@ -31,6 +31,7 @@ def start(page, text: str) -> None:
 
 
 @pytest.mark.slow
+@NEW_PYTHONS
 def test_a_study_made_with_the_form_is_carried_out_on_a_phone(lab, visit):
     page = visit("", size=PHONE)
     page.get_by_text("No studies yet.").wait_for()

@@ -38,7 +38,7 @@ def measure_speed(seconds: float = 2.0) -> dict[str, Any]:
     """Robot-steps and paper runs a second on this machine.
 
     Args:
-        seconds: How long each figure is measured, after everything is compiled.
+        seconds: Measuring time of each figure [s], after everything is compiled.
 
     Returns:
         Rates, each `per_core` and on `all_cores`: `robot_steps_per_second` of networks without hidden nodes and

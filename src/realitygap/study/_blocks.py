@@ -1,4 +1,4 @@
-"""In which order physical trials are driven, on which sheet, with which pen, and under which code."""
+"""The order, the sheets, the pens, and the codes of physical trials."""
 
 from __future__ import annotations
 

@@ -19,7 +19,7 @@ from realitygap.world import Arena
 from ._tracked import score_along
 
 AT_REST_S = 0.4
-"""By so much the robot may be seen later than it began, or less long than it drove: it stands at both ends."""
+"""Largest time by which the poses may begin after or end before a trial, because the robot is at rest at both ends."""
 
 
 class Looking(Protocol):
@@ -39,12 +39,12 @@ class Looking(Protocol):
 
 
 class CameraObserver:
-    """A camera above a robot: sees where it was at each look, and the cells that it crossed.
+    """A camera above a robot, which observes its poses and the cells that it crosses.
 
     Args:
         camera: Follows the robot.
-        arena: In which the camera finds its way.
-        beside: Another observer, which puts the robot at its start and reads its encoders; None if nobody has to.
+        arena: Arena in the camera's view.
+        beside: Another observer, which puts the robot at its start and reads its encoders; None if that is not needed.
         say: Told why a trial has to be counted by hand.
     """
 
@@ -83,7 +83,7 @@ class CameraObserver:
         self.beside.meet(robot, arena)
 
     def ready(self) -> None:
-        """Have it stand where it can turn on the spot."""
+        """Wait until the robot is at a place where it can turn on the spot."""
         self.beside.ready()
 
     def clock(self, robot: Robot) -> Clock:
@@ -105,12 +105,12 @@ class CameraObserver:
         return self.beside.wheels()
 
     def look(self) -> None:
-        """Note the time: where it was then is in the pictures."""
+        """Record the time. The robot's pose at this time is in the pictures."""
         self._times.append(self._camera.now())
         self.beside.look()
 
     def poses(self) -> NDArray[np.float64]:
-        """(n, 3) at each look.
+        """Return the pose at each look, (n, 3).
 
         Raises:
             RobotError: The camera did not see it.
@@ -118,7 +118,7 @@ class CameraObserver:
         return self._seen().at(np.array(self._times)) if self._times else np.empty((0, 3))
 
     def cells(self) -> tuple[int, ...]:
-        """Those along its line.
+        """Return the cells along its line.
 
         Raises:
             RobotError: The camera did not see it.

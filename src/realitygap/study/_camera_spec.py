@@ -17,8 +17,9 @@ def read_camera(spec: str, arena: Arena) -> tuple[str, Marks]:
     """A camera's number or a video's file, and what to look for in its pictures.
 
     Args:
-        spec: Such as 0, or film.mp4?tag=10&tag-height=0.1: after the question mark options of `realitygap track`.
-        arena: Where the robot drives.
+        spec: Camera, such as 0, or film.mp4?tag=10&tag-height=0.1. The options of `realitygap track` follow the
+            question mark.
+        arena: Arena of the robot.
 
     Raises:
         StudyError: Something in it cannot be.

@@ -94,7 +94,7 @@ class Cluster:
         self._open.close()
 
     def facts(self) -> dict[str, Any]:
-        """Its name, and the threads of each worker that was seen in this sitting, by its address."""
+        """Return its name, and the threads of each worker since the start, by address."""
         return {"cluster": self.name, "workers": dict(self.workers)}
 
     def prepare(self, conditions: Sequence[Condition]) -> None:

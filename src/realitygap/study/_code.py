@@ -21,7 +21,7 @@ from realitygap.tasks import (
 from ._study import Study
 
 AllowCode = bool | Callable[[PythonTask], bool]
-"""Whether Python files may run that the user has not allowed before; or who is asked, once for each file."""
+"""Permission to run Python files that the user has not allowed before, or a function that asks once for each file."""
 
 
 def python_tasks(study: Study) -> list[PythonTask]:
@@ -34,8 +34,8 @@ def with_code_allowed(study: Study, allow_code: AllowCode) -> Study:
     """Return the study with the permission to run its Python files, after running each once.
 
     Args:
-        study: As resolved from its file.
-        allow_code: Whether files may run that the user has not allowed before, or who is asked.
+        study: Study as resolved from its file.
+        allow_code: True to run Python files that the user has not allowed before, or a function that asks.
 
     Raises:
         TaskError: A file is not allowed, cannot be run, or lacks its function.

@@ -22,24 +22,24 @@ from ._code import allowed_task
 from ._file import DEFAULT_NEAT, load_study
 
 FRESH_TRIALS = 20
-"""How often a champion is tried again where it was selected, each time on noise of its own."""
+"""Number of trials that test a champion again on the platform that selected it, each with new noise."""
 
 _COLUMNS = ["replicate", "generation", "individual", "key"]
 
 
 @dataclass(frozen=True)
 class Controller:
-    """A controller and where it comes from.
+    """A controller and its origin.
 
     Attributes:
-        genome: Its network.
-        name: Such as random-3, or coverage-10/7 for the champion of run 7.
+        genome: Genome of its network.
+        name: Name, such as random-3, or coverage-10/7 for the champion of run 7.
         kind: random, or champion.
-        selected_score: Score for which it was selected, such as coverage [0..1]; None where it was not.
-        fresh_score: Its mean score on fresh noise where it was selected; None where it was not, or where that
-            cannot be computed.
-        selected_on: The platform where it was selected; empty where it was not.
-        condition: In which it was selected; None where it was not.
+        selected_score: Score for which it was selected, such as coverage [0..1]; None if it was not selected.
+        fresh_score: Mean score on fresh noise on the platform that selected it; None if it was not selected or the
+            score cannot be computed.
+        selected_on: Platform that selected it; empty if it was not selected.
+        condition: Condition that selected it; None if it was not selected.
     """
 
     genome: Genome
@@ -57,12 +57,12 @@ def sample_controllers(
     """Draw n controllers.
 
     Args:
-        kind: `random` (unrelated networks of the paper's NEAT, with the paper's inputs), a folder of results, of whose
-            champions n are drawn, or the name or file of a study, of whose first condition that can be computed n runs
-            are made. With several tasks, that is coverage, or else the first task.
-        n: How many, at least 1.
-        seed: Of the draw, and of the runs of a study.
-        allow_code: Whether the Python file of a task may run that the user has not allowed before.
+        kind: `random` for unrelated networks of the paper's NEAT with the paper's inputs. A folder of results, from
+            whose champions n are drawn. Or the name or file of a study: its first condition that can be computed gets
+            n runs. If there are several tasks, coverage is used, or otherwise the first task.
+        n: Number of controllers, at least 1.
+        seed: Seed of the draw, and of the runs of a study.
+        allow_code: True to run the Python file of a task that the user has not allowed before.
 
     Raises:
         ValueError: n is out of range.
@@ -107,7 +107,7 @@ def recorded_controllers(target: str) -> list[tuple[Controller, int]]:
     """The controllers of a target of recorded trials, and of how many trials of each there are at least.
 
     Args:
-        target: By name; of any other there are none.
+        target: Name of the target. Only recorded targets have controllers.
 
     Raises:
         RecordError: The file cannot be read.

@@ -53,7 +53,7 @@ class Executor(Protocol):
 
 
 class Threads:
-    """Kernels on threads of this process, with few chunks under way, so that memory use stays constant."""
+    """An executor that runs kernels on threads of this process, with few chunks at a time to limit memory."""
 
     def __init__(self, n: int) -> None:
         self._n = n

@@ -52,7 +52,7 @@ _OWN_KEYS = ("name", "selection", "platform", "noise")
 
 
 def named_studies() -> list[str]:
-    """Names of the studies that come with realitygap."""
+    """Return the names of the studies that come with realitygap."""
     folder = resources.files(__package__) / "studies"
     return sorted(
         entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml")
@@ -81,8 +81,8 @@ def load_study(
 
     Args:
         study: A name of `named_studies`, or a path of a TOML file.
-        seed: In place of the file's.
-        replicates: In place of the file's.
+        seed: Seed that replaces the file's.
+        replicates: Number of replicates that replaces the file's.
         randomize: posterior, or no: whether the robots of calibrations are drawn; as the file says when None.
 
     Raises:
@@ -136,8 +136,8 @@ def parse_study(text: str, origin: str, *, seed: int | None = None, replicates: 
 
     Args:
         text: TOML.
-        origin: What to call the file in messages.
-        seed, replicates: In place of the file's.
+        origin: Name of the file in messages.
+        seed, replicates: Values that replace the file's.
     """
     try:
         data = parse_toml(text)

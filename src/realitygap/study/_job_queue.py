@@ -33,7 +33,7 @@ class JobQueue:
     """A Dask scheduler in this process, and workers in jobs.
 
     Args:
-        name: of the batch system, with `:JOBS` to say how many jobs are wanted.
+        name: Name of the batch system, with an optional number of jobs as `:JOBS`.
 
     Raises:
         StudyError: there is no such batch system here, or its settings are not complete.
@@ -63,7 +63,7 @@ class JobQueue:
 
     @staticmethod
     def check_name(name: str) -> tuple[str, int | None]:
-        """The parts of a name: batch system, and number of jobs where it says one.
+        """Return the parts of a name: the batch system, and the number of jobs if given.
 
         Raises:
             StudyError: it is neither an address nor a batch system.
@@ -85,7 +85,7 @@ class JobQueue:
         return Client(self._cluster, set_as_default=False)
 
     def submit(self) -> None:
-        """Submit jobs until as many as wanted are queued or running, also in place of those that were lost.
+        """Submit jobs until the wanted number is queued or running. Lost jobs are replaced.
 
         Raises:
             StudyError: the batch system refused one.

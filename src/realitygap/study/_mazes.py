@@ -40,17 +40,17 @@ def measure_maze(
     Args:
         task: 'maze-medium' or 'maze-hard'.
         settings: A named set of NEAT's settings; population and generations are the task's.
-        seeds: How many runs of each reward, 1 to 2**32.
-        seed: Of the random numbers from which all runs draw, 0 to 2**63 - 1.
-        changes: Settings by name, in place of the set's and the task's.
+        seeds: Number of runs of each reward, 1 to 2**32.
+        seed: Seed of the random numbers of all runs, 0 to 2**63 - 1.
+        changes: Settings by name that replace those of the set and the task.
         threads: Runs at once; as many as there are processors when not given.
         tell: Called with the progress after each run.
 
     Returns:
-        `task`, `settings`, `limit` (evaluations), `source` and, by reward, `novelty` and `objective`: `seeds`,
-        `solved` (runs), `mean_evaluations`, `median_evaluations`, `sd_evaluations` (None of a single run),
-        `evaluations` (of each run, None where it is unsolved) and `published`, the same of the source as far as it is
-        given.
+        `task`, `settings`, `limit` (evaluations), `source` and, by reward, `novelty` and `objective`. These have
+        `seeds`, `solved` (runs), `mean_evaluations`, `median_evaluations`, `sd_evaluations` (None for a single run),
+        `evaluations` (one of each run, None if it is unsolved) and `published`, the same values from the source, as
+        far as they are given.
 
     Raises:
         StudyError: No such task or set, or a setting that cannot be.

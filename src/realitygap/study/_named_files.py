@@ -19,7 +19,7 @@ def find_files(data: dict[str, Any], folder: Path, problems: Problems) -> None:
 
     Args:
         data: The study as its file has it; changed. What is no table there is left alone.
-        folder: Of the study's file.
+        folder: Folder of the study's file.
         problems: Takes what is wrong with Python files.
     """
     platforms = data.get("platform")

@@ -36,9 +36,9 @@ class PhysicalResult:
 
     Attributes:
         n_runs: Runs of physical conditions in the study.
-        n_complete: Of them complete.
+        n_complete: Number of complete runs.
         n_driven: Trials driven in this sitting.
-        waiting: What has to be done before it can go on; empty when nothing has.
+        waiting: Action that is required before the study can continue; empty if there is none.
     """
 
     n_runs: int
@@ -48,12 +48,12 @@ class PhysicalResult:
 
 
 def physical_conditions(study: Study) -> list[Condition]:
-    """Those that a robot drives."""
+    """Return the conditions that a robot drives."""
     return [condition for condition in study.conditions if condition.is_physical]
 
 
 class PhysicalStudy:
-    """The physical conditions of a study, taken up where their ledger stands."""
+    """The physical conditions of a study, which resume from their ledger."""
 
     def __init__(
         self, study: Study, ledger: Ledger, operator: Operator, open_robot: OpenRobot, port: str
@@ -61,11 +61,11 @@ class PhysicalStudy:
         """Take up a study.
 
         Args:
-            study: As resolved.
+            study: Study as resolved.
             ledger: Open for writing.
-            operator: Who places the robot and says what was drawn.
+            operator: Operator, who places the robot and reports what was drawn.
             open_robot: Called when the first trial is to be driven.
-            port: What to call the robot's port in the ledger.
+            port: Name of the robot's port in the ledger.
         """
         self._study = study
         self._conditions = physical_conditions(study)
@@ -84,7 +84,7 @@ class PhysicalStudy:
         """Drive and score what is missing.
 
         Returns:
-            What has to be done before it can go on; empty when the study is complete.
+            The action that is required before the study can continue; empty if the study is complete.
 
         Raises:
             RobotError: The robot failed; what became of the trial in flight is asked when the study goes on.

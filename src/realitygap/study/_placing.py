@@ -42,7 +42,7 @@ def placing_words(plan: TrialPlan, arena: Arena, robot: RobotModel) -> str:
 
 
 def parse_length(text: str) -> float | None:
-    """A number as it is read off a ruler, such as 13 3/4 or -.5; None where it is none."""
+    """Return a number as read from a ruler, such as 13 3/4 or -.5; None if the text is no number."""
     found = _NUMBER.match(text.strip())
     if found is None:
         return None

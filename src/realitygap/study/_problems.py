@@ -18,10 +18,10 @@ class StudyFileError(StudyError):
 
     Args:
         head: Sentence that names the file.
-        mistakes: Each mistake, as PLACE: MESSAGE.
+        mistakes: Mistakes, each as PLACE: MESSAGE.
 
     Attributes:
-        mistakes: Each mistake, as PLACE: MESSAGE.
+        mistakes: Mistakes, each as PLACE: MESSAGE.
     """
 
     def __init__(self, head: str, mistakes: Sequence[str]) -> None:

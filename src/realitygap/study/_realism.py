@@ -67,7 +67,7 @@ def measure_realism(seconds: float = 2.0) -> dict[str, Any]:
     little.
 
     Args:
-        seconds: How long each figure is measured, after everything is compiled.
+        seconds: Measuring time of each figure [s], after everything is compiled.
 
     Returns:
         `avoiding`: of networks that turn away from walls; `pressed`: of such as push into them; `boxes`: that
@@ -109,8 +109,8 @@ class RealisticTrials:
     """Trials of one network with all the realism there is, ready to be run again and again.
 
     Args:
-        weights: Of the network, for move and turn.
-        boxes: Whether the two boxes of `paper-boxes` stand in the arena.
+        weights: Weights of the network, for move and turn.
+        boxes: True if the arena has the two boxes of `paper-boxes`.
     """
 
     def __init__(self, weights: tuple[tuple[float, ...], ...], *, boxes: bool) -> None:

@@ -16,7 +16,7 @@ def connect_robot(port: str, arena: Arena | None = None) -> OpenRobot:
 
     Args:
         port: Name of the port, with or without the platform's name before it.
-        arena: Where a robot begins that is emulated in this program, unless its port says where.
+        arena: Start of a robot that is emulated in this program, unless its port gives the start.
     """
 
     def open_robot(platform: Platform) -> Robot:

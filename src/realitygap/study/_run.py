@@ -39,8 +39,8 @@ class Progress:
         n_done: Runs published, those of earlier sittings counted.
         n_runs: Runs in all.
         n_computed: Runs computed in this sitting.
-        seconds: Since this sitting began to compute.
-        waiting_for: What a cluster lacks before anything goes on, such as a worker; empty otherwise.
+        seconds: Computing time since the start [s].
+        waiting_for: Missing part of a cluster, such as a worker; empty if computing continues.
     """
 
     n_done: int
@@ -55,11 +55,11 @@ class StudyResult:
     """The result of a study.
 
     Attributes:
-        folder: Its results.
+        folder: Folder of its results.
         n_runs: Simulated runs of the study; 0 if a robot was driven.
         n_computed: Runs computed in this sitting; the others were there.
         seconds: Computing took [s].
-        physical: How far the conditions are that a robot drives; None where the study has none.
+        physical: Progress of the conditions that a robot drives; None if the study has none.
     """
 
     folder: ResultsFolder
@@ -89,20 +89,19 @@ def run_study(
     depend on threads, chunks or interruptions.
 
     Args:
-        study: A study, the name of one that comes with realitygap, or the path of a study file.
+        study: Study, name of one that comes with realitygap, or path of a study file.
         out: Folder for the results; `results/NAME` when not given.
-        seed: In place of the study's, when it is given by name or path.
-        replicates: In place of the study's, likewise.
+        seed: Seed that replaces the study's, if the study is given by name or path.
+        replicates: Number of replicates that replaces the study's, if the study is given by name or path.
         threads: Kernels at once; as many as there are processors when not given.
         chunk: Runs computed and written together; chosen by their length when not given.
-        fresh: Delete the study that is in the folder first; never where a ledger of physical trials is.
-        cluster: Where to compute, in place of this machine's threads: `tcp://HOST:PORT` of a running Dask
-            scheduler, or `slurm`, `pbs`, `sge`, `lsf`, `oar`, `htcondor` or `moab` for jobs of that batch
-            system, set up in the user's Dask configuration; `slurm:20` asks for 20 jobs. All workers must
-            see `out` under the same path.
+        fresh: True to delete a study in the folder first. A folder with a ledger of physical trials is never deleted.
+        cluster: Cluster that replaces this machine's threads: `tcp://HOST:PORT` of a running Dask scheduler, or
+            `slurm`, `pbs`, `sge`, `lsf`, `oar`, `htcondor` or `moab` for jobs of that batch system, with the user's
+            Dask configuration. `slurm:20` asks for 20 jobs. All workers must see `out` under the same path.
         tell: Called with the progress after each chunk.
-        allow_code: Whether Python files of tasks (`kind = "python:FILE.py:FUNCTION"`) may run that the user has not
-            allowed before; or a function that gets the `PythonTask` and returns whether its file may run.
+        allow_code: True to run Python files of tasks (`kind = "python:FILE.py:FUNCTION"`) that the user has not
+            allowed before. Or a function that gets the `PythonTask` and returns whether its file may run.
 
     Raises:
         TaskError: A Python file is not allowed, cannot be run, or lacks its function; nothing was written.
@@ -142,7 +141,7 @@ def drive_study(
     resumes.
 
     Args:
-        study: A study, the name of one that comes with realitygap, or the path of a study file.
+        study: Study, name of one that comes with realitygap, or path of a study file.
         port: The robot's, such as `/dev/rfcomm0`, `COM3`, `socket://HOST:PORT`, or `emulator://s2?speed=off`, an
             emulated robot in this program.
         out: Folder for the results; `results/NAME` when not given.
@@ -151,7 +150,7 @@ def drive_study(
         operator: Places the robot and reports what it drew; the emulator's witness when not given, which only an
             emulated robot in this program has.
         open_robot: Called with the settings of a condition when a trial is to be driven; opens `port` when not given.
-        allow_code: As in `run_study`.
+        allow_code: Permission to run Python files, as in `run_study`.
 
     Raises:
         StudyError: No condition of the study is on a robot, nobody places the robot, or the folder holds another

@@ -100,7 +100,7 @@ class ConditionNotes(Settings):
 
 
 def same_file(name: str, others: Iterable[str]) -> str | None:
-    """Which of the other names stands for the same file on a disk that does not tell capitals; None where none does."""
+    """Return the other name that is the same file on a disk that ignores case; None if there is none."""
     return next((other for other in others if other.casefold() == name.casefold()), None)
 
 

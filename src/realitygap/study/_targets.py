@@ -25,7 +25,7 @@ def observations_head(target: Target, observe: Observe, robot: str | None = None
 
 
 def refuse_more_than_is_seen(target: Target, observe: Observe) -> None:
-    """Return where so much can be seen of a target.
+    """Raise an error if a target does not support an observation level.
 
     Raises:
         StudyError: It cannot.
@@ -53,9 +53,9 @@ def refuse_too_little(task: Task, target: Target, observe: Observe | None = None
 
     Args:
         task: The task.
-        target: Where trials are observed.
-        observe: What the user asked for. If None, as much as the task needs, and the crossed cells, too, if nobody has
-            to count them.
+        target: Target of the trials.
+        observe: Level that the user asked for. If None, the level that the task needs, and the crossed cells if no
+            person has to count them.
 
     Raises:
         StudyError: So much cannot be seen of the target, or the task needs more than was asked for.
@@ -92,7 +92,7 @@ WOULD_SEE: dict[Observe, str] = {
 
 
 def refuse_lost(n: int, name: str, kept: str = "") -> None:
-    """Return where no trial was lost for good, as where lost ones are skipped.
+    """Raise an error if a trial was lost for good, unless lost trials are skipped.
 
     Raises:
         RobotError: So many were.
@@ -112,15 +112,16 @@ def carry_out_missing(
     file: ObservationsFile | None = None,
     tell: TellTrial | None = None,
 ) -> list[TrialRecord]:
-    """Return the trials in the order of their plans: those that are kept, and the others, which are run now.
+    """Return the trials in the order of their plans: stored trials, and the others, which are driven now.
 
     Args:
         target: Runs the trials that are missing.
         plans: All trials.
-        observe: How much is seen of them.
+        observe: Observation level of the trials.
         kept: Whole trials by key; those that are run are added.
-        keys: Of the trial of each plan.
-        file: Gets each trial as it comes, also one that was cut off. The target settles those in it that never ended.
+        keys: Key of each plan's trial.
+        file: File that gets each trial as it ends, also an interrupted one. The target settles the trials in it that
+            never ended.
         tell: Called with the place and the trial, for each whole one that is run.
 
     Raises:

@@ -39,18 +39,18 @@ def measure_task(
         task: 'xor', 'double-pole' or 'double-pole-no-velocity'.
         settings: A named set of NEAT's settings; population, generations, recurrence and the constant input's
             value are the task's.
-        seeds: How many runs, 1 to 2**32.
-        seed: Of the random numbers from which all runs draw, 0 to 2**63 - 1.
-        changes: Settings by name, in place of the set's and the task's.
+        seeds: Number of runs, 1 to 2**32.
+        seed: Seed of the random numbers of all runs, 0 to 2**63 - 1.
+        changes: Settings by name that replace those of the set and the task.
         threads: Runs at once; as many as there are processors when not given.
         tell: Called with the progress after each run.
 
     Returns:
-        `task`, `settings`, `seeds`, `solved` (runs); over the runs that solved it, `mean_evaluations`,
-        `median_evaluations`, `sd_evaluations`, `worst_evaluations`, and of the networks that did `mean_hidden`,
+        `task`, `settings`, `seeds`, `solved` (runs). Over the runs that solved the task: `mean_evaluations`,
+        `median_evaluations`, `sd_evaluations`, `worst_evaluations`. Over the networks that solved it: `mean_hidden`,
         `mean_connections` (enabled) and, without velocities, `mean_generalization` (of 625 starts) and
-        `sd_generalization`; None where too few solved it. `published` holds the same of the source, as far as it
-        is given.
+        `sd_generalization`. Values are None if too few runs solved it. `published` has the same values from the
+        source, as far as they are given.
 
     Raises:
         StudyError: No such task or set, or a setting that cannot be.
@@ -163,7 +163,7 @@ def run_in_threads(
 
     Args:
         run: Computes the run of a number.
-        n_runs: How many.
+        n_runs: Number of runs.
         threads: Runs at once.
         tell: Called with the progress.
         begin: Called before the time is taken, such as to compile the kernels.

@@ -31,8 +31,8 @@ def study_template(name: str, source: str | None = None) -> str:
     """Return a study file to change: two conditions with every setting, its meaning, and its default, or a copy.
 
     Args:
-        name: Of the study: letters, digits, dot, dash and underscore.
-        source: Study that comes with realitygap; its file is copied, with the new name as name and title.
+        name: Name of the study: letters, digits, dot, dash, and underscore.
+        source: Study that comes with realitygap. Its file is copied, with the new name as name and title.
 
     Raises:
         ValueError: It cannot be the name of a study.

@@ -34,10 +34,10 @@ class TrialToTrack:
     """A trial that was driven, and is to be found in a video.
 
     Attributes:
-        head: What a file of its observation begins with.
-        trial: As it was observed; without poses.
+        head: First line of a file of its observation.
+        trial: Trial as observed, without poses.
         times: (t + 1,) when each command began, and when the last ended, since the trial's beginning [s].
-        arena: Where.
+        arena: Arena of the trial.
     """
 
     head: ObservationsHead
@@ -51,9 +51,9 @@ class TrackedTrial:
     """A trial with what a camera saw of it.
 
     Attributes:
-        trial: With poses and cells.
-        score: For a ledger.
-        beginning: When it begins in the video.
+        trial: Trial with poses and cells.
+        score: Score for a ledger.
+        beginning: Time of its start in the video [s].
         seen: Share of the pictures in it in which the robot was found.
     """
 
@@ -137,8 +137,8 @@ def place_trial(
 
     Args:
         wanted: The trial.
-        track: Of a video with all of it.
-        begins_s: When it begins in the video [s]; found by its commands where that is not said.
+        track: Track in a video that shows the whole trial.
+        begins_s: Time of its start in the video [s]. Default: the time that fits its commands.
         who: Enters it.
 
     Raises:
@@ -166,9 +166,9 @@ def score_along(track: Track, times: Floats, grid: Grid, who: str) -> Score:
     """Return the score of a trial along its track.
 
     Args:
-        track: With all of the trial in it.
+        track: Track that includes the whole trial.
         times: (t + 1,) when each command began, and when the last ended [s].
-        grid: Whose cells are counted.
+        grid: Grid of the counted cells.
         who: Enters it.
     """
     rows = np.arange(len(times), dtype=np.float64)
@@ -184,11 +184,11 @@ def score_tracked(
     """Enter what a camera saw of a trial into the ledger: cells, path, and a note that says of what video.
 
     Args:
-        folder: Of the study.
-        number: Of the trial.
-        tracked: What was seen.
+        folder: Folder of the study.
+        number: Number of the trial.
+        tracked: Tracked trial.
         told: The note.
-        role: As in `Ledger.score`.
+        role: Role of the score, as in `Ledger.score`.
 
     Raises:
         LedgerError: The ledger does not take it.
@@ -202,8 +202,8 @@ def note_of_track(camera: str, found: Tracked, placed: TrackedTrial) -> str:
     """The note that goes into a ledger with what a camera saw of a trial.
 
     Args:
-        camera: Its number, or the video's file.
-        found: In its pictures.
+        camera: Number of the camera, or file of the video.
+        found: Result of the tracking.
         placed: The trial in them.
     """
     begun = placed.beginning

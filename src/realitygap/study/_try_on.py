@@ -1,4 +1,4 @@
-"""One controller on a target, again and again; its trials can be kept as they come."""
+"""Repeated trials of one controller on a target, which can be stored as they end."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ def try_on(
     """Drive a controller on a target.
 
     Args:
-        target: Where.
+        target: Target of the trials.
         genome: The controller.
-        trials: How many; trial k has the number k.
+        trials: Number of trials. Trial k has the number k.
         steps: Commands in each.
-        observe: How much is seen of them.
-        out: A file for the trials, as they come; those that are in it are not driven again.
+        observe: Observation level of the trials.
+        out: File for the trials, as they end. Trials in it are not driven again.
 
     Raises:
         StudyError: So much cannot be seen of it.

@@ -1,4 +1,4 @@
-"""Targets around targets: whose trials are kept, led through by hand, or measured with a ruler."""
+"""Targets that wrap targets: they store trials, guide an operator, or measure with a ruler."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from ._targets import carry_out_missing
 Tell = Callable[[int, TrialRecord], None]
 
 PATH = "path"
-"""Purpose of trials whose end is measured with a ruler where no camera looks."""
+"""Purpose of trials whose end is measured with a ruler if there is no camera."""
 
 
 class StoppedByPerson(Exception):  # noqa: N818 - nothing is wrong
@@ -39,11 +39,11 @@ class WrappedTarget(ClosedOnExit):
     def carry_out(
         self, plans: Sequence[TrialPlan], observe: Observe, tell: Tell | None = None
     ) -> list[TrialRecord]:
-        """As `Target.carry_out`."""
+        """Run trials like `Target.carry_out`."""
         return self.target.carry_out(plans, observe, tell)
 
     def settle(self, plan: TrialPlan, trial: TrialRecord) -> TrialRecord | None:
-        """As `Target.settle`."""
+        """Settle a trial like `Target.settle`."""
         return self.target.settle(plan, trial)
 
     def close(self) -> None:
@@ -55,8 +55,8 @@ class CountingTarget(WrappedTarget):
     """Says after each trial how many of how many are there.
 
     Args:
-        target: What carries out trials.
-        n: How many there will be.
+        target: Target that runs the trials.
+        n: Total number of trials.
         count: Told of how many there are, and of n.
     """
 
@@ -67,7 +67,7 @@ class CountingTarget(WrappedTarget):
     def carry_out(
         self, plans: Sequence[TrialPlan], observe: Observe, tell: Tell | None = None
     ) -> list[TrialRecord]:
-        """As `Target.carry_out`."""
+        """Run trials like `Target.carry_out`."""
 
         def one_more(k: int, trial: TrialRecord) -> None:
             if is_whole(trial):
@@ -81,12 +81,12 @@ class CountingTarget(WrappedTarget):
 
 
 class RuledTarget(WrappedTarget):
-    """The ends of paths are read with a ruler where less than a camera is to be observed."""
+    """A target whose ends of paths are read with a ruler if the observation level is below a camera's."""
 
     def carry_out(
         self, plans: Sequence[TrialPlan], observe: Observe, tell: Tell | None = None
     ) -> list[TrialRecord]:
-        """As `Target.carry_out`."""
+        """Run trials like `Target.carry_out`."""
         if observe == "track" or not any(plan.purpose == PATH for plan in plans):
             return self.target.carry_out(plans, observe, tell)
         if self.target.observes != "track":
@@ -151,7 +151,7 @@ class OperatedTarget(WrappedTarget):
         return [trials[k] for k in range(len(plans))]
 
     def settle(self, plan: TrialPlan, trial: TrialRecord) -> TrialRecord | None:
-        """As `Target.settle`; a trial that counts is measured now."""
+        """Settle a trial like `Target.settle`. A trial that counts is measured now."""
         driven = self.target.settle(plan, trial)
         return None if driven is None else self._operator.measure(plan, driven)
 
@@ -187,7 +187,7 @@ class ResumableTarget(WrappedTarget):
     def carry_out(
         self, plans: Sequence[TrialPlan], observe: Observe, tell: Tell | None = None
     ) -> list[TrialRecord]:
-        """As `Target.carry_out`."""
+        """Run trials like `Target.carry_out`."""
         wanted = [_what_of(plan, self.arena.start) for plan in plans]
         if tell is not None:
             for k, what in enumerate(wanted):

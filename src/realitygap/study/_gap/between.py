@@ -30,7 +30,7 @@ class GapBetween:
 
     Attributes:
         study: Measures, and what figures are drawn from.
-        why: What each part of the model carries; None where nobody asked.
+        why: Part of the gap that each part of the model explains; None if not requested.
     """
 
     study: GapStudy
@@ -72,25 +72,25 @@ def gap_between(
     Args:
         sim: The simulator: `sim`, `sim:FILE` or `jyro`.
         target: Any platform, such as `twin:FILE` or `scribbler:PORT`.
-        controllers: As in `sample_controllers`; of recorded trials those that drove, unless others are named.
-        n_controllers: How many.
-        task: What scores the trials: a kind with its defaults, such as `avoid`, python:FILE.py:function, or a `Task`.
-            If not given, the task for which the controllers were selected; coverage for random ones.
-        trials: Of each on each platform.
-        margin: Of equivalence in level, in units of the score.
-        observe: How much is seen of the target; as much as the task needs if not given.
-        arena: By name, from a file, or an `Arena`; if not given, that in which the controllers were selected, and the
-            paper's for random ones.
+        controllers: Controllers, as in `sample_controllers`. Default for recorded trials: the controllers that drove.
+        n_controllers: Number of controllers.
+        task: Task that scores the trials: a kind with its defaults, such as `avoid`, python:FILE.py:function, or a
+            `Task`. Default: the task for which the controllers were selected, and coverage for random ones.
+        trials: Number of trials of each controller on each platform.
+        margin: Margin of equivalence in level, in units of the score.
+        observe: Observation level of the target. Default: the level that the task needs.
+        arena: Arena by name, from a file, or an `Arena`. Default: the arena in which the controllers were selected,
+            and the paper's for random ones.
         noise: The paper's a on simulators; 0.1 on `jyro` and none on others when not given.
-        randomize: Of a simulator that is a calibration: posterior draws the robot of each trial from it.
+        randomize: For a simulator that is a calibration: 'posterior' draws the robot of each trial from it.
         reevolved: Results or a study that was evolved on the target.
-        why: Whether to find what each part of the model carries; the simulator has to be a calibration then.
-        processes: Of a twin.
-        witness: Of an emulated robot in another program: HOST:PORT.
-        observer: Of a robot: who places it and says what it drew, where no witness does.
-        seed: Of everything.
-        results: A file where the target's trials are kept.
-        allow_code: Whether the Python file of a task may run that the user has not allowed before.
+        why: True to compute how much of the gap each part of the model explains. The simulator must be a calibration.
+        processes: Number of processes of a twin.
+        witness: Witness of an emulated robot in another program: HOST:PORT.
+        observer: Observer of a robot without a witness: it places the robot and reports what it drew.
+        seed: Seed of all random numbers.
+        results: File for the target's trials.
+        allow_code: True to run the Python file of a task that the user has not allowed before.
         tell: Called as trials are done.
         say: Called with what is done otherwise.
 

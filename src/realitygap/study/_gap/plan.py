@@ -38,7 +38,7 @@ class Spreads:
     Attributes:
         noise: Standard deviation of trials about their controller's mean, in units of the score.
         controllers: Standard deviation of controllers' means without noise.
-        origin: Where these are from.
+        origin: Origin of these numbers.
     """
 
     noise: float
@@ -52,9 +52,9 @@ class GapPlan:
 
     Attributes:
         question: effect, margin or correlation.
-        value: Of the effect, the margin or the correlation.
+        value: Value of the effect, the margin, or the correlation.
         spread: Standard deviation of true differences over controllers that was assumed.
-        spreads: What was known of trials.
+        spreads: Spreads of trials that were assumed.
         needed: A row for each number of trials.
     """
 
@@ -137,16 +137,16 @@ def plan_gap(
     Args:
         question: `effect`: to find a mean difference; `margin`: to show equivalence within it; `correlation`: to show
             that the correlation over controllers, which is `value`, is above `least`.
-        value: In units of the score; a correlation without unit.
-        spreads: Of trials; of a pilot on `sim` when not given.
+        value: Value in units of the score; a correlation has no unit.
+        spreads: Spreads of trials. Default: those of a pilot on `sim`.
         task: Scores the trials of the pilot; coverage if not given.
-        arena: Of the pilot.
+        arena: Arena of the pilot.
         spread: Standard deviation of true differences over controllers, in units of the score; half the spread of
             controllers when not given.
         least: Above which a correlation shall be shown.
-        power: How often it shall be found.
-        trials: Of each controller on each platform.
-        seed: Of simulated studies.
+        power: Statistical power: the probability of detecting the effect.
+        trials: Number of trials of each controller on each platform.
+        seed: Seed of simulated studies.
 
     Raises:
         StudyError: A number is out of range; no pilot is made then.

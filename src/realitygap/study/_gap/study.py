@@ -37,7 +37,8 @@ Tell = Callable[[str, int, int], None]
 """Called with what is being done, the trials done, and the trials in all."""
 
 MOST_TRIALS = 4_096
-"""Of a controller: trial k of controller i has the number 4096 i + k, whatever the number of trials and controllers."""
+"""Maximum number of trials of a controller. Trial k of controller i has the number 4096 i + k, for any number of
+trials and controllers."""
 
 MOST_CONTROLLERS = 1_024
 TARGET_FROM = MOST_TRIALS * MOST_CONTROLLERS
@@ -50,7 +51,7 @@ STEPS = 100
 """Commands in a trial."""
 
 REPLAYS = 4
-"""How often the commands of a trial are replayed in simulation."""
+"""Number of replays of a trial's commands in simulation."""
 
 MOST_REPLAYED = 60
 """Trials that are replayed: the first of each controller, then the second, and so on."""
@@ -65,14 +66,14 @@ class GapStudy:
         source: Trials in simulation.
         target: Trials on the target.
         controllers: Row k of both is of controller k.
-        arena: Where.
-        source_trials: Trial after trial of controller after controller.
-        target_trials: Likewise.
-        maps: Where trials go on both sides.
-        task: What scored the trials.
-        replay: Open-loop replays; None where nobody saw the target's robot.
-        observe: How much was seen of the target.
-        step_s: How long commands lasted in simulation [s].
+        arena: Arena of the trials.
+        source_trials: All trials in simulation, controller after controller.
+        target_trials: All trials on the target, in the same order.
+        maps: Maps of the cells that trials cross on both sides.
+        task: Task that scored the trials.
+        replay: Open-loop replays; None if the target's poses are unknown.
+        observe: Observation level of the target.
+        step_s: Duration of commands in simulation [s].
     """
 
     result: GapResult
@@ -110,22 +111,23 @@ def study_gap(
 
     Args:
         source: The simulator.
-        target: Where trials are costly. Its trials go round the controllers, so that what changes over time, such as
-            a battery, is no controller's alone.
-        controllers: At least 2, see `sample_controllers`; of champions it is said how much of their score was luck.
+        target: Target, on which trials are expensive. Its trials alternate between controllers, so that changes over
+            time, such as a falling battery, affect all controllers equally.
+        controllers: At least 2 controllers, see `sample_controllers`. For champions, the result includes the part of
+            their score that was luck.
         task: Scores the trials of both sides, from what an observer has of them: with the noise of readings. Coverage
             of the driven line if not given.
-        trials: Of each controller on each platform, 1 to 4096.
-        margin: Of equivalence in level, in units of the score.
-        observe: How much is seen of the target; with `track` commands are replayed in simulation as well. If not given,
-            as much as the task needs, and the crossed cells if nobody has to count them.
-        misspecified: Whether a check found that the simulator cannot make what was observed.
-        reevolved: Champions that were evolved on the target: tried there, too, and set beside the champions among
-            `controllers` in simulation.
-        seed: Of the bootstrap.
+        trials: Number of trials of each controller on each platform, 1 to 4096.
+        margin: Margin of equivalence in level, in units of the score.
+        observe: Observation level of the target. With `track`, commands are also replayed in simulation. Default: the
+            level that the task needs, and the crossed cells if no person has to count them.
+        misspecified: True if a check showed that the simulator cannot reproduce the observations.
+        reevolved: Champions that were evolved on the target. They are also tried there, and compared with the
+            champions among `controllers` in simulation.
+        seed: Seed of the bootstrap.
         tell: Called as trials are done.
-        results: A file where the target's trials are kept as they come; those in it are not carried out again.
-        at_its_pace: Whether commands of a `sim` that was not calibrated last as long as those of the target did.
+        results: File that stores the target's trials as they end. Trials in it are not driven again.
+        at_its_pace: True to give commands of a `sim` without calibration the duration that they had on the target.
         steps: Commands in each trial.
 
     Raises:

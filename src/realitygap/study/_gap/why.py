@@ -15,7 +15,7 @@ from realitygap.platforms import Play, SimEnsemble, SimPlatform, split_spec
 from realitygap.world import Arena, Calibration, load_robot, read_calibration
 
 PARTS = ("body", "contact", "sensor noise", "motor", "turn per step", "delay")
-"""What a model is switched by; every number of a robot is in one of them."""
+"""Parts of a model that are replaced separately. Each number of a robot is in one of them."""
 
 _OWN = {
     "drive.axle": "body",
@@ -27,10 +27,10 @@ _OWN = {
 _BY_FIRST = {"body": "body", "contact": "contact", "drive": "motor", "stall": "contact", "encoders": "motor"}
 
 DRAWS = 8
-"""From the posterior, beside the estimate."""
+"""Number of draws from the posterior, in addition to the estimate."""
 
 TRIALS = 8
-"""Of each controller in simulation with each choice of parts."""
+"""Number of trials of each controller in simulation with each choice of parts."""
 
 
 def part_of(number: str) -> str:
@@ -39,7 +39,7 @@ def part_of(number: str) -> str:
 
 
 def calibration_of(spec: str) -> Calibration | None:
-    """The calibration that `sim:FILE` names; None where it names something else.
+    """Return the calibration that `sim:FILE` names; None for any other name.
 
     Raises:
         StudyError: The file cannot be read.
@@ -71,15 +71,16 @@ def why_gap(
     body, contact, sensor noise, motor, turn per step, delay. The fall of the RMS gap is shared out by Shapley values.
 
     Args:
-        calibration: Whose numbers are switched in.
-        arena: Where.
+        calibration: Calibration whose numbers replace those of the robot.
+        arena: Arena of the trials.
         genomes: The controllers; row k of the target is of genome k.
         target: Their trials on the target, at least 2 of each.
         steps: Commands in a trial.
-        step_s: How long each lasts [s]; as the calibration says, and where it does not, as the robot's file does.
-        seed: Of the noise.
-        draws: From the posterior beside the estimate, for intervals; fewer where the calibration has fewer.
-        trials: Of each controller with each choice of parts, at least 2.
+        step_s: Duration of each command [s]. Default: that of the calibration, or otherwise that of the robot file.
+        seed: Seed of the noise.
+        draws: Number of draws from the posterior, in addition to the estimate, for intervals; fewer if the calibration
+            has fewer.
+        trials: Number of trials of each controller with each choice of parts, at least 2.
 
     Raises:
         StudyError: The calibration changes nothing, or the target has one trial of each controller.

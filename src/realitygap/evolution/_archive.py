@@ -26,7 +26,7 @@ class NoveltyArchive:
         """Make an empty archive.
 
         Args:
-            settings: Kind, distance and all else; the paper's where none are given.
+            settings: Kind, distance, and all other settings. Default: the paper's.
             columns, rows: Size of the grid.
         """
         self.settings = settings or NoveltySettings()
@@ -62,10 +62,11 @@ class NoveltyArchive:
         """Novelty of one generation, which the archive then takes in.
 
         Args:
-            behaviors: of n individuals, in their order: what the distance compares (`BehaviorDistance.distances`).
+            behaviors: n behaviors in the order of individuals, in the form that the distance compares
+                (`BehaviorDistance.distances`).
 
         Returns:
-            (n,) float64, in the unit of the distance; 0 where there is nothing to compare with.
+            (n,) float64, in the unit of the distance; 0 if there is nothing to compare with.
 
         Raises:
             TypeError: A cell that is not a whole number.

@@ -28,11 +28,12 @@ def archive_members(
 
     Args:
         generations: The behaviors of each, as `NoveltyArchive.update` takes them.
-        settings: Of the archive; the paper's where none are given.
+        settings: Settings of the archive. Default: the paper's.
         columns, rows: Size of the grid.
 
     Returns:
-        For each generation the members of the archive. Of individuals of a generation that behave alike, the first.
+        The members of the archive for each generation. If individuals of a generation behave alike, the first is
+        given.
 
     Raises:
         TypeError: A cell that is not a whole number.

@@ -131,8 +131,8 @@ def to_aseba(
 
     Args:
         network: The network; its memory is not exported.
-        interface: Its inputs and outputs. A Thymio has `range.0` to `range.6`, `line.0`, `line.1`, and all inputs that
-            are computed. Its `stall` is 0.
+        interface: Names of its inputs and outputs. A Thymio has `range.0` to `range.6`, `line.0`, `line.1`, and all
+            computed inputs. Its `stall` is 0.
         steps: Commands of a trial, of which `time` is a share, 1 to 32,767.
         step_s: Duration of a command [s], 0.01 to 32.
         full_speed: Target of a wheel for a command of 1, 1 to 1000.

@@ -103,7 +103,7 @@ def to_c(
     which suits small processors, below 1e-4 for a feed-forward network.
 
     Args:
-        network: Of any genome; its memory is not exported.
+        network: Network of any genome. Its memory is not exported.
         input_names: Names of the inputs to be given, without the constant one; they become constants.
         output_names: Names of the outputs.
         precision: Type of all numbers: double or single (float).

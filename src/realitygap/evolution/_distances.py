@@ -185,7 +185,7 @@ def behavior_distance(name: str) -> BehaviorDistance:
 
 
 def distance_kind(name: str) -> int:
-    """Its number in kernels."""
+    """Return its number in kernels."""
     return _KINDS[name]
 
 
@@ -220,7 +220,7 @@ def pack_behaviors(
 
 
 def first_visits(cells: Any, columns: int, rows: int) -> NDArray[np.int64]:
-    """The cells of a behavior, each once, in the order in which they come first.
+    """Return the cells of a behavior, each once, in the order of first visits.
 
     Raises:
         TypeError: A cell that is not a whole number.

@@ -40,7 +40,7 @@ class FixedNode:
     """A node that computes.
 
     Attributes:
-        node: Its number.
+        node: Number of the node.
         sources: Numbers of the nodes that it sees.
         weights: An integer for each of them, at most 16 bits.
         constant: Two factors whose product is added to the sum.
@@ -73,7 +73,7 @@ class FixedNetwork:
         n_nodes: Largest number of a node, and 1.
         outputs: Numbers of the outputs.
         nodes: Outputs and hidden nodes in the order of activation.
-        is_recurrent: Whether nodes see the others as they were after the step before.
+        is_recurrent: True if nodes get the values that the others had after the step before.
     """
 
     activation: str
@@ -242,7 +242,7 @@ def errors(network: Network, fixed: FixedNetwork, inputs: Sequence[Sequence[int]
 
     Args:
         network: The network.
-        fixed: The same in integers.
+        fixed: The same network in integers.
         inputs: (t, n_inputs) integers, shares of `ONE`.
     """
     twin = Network.from_dict(network.to_dict())

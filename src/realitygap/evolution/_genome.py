@@ -34,7 +34,7 @@ class NodeGene:
 
 @dataclass(frozen=True)
 class ConnectionGene:
-    """A connection from node `source` to node `target`; a disabled one is kept but carries nothing."""
+    """A connection from node `source` to node `target`. A disabled one is stored but has no effect."""
 
     innovation: int
     source: int
@@ -64,7 +64,7 @@ class Network:
 
     @property
     def n_inputs(self) -> int:
-        """Inputs to be given; the constant one, where there is one, is not among them."""
+        """Number of inputs to give, without the constant one."""
         return self._rules.n_inputs - (self._rules.bias_input >= 0)
 
     @property
@@ -137,7 +137,7 @@ class Network:
         return cls._from(_json.checked(values, _json.NetworkForm, "network", "The mapping"), "The mapping")
 
     def to_json(self) -> str:
-        """The network as JSON with a version; numbers come back bit for bit."""
+        """Return the network as JSON with a version; numbers are restored bit for bit."""
         return _json.to_text(self.to_dict())
 
     @classmethod
@@ -177,7 +177,7 @@ class Network:
 
 
 class Genome:
-    """One individual's genes: a view of a row of a population's arrays."""
+    """Genes of an individual: a view of a row of a population's arrays."""
 
     def __init__(self, genomes: Genomes, row: int, rules: NeatRules, bias_value: float = 1.0) -> None:
         self._genomes = genomes
@@ -209,7 +209,7 @@ class Genome:
         return paper
 
     def with_interface(self, interface: ControllerInterface) -> Self:
-        """The same genome whose inputs and outputs have these names.
+        """Return the same genome with these names of inputs and outputs.
 
         Raises:
             ControllerError: The numbers of names do not fit, or the constant input has another place.
@@ -306,7 +306,7 @@ class Genome:
         return cls._from(_json.checked(values, _json.GenomeForm, "genome", "The mapping"), "The mapping")
 
     def to_json(self) -> str:
-        """The genome as JSON with a version; numbers come back bit for bit."""
+        """Return the genome as JSON with a version; numbers are restored bit for bit."""
         return _json.to_text(self.to_dict())
 
     @classmethod
@@ -321,7 +321,7 @@ class Genome:
         return cls._from(_json.checked(values, _json.GenomeForm, "genome", "The text"), "The text")
 
     def save(self, path: str | Path) -> None:
-        """Write the genome as JSON; a file that is there gives way once the new one is complete.
+        """Write the genome as JSON. An existing file is replaced once the new one is complete.
 
         Raises:
             RecordError: It cannot be written.
@@ -422,7 +422,7 @@ def genome_from_record(
     Args:
         record: The row's `genome`: lists hidden, biases, innovation, source, target, weight, enabled.
         rules: Sizes and activation, from the condition's settings.
-        bias_value: Of the constant input.
+        bias_value: Value of the constant input.
 
     Raises:
         RecordError: The lists do not fit together, or lead kernels to a node that is not there.

@@ -26,10 +26,10 @@ def to_networkx(
     formats can hold them.
 
     Args:
-        genome: Whose genes.
-        input_names: One for each input, the constant one included; numbers when not given.
-        output_names: One for each output; numbers when not given.
-        disabled: Whether disabled connections are edges, too.
+        genome: Genome to convert.
+        input_names: Name of each input, including the constant one. Default: numbers.
+        output_names: Name of each output. Default: numbers.
+        disabled: True to include disabled connections as edges.
 
     Raises:
         MissingExtraError: networkx is not installed.

@@ -30,7 +30,7 @@ class ControllerInterface:
     """The names of a network's inputs and outputs, in order.
 
     Attributes:
-        inputs: As a task names them: `obstacle` (the largest range reading), `stall`, `time` (step / steps), `range.K`
+        inputs: Names as in a task: `obstacle` (the largest range reading), `stall`, `time` (step / steps), `range.K`
             and other sensors of the robot, and `bias` for the constant input.
         outputs: `move` and `turn`, or the wheels `left` and `right`, each -1..1.
 
@@ -65,14 +65,14 @@ class ControllerInterface:
 
     @property
     def drives_wheels(self) -> bool:
-        """Whether the outputs are the speeds of two wheels."""
+        """True if the outputs are the speeds of two wheels."""
         return self.outputs == WHEELS
 
     def commands(self, outputs: ArrayLike) -> NDArray[np.float64]:
         """Return the commands that outputs are.
 
         Args:
-            outputs: (..., 2) of networks; limited to -1..1, and 0 where they are no number.
+            outputs: (..., 2) outputs of networks. They are limited to -1..1, and nan counts as 0.
 
         Returns:
             (..., 2) move and turn, -1..1. Wheels drive move = (left + right) / 2 and turn = (right - left) / 2.
@@ -88,9 +88,9 @@ class ControllerInterface:
         """Refuse a platform that lacks an input.
 
         Args:
-            there: What networks can see on the platform.
-            who: What the message calls the controller.
-            where: What it calls the platform.
+            there: Inputs that the platform has.
+            who: Name of the controller in the message.
+            where: Name of the platform in the message.
 
         Raises:
             ControllerError: An input is missing.
@@ -120,7 +120,7 @@ def paper_interface(*, constant: bool) -> ControllerInterface:
     """Return what the paper's networks see and answer.
 
     Args:
-        constant: Whether they have the constant input, which is the last.
+        constant: True to add the constant input, which is the last.
 
     Source: Rosenzweig & Remy, section 2.1.
     """
@@ -132,7 +132,7 @@ def inputs_of_robot(n: int, channels: Sequence[str] = ()) -> tuple[str, ...]:
 
     Args:
         n: Number of its range readings.
-        channels: Names of what else it can read, such as `light.0`.
+        channels: Names of its other channels, such as `light.0`.
     """
     return (*PAPER_INPUTS, "last_move", "last_turn", *(f"range.{k}" for k in range(n)), *channels)
 

@@ -17,9 +17,9 @@ from ._interface import ControllerInterface
 from ._settings import ACTIVATIONS, NeatSettings
 
 FORMAT_VERSION = 1
-"""Of networks, and of genomes that do not name their inputs and outputs."""
+"""Version of the format of networks, and of genomes without names of inputs and outputs."""
 NAMED_VERSION = 2
-"""Of genomes that do."""
+"""Version of the format of genomes with names of inputs and outputs."""
 Kind = Literal["genome", "network"]
 
 
@@ -130,7 +130,7 @@ def interface_to_dict(interface: ControllerInterface) -> dict[str, Any]:
 
 
 def interface_of(form: GenomeForm) -> ControllerInterface | None:
-    """The names that a document has; None where it has none.
+    """Return the names of inputs and outputs in a document; None if it has none.
 
     Raises:
         ControllerError: They are no names of a controller's inputs and outputs.
@@ -143,12 +143,12 @@ def interface_of(form: GenomeForm) -> ControllerInterface | None:
 
 
 def to_text(values: dict[str, Any]) -> str:
-    """A document as text; numbers are written so that they come back bit for bit."""
+    """Return a document as text, with numbers that are restored bit for bit."""
     return json.dumps(values, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
 
 
 def from_text(text: str | bytes, kind: Kind, where: str) -> Any:
-    """The document in a text; `where` is what messages call it.
+    """Return the document in a text; `where` is its name in messages.
 
     Raises:
         RecordError: it is no JSON, or cut off.

@@ -38,10 +38,10 @@ def to_onnx(
     In double precision the outputs are those of `Network.activate` but for rounding, below 1e-12.
 
     Args:
-        network: Of which genome ever; its memory is not exported.
-        input_names: Of the inputs to be given, without the constant one; kept in the model's metadata.
-        output_names: Of the outputs; kept in the model's metadata.
-        precision: Of all numbers: double (float64) or single (float32).
+        network: Network of any genome. Its memory is not exported.
+        input_names: Names of the inputs, without the constant one. They are stored in the model's metadata.
+        output_names: Names of the outputs. They are stored in the model's metadata.
+        precision: Precision of all numbers: double (float64) or single (float32).
 
     Raises:
         MissingExtraError: onnx is not installed.
@@ -89,7 +89,7 @@ def to_onnx(
 
 
 Ends = tuple[list[tuple[str, int]], list[tuple[str, int]]]
-"""Names and widths of what goes in, and of what comes out."""
+"""Names and widths of the inputs and of the outputs."""
 
 
 @dataclass

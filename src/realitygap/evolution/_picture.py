@@ -32,11 +32,11 @@ def network_picture(
     arrow, a negative one is dashed and ends in a bar. Disabled genes are faint and dotted.
 
     Args:
-        genome: What is drawn.
-        input_names: One for each input, the constant one included; numbers when not given.
-        output_names: One for each output; numbers when not given.
-        title: Of the picture.
-        show_disabled: Whether disabled genes are drawn at all.
+        genome: Genome to draw.
+        input_names: Name of each input, including the constant one. Default: numbers.
+        output_names: Name of each output. Default: numbers.
+        title: Title of the picture.
+        show_disabled: True to draw disabled genes.
 
     Raises:
         ValueError: Another number of names than of inputs or outputs.

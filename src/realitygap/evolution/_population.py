@@ -1,4 +1,4 @@
-"""A population that is asked for genomes and told their fitness."""
+"""A population with an ask-and-tell interface for genomes and their fitness."""
 
 from __future__ import annotations
 
@@ -63,10 +63,10 @@ class Population:
             n_inputs: Inputs that the task gives, >= 1.
             n_outputs: Outputs that it reads, >= 1.
             settings: NEAT's settings; the set 'default', which is `NeatSettings()`, when not given.
-            seed: Of the random numbers, 0 to 2**63 - 1.
-            replicate: Which of many runs from one seed, 0 to 2**32 - 1.
-            bias: Whether networks have a constant input as their last (EC02, section 4.1).
-            key: The key of the random numbers in place of the seed's, 0 to 2**64 - 1.
+            seed: Seed of the random numbers, 0 to 2**63 - 1.
+            replicate: Number of the run with this seed, 0 to 2**32 - 1.
+            bias: True for a constant input, which is the last one (EC02, section 4.1).
+            key: Key of the random numbers, which replaces the seed's, 0 to 2**64 - 1.
 
         Raises:
             TypeError: A number is not a whole one, or the settings are something else.
@@ -115,7 +115,7 @@ class Population:
 
     @property
     def species(self) -> NDArray[np.int32]:
-        """(n,) the species of each individual of this generation, by a number never used again."""
+        """Species of each individual of this generation, (n,), as numbers that are never reused."""
         return self._species_of.copy()
 
     @property
@@ -181,7 +181,7 @@ class Population:
         self.generation += 1
 
     def save(self, path: str | Path) -> None:
-        """Write a checkpoint; a file that is there gives way once the new one is complete.
+        """Write a checkpoint. An existing file is replaced once the new one is complete.
 
         Between `ask` and `tell` nothing else needs to be kept: `load`, `ask` and tell the same fitness, and the
         next generation is the same, bit for bit.

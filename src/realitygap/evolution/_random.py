@@ -9,8 +9,8 @@ def random_key(seed: int, name: str | None = None) -> int:
     """The 64-bit key of a study's random numbers, or of one condition's.
 
     Args:
-        seed: Of the study.
-        name: Of the condition; None where all conditions share their random numbers.
+        seed: Seed of the study.
+        name: Name of the condition; None if all conditions share their random numbers.
     """
     text = f"realitygap:{seed}" if name is None else f"realitygap:{seed}:{name}"
     return int.from_bytes(hashlib.blake2b(text.encode(), digest_size=8).digest(), "little")

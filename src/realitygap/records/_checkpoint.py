@@ -33,13 +33,13 @@ _FIRST_BYTES = b"PK"
 def write_checkpoint(
     path: Path, kind: str, about: Mapping[str, Any], arrays: Mapping[str, npt.NDArray[Any]]
 ) -> None:
-    """Write a checkpoint, a NumPy .npz file; one that is there gives way once the new one is complete.
+    """Write a checkpoint, a NumPy .npz file. An existing one is replaced once the new one is complete.
 
     Args:
         path: the file.
-        kind: what it holds, such as "population".
+        kind: Kind of the content, such as "population".
         about: JSON values.
-        arrays: by name; not of objects.
+        arrays: Arrays by name. They must not have objects.
 
     Raises:
         RecordError: it cannot be written; a file that was there is as it was.

@@ -65,7 +65,7 @@ class Chunk:
         first: first replicate.
         last: last replicate, inclusive.
         condition_hash: hash of the condition as resolved, as given by who published.
-        results_version: what computed the numbers.
+        results_version: Results version that computed the numbers.
         n_rows: number of rows.
         rows_digest: digest of the rows' values, hexadecimal sha256.
     """

@@ -106,7 +106,7 @@ EXTRA: tuple[Column, ...] = (
         fields=_GENOME,
     ),
 )
-"""Columns that only some conditions have; null in rows of others where rows of several are read together."""
+"""Columns that only some conditions have. They are null in rows of other conditions."""
 
 EXTRA_SCHEMA: pl.Schema = pl.Schema({column.name: column.dtype for column in EXTRA})
 SCHEMA: pl.Schema = pl.Schema({column.name: column.dtype for column in COLUMNS})
@@ -170,8 +170,8 @@ def check_rows(frame: pl.DataFrame, condition: str, first: int) -> int:
 
     Args:
         frame: columns as in `SCHEMA`, and any of `EXTRA`, in any order.
-        condition: what every row's `condition` must be.
-        first: the first row's replicate; the following ones must come without a gap.
+        condition: Condition that every row must have.
+        first: Replicate of the first row. The following replicates must have no gap.
 
     Returns:
         The last replicate.

@@ -23,10 +23,10 @@ class Derived:
     """A frame that is derived from rows.
 
     Attributes:
-        row: what a row of it is.
+        row: Meaning of a row.
         columns: its columns.
         needs: the columns of the rows that it is derived from.
-        of: from the rows of whole runs, in key order, to the frame.
+        of: Function of the rows of whole runs, in key order, that returns the frame.
     """
 
     row: str
@@ -116,7 +116,7 @@ def parent_rows(rows: pl.DataFrame) -> tuple[npt.NDArray[np.int64], npt.NDArray[
     """Return for each row the rows of its first and second parent, (n,) and (n,), -1 without parent.
 
     Args:
-        rows: of whole runs in key order, with individual, generation and parents.
+        rows: Rows of whole runs in key order, with individual, generation, and parents.
     """
     starts_generation = (rows["individual"] == 0).to_numpy()
     generation_starts = np.flatnonzero(starts_generation)

@@ -1,4 +1,4 @@
-"""A digest of rows that depends on their values and on nothing else.
+"""A digest of rows that depends only on their values.
 
 Every column is hashed apart, as a stream of little-endian values in the order of the rows; a list is two
 streams, its lengths and its entries, so that rows may arrive in chunks of any size. Not a number has one
@@ -54,7 +54,7 @@ def study_digest(results_version: int, conditions: dict[str, tuple[str, str]]) -
     """Digest of a study as hexadecimal sha256.
 
     Args:
-        results_version: what computed the numbers.
+        results_version: Results version that computed the numbers.
         conditions: name: (hash of the condition, digest of its rows); their order does not matter.
     """
     return _hash_json({"results_version": results_version, "conditions": conditions})

@@ -24,7 +24,7 @@ def write_durably(path: Path, data: bytes, *, replace: bool) -> None:
     Args:
         path: the file to make; its folder must exist.
         data: all of its bytes.
-        replace: whether a file that is there already gives way.
+        replace: True to replace an existing file.
 
     Raises:
         RecordError: the file is there and shall not be replaced, or the system refused; nothing stays.

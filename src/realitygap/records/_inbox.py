@@ -1,4 +1,4 @@
-"""An inbox: where processes that do not hold a folder's lock leave chunks for the one that does.
+"""An inbox, in which processes without a folder's lock leave chunks for the process that has it.
 
 Only the holder of the lock publishes, by renaming out of its own inbox. What a worker of an earlier sitting still
 computes goes to an inbox that is gone, so that it can neither overlap with what was planned since nor come back
@@ -55,7 +55,7 @@ def deliver(inbox: Path, condition: str, first: int, frame: pl.DataFrame, condit
     Twice the same is once: the second takes the place of the first.
 
     Args:
-        inbox: of the folder of results; see `ResultsFolder.inbox`.
+        inbox: Inbox of the folder of results; see `ResultsFolder.inbox`.
         condition: its name.
         first: the first replicate in `frame`.
         frame: columns as in `SCHEMA`, rows sorted by replicate, generation and individual, without a gap.
@@ -104,5 +104,5 @@ def _fresh_name(folder: Path) -> Path:
 
 
 def is_inbox(name: str) -> bool:
-    """Whether a folder is an inbox, of this sitting or an earlier one."""
+    """Return whether a folder is an inbox, of this program or an earlier one."""
     return _NAME.fullmatch(name) is not None

@@ -1,4 +1,4 @@
-"""Writing inside a folder that may come from elsewhere: never through a link, a pipe or a device.
+"""Functions that write inside a folder of any origin, but never through a link, a pipe, or a device.
 
 The user names the folder, so the folder itself may be a link. Whoever made the folder chose the names in it: a link
 there would let them have any file of the user overwritten. A folder that others change at the same moment is not
@@ -21,10 +21,10 @@ _JUNCTION = getattr(stat, "IO_REPARSE_TAG_MOUNT_POINT", -1)
 
 
 def refuse_links(folder: Path, *paths: Path) -> None:
-    """Raise an error if a path inside a folder, or a name on the way to it, is not a plain file or folder.
+    """Raise an error if a path inside a folder, or a part of it, is not a plain file or folder.
 
     Args:
-        folder: As the user named it; it may be a link itself.
+        folder: Folder as the user named it. It may be a link itself.
         paths: Inside it; those that do not exist are fine.
 
     Raises:
@@ -57,9 +57,9 @@ def open_inside(folder: Path, path: Path, flags: int) -> int:
     """Open a file in a folder for writing in place.
 
     Args:
-        folder: As the user named it.
+        folder: Folder as the user named it.
         path: Inside it.
-        flags: As `os.open` takes them.
+        flags: Flags of `os.open`.
 
     Returns:
         The descriptor.

@@ -40,7 +40,7 @@ class Ledger(LedgerReader):
 
     @classmethod
     def create(cls, path: str | Path) -> Self:
-        """Begin a ledger where none is."""
+        """Create a ledger; raise an error if the file exists."""
         create_file(Path(path))
         return cls.open(path)
 
@@ -133,10 +133,10 @@ class Ledger(LedgerReader):
         """Freeze the scores of a generation, with what selection made of them.
 
         Args:
-            condition, replicate, generation: which.
-            fitness: (n,) in the order of individuals.
-            novelty: (n,) likewise; None where selection is something else.
-            cells: of which fitness and novelty were made; somebody may have entered others meanwhile.
+            condition, replicate, generation: Generation of a run.
+            fitness: (n,) fitness in the order of individuals.
+            novelty: (n,) novelty in the order of individuals; None if selection uses something else.
+            cells: Cells from which fitness and novelty were computed. A person may have entered others meanwhile.
 
         Raises:
             LedgerError: a trial of it is not scored, or scored otherwise, or it is closed.
@@ -206,7 +206,7 @@ class Ledger(LedgerReader):
                 self._score(number, score, "score")
 
     def interrupt(self, number: int, record: TrialRecord) -> None:
-        """Keep a running trial that was cut off, or that nobody scored; `settle` decides whether it counts."""
+        """Store a running trial that was cut off or not scored. `settle` decides whether it counts."""
         with self._writing():
             self._keep_steps(number, record)
             self._note_event(number, "interrupted", {"end": record.end, "problem": record.problem})
@@ -225,7 +225,7 @@ class Ledger(LedgerReader):
         self.score_all({number: score}, role)
 
     def score_all(self, scores: Mapping[int, Score], role: ScoreRole = "score") -> None:
-        """Enter the cells of several trials, by their numbers: all of them, or none where one is refused."""
+        """Enter the cells of several trials by number: all of them, or none if one is refused."""
         with self._writing():
             for number, score in scores.items():
                 self._score(number, score, role)

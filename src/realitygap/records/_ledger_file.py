@@ -28,7 +28,7 @@ _PATIENCE_S = 10.0
 """How long to wait for another program that writes."""
 
 SYNCHRONOUS = "FULL"
-"""When SQLite waits for the disk: at every commit."""
+"""Time at which SQLite waits for the disk: at every commit."""
 
 TABLES = """
 CREATE TABLE conditions (  -- a condition on a robot, as resolved

@@ -14,15 +14,15 @@ ScoreRole = Literal["score", "second", "correction"]
 
 @dataclass(frozen=True)
 class Individual:
-    """One of a generation, as it is planned.
+    """One planned individual of a generation.
 
     Attributes:
         individual: its number in the generation.
         species: its species.
         parents: individuals of the generation before.
-        nodes: of its genome.
+        nodes: Nodes of its genome.
         genome: the fields of the records' genome, as lists.
-        key: of the random numbers.
+        key: Key of the random numbers.
     """
 
     individual: int
@@ -45,7 +45,7 @@ class Generation:
 
 @dataclass(frozen=True)
 class Turn:
-    """When and with which pen an individual is driven; `code` is what an operator knows it by when scoring is blind."""
+    """An individual's place in the order of trials, with its pen; `code` replaces its name if scoring is blind."""
 
     condition: str
     replicate: int
@@ -61,10 +61,10 @@ class Trial:
     """A trial as the ledger has it; `trial` is its number.
 
     Attributes:
-        place: when its turn comes, ascending.
+        place: Place in the order of trials, ascending.
         attempt: 0, and one more for each trial of the individual that was void.
-        cells: as entered and not undone; None before.
-        is_closed: whether its generation is closed, so that its score is frozen.
+        cells: Cells as entered and not undone; None before.
+        is_closed: True if its generation is closed, so that its score is frozen.
     """
 
     trial: int
@@ -95,7 +95,7 @@ class Trial:
 
     @property
     def name(self) -> str:
-        """Which trial it is, in words."""
+        """Name of the trial in words."""
         again = f" (attempt {self.attempt + 1})" if self.attempt else ""
         run = f"{self.condition}, run {self.replicate}"
         return f"{run}, generation {self.generation}, individual {self.individual}{again}"
@@ -107,10 +107,10 @@ class PhotoCount:
 
     Attributes:
         file: its name.
-        sha256: of the file, as hexadecimal digits.
+        sha256: Hash of the file, as hexadecimal digits.
         proposed: cells as they were read from it; those of the score are what was confirmed.
         doubtful: cells less than 90 % sure, crossed or not.
-        is_confirmed: whether somebody said that they looked.
+        is_confirmed: True if a person confirmed the cells.
     """
 
     file: str
@@ -121,10 +121,10 @@ class PhotoCount:
 
 
 PATH_PARTS = 4
-"""In how many parts of a step the driven path is kept, so that arcs look like arcs."""
+"""Number of parts of a step in a stored path, so that arcs look like arcs."""
 
 ROBOT = "robot"
-"""Who scores a trial of which nobody counted the cells, because its task is scored by the robot's own readings."""
+"""Name of the scorer if no person counted cells, because the robot's own readings score the task."""
 
 
 @dataclass(frozen=True)
@@ -134,10 +134,10 @@ class Score:
     Attributes:
         cells: crossed by the line, columns * row + column; none if `who` is `ROBOT`.
         who: entered them.
-        n_ends: cells in which steps end; None where nobody saw it.
-        path: (4 t + 1, 3) x [m], y [m], heading [rad] at each quarter of its t steps; None where nobody saw it.
-        photo: the photograph that they were read from; None where somebody counted on paper. The ledger has it in the
-            event of the score.
+        n_ends: Number of cells in which steps end; None if unknown.
+        path: (4 t + 1, 3) x [m], y [m], heading [rad] at each quarter of its t steps; None if unknown.
+        photo: Photograph from which they were read; None if a person counted on paper. The ledger has it in the event
+            of the score.
     """
 
     cells: Sequence[int]

@@ -204,7 +204,7 @@ class LedgerReader(ClosedOnExit):
         return [self._decoded(row, "details") for row in self._all("SELECT * FROM events ORDER BY id")]
 
     def used_codes(self) -> set[str]:
-        """Codes that stand for a trial."""
+        """Return the codes that are names of trials."""
         return {row["code"] for row in self._all("SELECT code FROM trials")}
 
     def last_sheet(self) -> int:

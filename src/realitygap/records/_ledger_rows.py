@@ -36,7 +36,7 @@ def complete_runs(ledger: Ledger, condition: str) -> list[int]:
 
 
 def ledger_frame(ledger: Ledger, condition: str) -> pl.DataFrame:
-    """One row an individual of the complete runs of a condition, with the columns of the records, in key order.
+    """Return a row for each individual of a condition's complete runs, with the columns of records, in key order.
 
     Cells and coverage are those of the last correction, where there is one; `fitness` and `novelty` stay what selection
     used. `coverage_ends` is null where nobody saw in which cells steps end, and `coverage_line` where nobody counted

@@ -1,4 +1,4 @@
-"""Which files in a folder of results are whose."""
+"""The owners of the files in a folder of results."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def list_chunks(trials: Path) -> list[ChunkName]:
 
 
 def is_temporary(name: str) -> bool:
-    """Whether a file is one that a writer of this package renames or removes before it ends."""
+    """Return whether a file is temporary, so that a writer of this package renames or removes it."""
     match = _TEMPORARY.fullmatch(name)
     return match is not None and (
         match["target"] in (DESCRIPTION_NAME, LEDGER_NAME) or ChunkName.parse(match["target"]) is not None
@@ -54,12 +54,12 @@ def is_temporary(name: str) -> bool:
 
 
 def is_system_file(name: str) -> bool:
-    """Whether the operating system puts such files into folders by itself."""
+    """Return whether the operating system puts such files into folders."""
     return name in _SYSTEM_FILES or name.startswith(_SYSTEM_PREFIXES)
 
 
 def is_trace(entry: Path) -> bool:
-    """Whether this is no more than what an interrupted `create` or `clear`, or the system, may have left."""
+    """Return whether an entry is only a trace of an interrupted `create` or `clear`, or of the operating system."""
     if entry.name == TRIALS_NAME and entry.is_dir():
         return all(is_temporary(inner.name) or is_system_file(inner.name) for inner in entry.iterdir())
     return entry.name == LOCK_NAME or is_temporary(entry.name) or is_system_file(entry.name)

@@ -1,4 +1,4 @@
-"""One writer at a time in a folder of results."""
+"""A lock that admits one writer at a time to a folder of results."""
 
 from __future__ import annotations
 

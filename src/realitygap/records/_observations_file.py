@@ -1,4 +1,4 @@
-"""Observed trials in a file: a line of JSON each, kept as they end.
+"""A file of observed trials, one line of JSON for each, which are stored as they end.
 
 The first line says of what, where and how much was observed. A trial is on the disk when `append` returns; a crash in
 the midst of a line costs that trial and no other. A robot's trial has a line when it begins and, if a person has to say
@@ -37,13 +37,13 @@ class ObservationsHead:
     """The common head of all trials of a file.
 
     Attributes:
-        target: On which platform, as the user named it.
-        label: What figures of its trials say: SIM, TWIN, EMULATED or REAL.
-        robot: Which robot it is, by name or file.
-        arena: Where, as `Arena.to_dict` has it.
-        step_s: How long one command lasts [s].
-        observe: How much was looked at.
-        identity: What tells the target from others whatever its name; empty where only the name does.
+        target: Platform, as the user named it.
+        label: Label of its trials in figures: SIM, TWIN, EMULATED or REAL.
+        robot: Name or file of the robot.
+        arena: Arena, as in `Arena.to_dict`.
+        step_s: Duration of a command [s].
+        observe: Observation level.
+        identity: Identity of the target, which does not depend on its name; empty if only the name identifies it.
     """
 
     target: str
@@ -55,7 +55,7 @@ class ObservationsHead:
     identity: str = ""
 
     def to_dict(self) -> dict[str, Any]:
-        """As plain values, equal to those that come out of a file."""
+        """Return plain values, equal to those that a file gives."""
         plain: dict[str, Any] = json.loads(json.dumps(asdict(self)))
         return plain
 
@@ -65,9 +65,9 @@ class Observations:
     """The trials of a file.
 
     Attributes:
-        head: What they have in common.
-        trials: In the order in which they ended.
-        problem: What was left out and why; empty where nothing was.
+        head: Common values of the trials.
+        trials: Trials in the order in which they ended.
+        problem: Description of what was left out, with the reason; empty if nothing was.
         under_way: The last line of each trial that never ended, because the program did: what the robot drove, if its
             `end` is "driven".
     """
@@ -79,7 +79,7 @@ class Observations:
 
 
 def not_compared(there: Mapping[str, Any], wanted: Mapping[str, Any]) -> str:
-    """Which of `target` and `identity` does not tell two targets apart: the name, where identities are known."""
+    """Return the key that does not distinguish targets: `target` if identities are known, otherwise `identity`."""
     return "target" if there.get("identity") and wanted.get("identity") else "identity"
 
 
@@ -167,14 +167,14 @@ class ObservationsFile(ClosedOnExit):
     target whose identity is known on both sides may have another name, such as another port.
 
     Args:
-        path: Where; made where there is none.
-        head: What its trials have in common.
+        path: Path of the file. It is made if it does not exist.
+        head: Common values of its trials.
         within: The folder that the user named, if the name of the file in it is not the user's.
 
     Attributes:
-        trials: Those that it had when it was opened.
+        trials: Trials in the file when it was opened.
         under_way: Trials that never ended, by purpose, number, and controller; `append` adds and removes them.
-        problem: What was cut off; empty where nothing was.
+        problem: Description of what was cut off; empty if nothing was.
 
     Raises:
         RecordError: It is another file, of another target, damaged, or cannot be written.

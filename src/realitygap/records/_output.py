@@ -34,7 +34,7 @@ def refuse_results(path: Path) -> None:
 
 
 def is_special(path: Path) -> bool:
-    """Whether it is a terminal, a device or a pipe: written to, and never replaced."""
+    """Return whether a path is a terminal, a device, or a pipe, which is written to and never replaced."""
     return path.exists() and not path.is_file() and not path.is_dir()
 
 

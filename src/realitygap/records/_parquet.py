@@ -13,12 +13,12 @@ from realitygap.errors import RecordError
 
 
 def write_frames(path: Path, frames: Iterable[pl.DataFrame], schema: pl.Schema) -> int:
-    """Write frames of one schema to a file; one that is there gives way once the new one is complete.
+    """Write frames of one schema to a file. An existing file is replaced once the new one is complete.
 
     They are written to files of their own first, which polars then joins as a stream.
 
     Returns:
-        How many rows there are.
+        The number of rows.
 
     Raises:
         RecordError: it cannot be written; a file that was there is as it was.

@@ -13,7 +13,7 @@ from typing import Any
 from realitygap._limits import MOST_CHUNK_BYTES, LimitError
 
 MOST_VALUES = MOST_CHUNK_BYTES // 8
-"""Of all columns together."""
+"""Maximum number of values in all columns together."""
 _MOST_DEPTH = 16
 _MOST_ITEMS = 1_000_000
 _WIDTH = 8

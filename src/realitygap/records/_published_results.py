@@ -137,7 +137,7 @@ class PublishedResults:
 
     @property
     def missing_note(self) -> str | None:
-        """A sentence when runs are missing, by the names of chunks; None when none is, or nobody knows how many."""
+        """Return a sentence on missing runs, by the names of chunks; None if none is missing or this is unknown."""
         n_there, n_runs = self.count_runs()
         if n_runs is None or n_there >= n_runs:
             return None
@@ -295,7 +295,7 @@ class PublishedResults:
     def derived_frames(
         self, what: DerivedFrame, condition: str | None = None, replicates: Iterable[int] | None = None
     ) -> Iterator[pl.DataFrame]:
-        """As `derive`, chunk by chunk, so that memory holds one chunk at a time."""
+        """Yield the frames of `derive` chunk by chunk, so that memory holds one chunk at a time."""
         if what not in DERIVED:
             raise ValueError(f"Unknown frame {what!r}. {did_you_mean(what, DERIVED)}")
         self._check_selection(condition, None)
@@ -310,14 +310,14 @@ class PublishedResults:
         condition: str | None = None,
         replicates: Iterable[int] | None = None,
     ) -> int:
-        """Write `derive` to a Parquet file, chunk by chunk; one that is there gives way once the new one is complete.
+        """Write `derive` to a Parquet file, chunk by chunk. An existing file is replaced once the new one is complete.
 
         Args:
-            what, condition, replicates: As of `derive`.
+            what, condition, replicates: Arguments of `derive`.
             path: The file; none of a study's own.
 
         Returns:
-            How many rows it has.
+            The number of rows.
 
         Raises:
             RecordError: as `chunks`, or the file is one of a study's own or cannot be written.

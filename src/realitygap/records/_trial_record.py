@@ -9,17 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 Observe = Literal["readings", "cells", "encoders", "track"]
-"""How much is seen of a robot: commands, readings and stall; crossed cells, too; its encoders, too; its poses, too."""
+"""Observation level of a trial. Each level adds data: commands, readings, and stall; crossed cells; encoders; poses."""
 
 OBSERVATIONS: tuple[Observe, ...] = ("readings", "cells", "encoders", "track")
-"""From the least to the most: each has all that those before it have."""
+"""Observation levels in ascending order. Each includes those before it."""
 
 CALIBRATES: tuple[Observe, ...] = OBSERVATIONS[1:]
-"""As much as a calibration needs: from readings alone nothing is told of where a robot drove."""
+"""Levels that a calibration can use. Readings alone contain no information about the robot's position."""
 
 
 UNDER_WAY = ("running", "driven")
-"""Ends of records of trials that go on: the robot drives, or a person has yet to say what they saw of it."""
+"""Ends of records of unfinished trials: the robot drives, or a person has yet to report what they saw."""
 
 
 def sees(observe: Observe, least: Observe) -> bool:
@@ -32,27 +32,27 @@ class TrialRecord:
     """A trial of t commands; row k of what is sensed is from before command k.
 
     Attributes:
-        start: (3,) where the robot was put: x [m], y [m], heading [rad]; zeros where only its study knows.
+        start: (3,) start of the robot: x [m], y [m], heading [rad]; zeros if only its study has it.
         step_s: Duration of a command [s].
         commands: (t, 2) move and turn, -1..1.
-        readings: (t, s) of each range sensor, 0..1.
+        readings: (t, s) reading of each range sensor, 0..1.
         stalled: (t,) bool.
-        cells: Crossed cells of the arena's grid, ascending: of a pen's line the order is not known. Empty where
-            nobody counted.
-        wheels: (t + 1, 2) way of the left and the right wheel since the start, by encoders [m]; no rows where
-            encoders are not observed.
-        poses: (t + 1, 3) x [m], y [m], heading [rad]; no rows where no camera looks.
-        genome: The controller as JSON text; empty where commands were given one by one.
-        number: Of the trial on its platform: with which noise it ran.
-        purpose: What it was driven for, such as controller, path, sensors, motion, contact.
-        battery_v: At its start [V]; nan where it is not known.
+        cells: Crossed cells of the arena's grid, ascending, because a pen's line does not show their order. Empty if
+            not counted.
+        wheels: (t + 1, 2) distance of the left and the right wheel since the start, by encoders [m]; no rows if not
+            observed.
+        poses: (t + 1, 3) x [m], y [m], heading [rad]; no rows without a camera.
+        genome: Controller as JSON text; empty if commands were given.
+        number: Number of the trial on its platform, which selects its noise.
+        purpose: Purpose, such as controller, path, sensors, motion, contact.
+        battery_v: Battery voltage at its start [V]; nan if unknown.
         end: Why it ended, as `EndReason` has it.
-        end_pose: Where it stood at its end by a ruler: x [m], y [m], heading [rad] with all full turns from that of
-            the start on; None where nobody measured.
-        last_readings: (s,) of each range sensor after the last command; no entries where nobody looked.
-        last_stalled: Whether the last command was blocked; False where nobody looked.
-        times: Since the trial began [s], of each look at the sensors, so (t + 1,) if the robot looked after the last
-            command, otherwise (t,). No entries for a simulation, in which they follow from `step_s`.
+        end_pose: Final pose, measured by a ruler: x [m], y [m], heading [rad], which includes all full turns from the
+            start; None if not measured.
+        last_readings: (s,) reading of each range sensor after the last command; no entries if not observed.
+        last_stalled: True if the last command was blocked; False if not observed.
+        times: Time of each look at the sensors since the start [s]. It has (t + 1,) entries if the robot looked after
+            the last command, otherwise (t,). A simulation has no entries, because times follow from `step_s`.
         raw: Readings at these times in the robot's own units, a row each; no rows for a simulation.
         problem: Message about the end; empty after the last step.
     """

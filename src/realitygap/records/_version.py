@@ -7,4 +7,4 @@ RESULTS_VERSION = 2
 
 
 class RecordWarning(UserWarning):
-    """Something about a folder of results that a reader should know and that stops nobody."""
+    """A warning about a folder of results that does not stop the program."""

@@ -26,11 +26,11 @@ class TaskRun:
     """The result of one run on a classical task.
 
     Attributes:
-        solved: Whether a network solved the task.
+        solved: True if a network solved the task.
         evaluations: Networks tried, up to and with the one that did.
         generations: Begun.
-        n_hidden: Hidden nodes of the solver; 0 where there is none.
-        n_connections: Its enabled connections.
+        n_hidden: Number of hidden nodes of the solver; 0 if there is none.
+        n_connections: Number of its enabled connections.
         generalization: Starts of 625 that it passed; 0 in other tasks than the one without velocities.
     """
 
@@ -46,10 +46,10 @@ def run_task(task: ClassicalTask, settings: NeatSettings, seed: int, replicate: 
     """One run on a classical task, in one call of a kernel.
 
     Args:
-        task: Which task.
+        task: Task to solve.
         settings: NEAT's settings, those of the task among them.
-        seed: Of the random numbers.
-        replicate: Which of the runs from that seed.
+        seed: Seed of the random numbers.
+        replicate: Number of the run with this seed.
     """
     bias_input = task.n_inputs
     neat = settings.rules(task.n_inputs + 1, 1, bias_input=bias_input)

@@ -1,4 +1,4 @@
-"""One condition of a study, as resolved: everything that decides what a run of it does."""
+"""One condition of a study, as resolved, with all settings that determine its runs."""
 
 from __future__ import annotations
 
@@ -293,7 +293,7 @@ class Condition(Settings):
 
     @property
     def task_of_trials(self) -> Task:
-        """Its task, as what scores trials."""
+        """Its task, as an object that scores trials."""
         if not isinstance(self.task, Task):
             raise TypeError(f"The task is {self.task!r}, which is no `Task`.")
         return self.task
@@ -323,7 +323,7 @@ class Condition(Settings):
 
     @property
     def counted_cells(self) -> Literal["line", "ends"]:
-        """Which cells count as a behavior, and as coverage."""
+        """Kind of the cells that count as a behavior, and as coverage."""
         return "line" if self.coverage is None else self.coverage.cells
 
     @property
@@ -359,7 +359,7 @@ class Condition(Settings):
         return self.controller.outputs
 
     def settings(self) -> dict[str, Any]:
-        """Everything that decides its results, as plain values; its name counts only where seeds are not paired."""
+        """All values that determine its results, as plain values. Its name counts only if seeds are not paired."""
         return self.model_dump(mode="json", exclude={"name"})
 
     @model_serializer(mode="wrap")
@@ -371,7 +371,7 @@ class Condition(Settings):
         return values
 
     def hash(self) -> str:
-        """A hash of `settings` and, where random numbers depend on it, the name."""
+        """Return a hash of `settings` and, if random numbers depend on it, the name."""
         counted: dict[str, Any] = self.settings()
         if not self.pair:
             counted["name"] = self.name

@@ -1,4 +1,4 @@
-"""One run of a condition generation by generation, for trials that take their time: by asking and telling."""
+"""One run of a condition, generation by generation, with an ask-and-tell interface for slow trials."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Told:
 
     Attributes:
         fitness: (n,) the number that it uses.
-        novelty: (n,) of each individual; None unless selection is novelty.
+        novelty: (n,) novelty of each individual; None unless selection is novelty.
     """
 
     fitness: tuple[float, ...]
@@ -62,7 +62,7 @@ def named(genome: Genome, condition: Condition) -> Genome:
 
 
 class Evolution:
-    """One run: `ask` for a generation, `tell` what each individual is worth, and so on.
+    """One run with an ask-and-tell interface: `ask` for a generation, `tell` the score of each individual, and so on.
 
     What is asked is a function of the condition, the replicate and what was told: as in the whole runs that
     `run_replicates` carries out, by the same kernels and with the same random numbers. The novelty archive is updated
@@ -101,7 +101,7 @@ class Evolution:
         """Take what a generation is worth, and breed the next one.
 
         Args:
-            scores: (n,) by the task, in the order of individuals, such as coverage 0..1.
+            scores: (n,) scores by the task, in the order of individuals, such as coverage 0..1.
             cells: n lists of visited cells, by which novelty selects; their order within a list does not matter.
 
         Raises:

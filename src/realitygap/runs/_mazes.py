@@ -28,8 +28,8 @@ class Tried(NamedTuple):
     """The results of n networks in a maze.
 
     Attributes:
-        ends: (m, 2) where their trials ended [m]; of those tried, the first m <= n.
-        solver: Which one reached the exit first in their order; -1 where none did.
+        ends: (m, 2) final positions of the first m <= n trials [m].
+        solver: Index of the first network that reached the exit; -1 if none did.
     """
 
     ends: NDArray[np.float64]
@@ -41,7 +41,7 @@ class MazePath(NamedTuple):
 
     Attributes:
         poses: (t + 1, 3) x, y [m] and heading [rad]; row 0 is the start.
-        inputs: (t, i) what it saw, as `MazeAgent.input_names` has it.
+        inputs: (t, i) inputs of the network, in the order of `MazeAgent.input_names`.
     """
 
     poses: NDArray[np.float64]
@@ -61,9 +61,9 @@ class MazeTrials:
         """Put an agent into a maze.
 
         Args:
-            arena: Its walls, its start and its goal: nearer than its radius to it is at the exit.
+            arena: Arena with walls, a start, and a goal, whose radius is that of the exit.
             agent: The published one when not given.
-            precision: Of the arithmetic.
+            precision: Precision of the arithmetic.
 
         Raises:
             ValueError: The arena has no goal.
@@ -156,10 +156,10 @@ class MazeRun:
     """The result of one run in a maze.
 
     Attributes:
-        solved: Whether a network reached the exit.
+        solved: True if a network reached the exit.
         evaluations: Networks tried, up to and with the one that did.
         archived: Behaviors in the archive at the end.
-        ends: (evaluations, 2) where the trials ended [m], where that was asked for.
+        ends: (evaluations, 2) final positions of the trials [m], if requested.
         solver: The network that reached the exit.
     """
 
@@ -187,14 +187,14 @@ def run_maze(
     is.
 
     Args:
-        task: What novelty search has to be there.
-        trials: Of the maze.
-        reward: For what.
+        task: Task with the settings of novelty search.
+        trials: Trials in the maze.
+        reward: Reward: novelty or objective.
         settings: NEAT's settings, those of the task among them.
-        seed: Of the random numbers.
-        replicate: Which of the runs from that seed.
-        keep_ends: Whether to keep where all trials ended.
-        go_on: Asked before each generation; a run that may not go on ends unsolved.
+        seed: Seed of the random numbers.
+        replicate: Number of the run with this seed.
+        keep_ends: True to store the final positions of all trials.
+        go_on: Function that is asked before each generation. If it returns False, the run ends unsolved.
     """
     population = Population(len(trials.agent.input_names) - 1, 2, settings, seed=seed, replicate=replicate)
     archive = _EndsArchive(task)

@@ -38,7 +38,7 @@ def replay(condition: Condition | Mapping[str, Any], row: Mapping[str, Any]) -> 
     """Recompute the trial of a row of results, step by step.
 
     Args:
-        condition: As resolved, or its entry in `study.json`, or the settings in that.
+        condition: Condition as resolved, its entry in `study.json`, or the settings of this entry.
         row: The row, as `DataFrame.row(k, named=True)` gives it.
 
     Returns:

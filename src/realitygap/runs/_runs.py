@@ -89,10 +89,11 @@ def run_rows(condition: Condition, first_replicate: int, n_runs: int, *, staged:
     """Run `n_runs` runs of a condition; see `run_replicates` for them as a frame.
 
     Args:
-        condition: As resolved.
+        condition: Condition as resolved.
         first_replicate: Number of the first run.
-        n_runs: How many, >= 1.
-        staged: Take the road that serves all platforms where the whole-run kernel would do; the rows are the same.
+        n_runs: Number of runs, at least 1.
+        staged: True to use the method for all platforms even if the whole-run kernel is available. The rows are the
+            same.
 
     Returns:
         Arrays (n_runs, generations, individuals, ...).
@@ -156,7 +157,7 @@ def prepare_kernels(conditions: Iterable[Condition] = ()) -> None:
     """Compile, or load from disk, all that runs need, by runs that are as small as can be.
 
     Args:
-        conditions: Those to come; without any, a run of the paper's.
+        conditions: Conditions to be run. Default: a condition of the paper.
     """
     least = [_least(condition) for condition in conditions if not condition.is_physical]
     done: list[dict[str, Any]] = []
@@ -181,13 +182,13 @@ def run_replicates(condition: Condition, first_replicate: int, n_runs: int) -> p
     """Run `n_runs` runs of a condition.
 
     Args:
-        condition: As resolved.
+        condition: Condition as resolved.
         first_replicate: Number of the first run.
-        n_runs: How many, >= 1.
+        n_runs: Number of runs, at least 1.
 
     Returns:
-        One row an individual tried, with the columns of the records, sorted by replicate, generation and
-        individual. The rows of a replicate do not depend on which others are asked for.
+        One row for each individual, with the columns of the records, sorted by replicate, generation, and individual.
+        The rows of a replicate do not depend on the other replicates.
 
     Raises:
         TypeError, ValueError: As `run_rows`.

@@ -50,7 +50,7 @@ class _Scored(NamedTuple):
 
 
 def runs_together(population: int) -> int:
-    """Runs that a block has where there are enough."""
+    """Return the number of runs in a full block."""
     return max(LEAST_RUNS, -(-BLOCK_TRIALS // population))
 
 
@@ -60,14 +60,14 @@ def run_staged(
     """Run one replicate for each place of `rows`, numbered from `first_replicate`.
 
     Args:
-        condition: As resolved.
-        rules: Its rules.
+        condition: Condition as resolved.
+        rules: Rules of the run.
         first_replicate: Number of the first run.
         rows: Written.
         room, hidden_room: Genes and hidden nodes that a genome may have; those of `rows`.
 
     Returns:
-        Whether all genomes found room; if not, the rows are worth nothing and want more room.
+        True if there was room for all genomes. Otherwise the rows are invalid and need more room.
 
     Raises:
         TaskError: A function of the user's own failed.

@@ -1,4 +1,4 @@
-"""Who is tried together with whom, where each robot of an arena has another network."""
+"""Teams, for conditions in which each robot of an arena has another network."""
 
 from __future__ import annotations
 
@@ -34,8 +34,8 @@ def mean_of_teams(scores: NDArray[np.float64], teams: NDArray[np.int32]) -> NDAr
     """Return the mean score of the trials in which each individual drove, shape (n,).
 
     Args:
-        scores: (n,) of each trial.
-        teams: (n, r) as `draw_teams` has them.
+        scores: (n,) score of each trial.
+        teams: (n, r) teams of `draw_teams`.
     """
     means = np.zeros(len(scores))
     for robot in teams.T:

@@ -12,14 +12,14 @@ class ClassicalTask:
     """A task, what NEAT has to be for it, and what was published.
 
     Attributes:
-        name: As the command takes it.
-        title: For people.
+        name: Name in commands.
+        title: Title for people.
         n_inputs: Inputs that the task gives, the constant one not counted.
         settings: NEAT's settings that belong to the task and not to a named set: population, generations,
             the constant input's value, recurrence.
-        published_settings: Those that the source changes for this task alone; part of 'stanley-2002' here.
-        published: Its results, under the names that ours have, with the number of runs `n`.
-        source: Where they stand.
+        published_settings: Settings that the source changes only for this task. They are part of 'stanley-2002' here.
+        published: Published results, under our names, with the number of runs `n`.
+        source: Source of the published results.
     """
 
     name: str

@@ -68,15 +68,15 @@ class CoverageTask(Settings):
 
     @property
     def observe(self) -> Observe:
-        """The crossed cells; its poses where cells count in which steps end."""
+        """The required observation level: the crossed cells, or poses if the cells at the ends of steps count."""
         return "cells" if self.cells == "line" else "track"
 
     def fitness(self, trajectories: Trajectories, arena: Arena) -> NDArray[np.float64]:
-        """(n,) visited share of the reachable cells, 0..1."""
+        """Return the visited share of the reachable cells, (n,), 0..1."""
         return trajectories.coverage_line if self.cells == "line" else trajectories.coverage_ends
 
     def has_bias_input(self, selection: str) -> bool:
-        """Whether the networks of a condition have the constant input."""
+        """Return whether the networks of a condition have the constant input."""
         if self.bias_input == "with-novelty":
             return selection == "novelty"
         return self.bias_input == "always"

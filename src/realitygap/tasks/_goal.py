@@ -60,7 +60,7 @@ class GoalTask(StepTask):
         return arena.goal
 
     def fitness(self, trajectories: Trajectories, arena: Arena) -> NDArray[np.float64]:
-        """(n,) at most 1; below 0 where the robot ended farther away than it began.
+        """Return the scores, (n,), at most 1; below 0 if the robot ended farther away than it began.
 
         Raises:
             TaskError: The arena has no goal, or it is where trials start.

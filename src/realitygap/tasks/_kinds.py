@@ -22,7 +22,7 @@ TASKS: dict[str, type[Settings]] = {
     "wall": WallTask,
     "goal": GoalTask,
 }
-"""What `[task] kind` can be, beside python:FILE.py:function; each is a `Settings` and, but for coverage, a `Task`."""
+"""Kinds of `[task] kind`, except python:FILE.py:function. Each is a `Settings` and, except coverage, a `Task`."""
 
 
 def task_model(values: Mapping[str, Any]) -> type[Settings]:
@@ -43,7 +43,7 @@ def task_model(values: Mapping[str, Any]) -> type[Settings]:
 
 
 def as_task(value: Any) -> Any:
-    """A task of a table; anything else as it is."""
+    """Return the task of a table; any other value is returned unchanged."""
     if not isinstance(value, Mapping):
         return value
     model = task_model(value)

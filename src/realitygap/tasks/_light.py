@@ -50,7 +50,7 @@ class LightTask(StepTask):
             )
 
     def fitness(self, trajectories: Trajectories, arena: Arena) -> NDArray[np.float64]:
-        """(n,) 0 to 1.
+        """Return the scores, (n,), 0 to 1.
 
         Raises:
             TaskError: The arena has no light, or one at the start.

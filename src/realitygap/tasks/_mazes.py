@@ -20,13 +20,13 @@ class MazeAgent:
     refused as a whole, and the turn is kept.
 
     Attributes:
-        steps: How long it has.
-        radius: Of the disc.
+        steps: Number of steps.
+        radius: Radius of the disc.
         rays: Directions of its range finders from ahead, which look out of its center [rad].
-        reach: Of the range finders; what they read is the distance as a part of it.
+        reach: Reach of the range finders. Their reading is the distance divided by the reach.
         push: Speed gained in a step for each whole that its second output is above one half.
         top_speed: Forward or backward.
-        twist: Turning gained in the same way by its first output.
+        twist: Change of the turn rate in a step by its first output.
         top_spin: Left or right.
 
     Source: Lehman & Stanley (2011), section 4; numbers as in public re-implementations.
@@ -53,14 +53,14 @@ class MazeTask:
     """A maze, what NEAT has to be for it, and what was published.
 
     Attributes:
-        name: As the command takes it, and of the arena.
+        name: Name in commands, and of the arena.
         settings: NEAT's settings that belong to the task: population and generations.
         neighbors: Nearest behaviors that novelty is averaged over.
         threshold: Novelty from which on a behavior enters the archive at first [m].
         patience: Evaluations without an entry after which the threshold falls.
         far: Distance from the exit that has fitness 0, farther than any place of the maze [m].
-        published: Its results, by what is rewarded.
-        source: Where they stand.
+        published: Published results, by reward.
+        source: Source of the published results.
     """
 
     name: str

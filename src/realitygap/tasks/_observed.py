@@ -22,7 +22,7 @@ def score_observed(task: Task, trials: Sequence[TrialRecord], arena: Arena) -> N
     Args:
         task: The task.
         trials: n trials, each with as much as the task needs, by `task.observe`.
-        arena: Where they were.
+        arena: Arena of the trials.
 
     Returns:
         (n,) scores, finite.
@@ -62,11 +62,11 @@ def observed_trajectories(trials: Sequence[TrialRecord], arena: Arena) -> Trajec
 
     Args:
         trials: n >= 1 trials of t commands each, with s range sensors.
-        arena: Where they were.
+        arena: Arena of the trials.
 
     Returns:
-        Trajectories without inputs of networks. What nobody observed has no rows (wheels, poses), or is NaN: coverage
-        where no cells are known, and the readings at the end where nobody looked.
+        Trajectories without inputs of networks. Missing observations have no rows (wheels, poses), or are NaN
+        (coverage without cells, and the readings at the end).
 
     Raises:
         ValueError: The trials differ in their numbers of steps or sensors.

@@ -67,7 +67,7 @@ class PythonTask(Settings):
         """Read a task's file.
 
         Args:
-            kind: `python:FILE.py:function`, with the file's path as seen from the current folder.
+            kind: `python:FILE.py:function`, with the file's path relative to the current folder.
             settings: `inputs`.
 
         Raises:
@@ -190,7 +190,7 @@ def read_task_file(kind: str, folder: Path) -> tuple[str, str]:
 
     Args:
         kind: `python:FILE.py:function`.
-        folder: Where a relative FILE is.
+        folder: Folder of a relative FILE.
 
     Returns:
         `kind` with the file's name alone, and the file's text.

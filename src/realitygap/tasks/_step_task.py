@@ -20,5 +20,5 @@ class StepTask(Settings):
 
     @property
     def name(self) -> str:
-        """As `[task] kind` has it."""
+        """Name of the task, the same as `[task] kind`."""
         return self.kind

@@ -23,15 +23,15 @@ class Task(Protocol):
     same call.
 
     Attributes:
-        name: As `[task] kind` has it.
-        inputs: What the networks see, in order: `obstacle` (the largest of the range readings), `stall`, `time`
-            (step / steps), `bias` (constant, the last if there is one), one sensor's reading `range.K`, `light.K`,
-            `line.K`, `bump.K`, `encoder.K`, `goal_sector.K` (which pie slice the goal is in), `goal_distance`,
+        name: Name of the task, the same as `[task] kind`.
+        inputs: Inputs of the networks, in order: `obstacle` (the largest of the range readings), `stall`, `time` (step
+            / steps), `bias` (constant, the last if there is one), one sensor's reading `range.K`, `light.K`, `line.K`,
+            `bump.K`, `encoder.K`, `goal_sector.K` (the quarter around the robot with the goal), `goal_distance`,
             `last_move`, `last_turn`.
-        needs_trace: Whether `fitness` looks at single steps; where it does not, the arrays of steps have no rows.
-        observe: How much an observer has to see of a trial so that it can be scored.
-        score_range: The least and the greatest score that there can be; infinite where there is no limit.
-        score_name: What figures call the score, with its unit, such as `coverage` or `distance along walls [m]`.
+        needs_trace: True if `fitness` uses single steps. Otherwise the arrays of steps have no rows.
+        observe: Minimum observation level of a trial that can be scored.
+        score_range: Minimum and maximum of the score; infinite if there is no limit.
+        score_name: Name of the score in figures, with its unit, such as `coverage` or `distance along walls [m]`.
     """
 
     @property
@@ -53,5 +53,5 @@ class Task(Protocol):
     def score_range(self) -> tuple[float, float]: ...
 
     def fitness(self, trajectories: Trajectories, arena: Arena) -> NDArray[np.float64]:
-        """(n,) what each trial is worth, finite; more is better."""
+        """Return the finite score of each trial, (n,). A better trial has a higher score."""
         ...

@@ -40,14 +40,14 @@ class Trajectories:
     start.
 
     Attributes:
-        arena: Where they were.
-        step_s: How long a step lasts [s].
-        arrays: What the kernels kept, as they kept it.
+        arena: Arena of the trials.
+        step_s: Duration of a step [s].
+        arrays: Arrays as the kernels store them.
         sensors: (s,) names of the readings, such as `range.0`, `light.1`.
         network_inputs: (i,) names of what the networks saw.
         coverage_line, coverage_ends: (n,) visited share of the reachable cells, 0..1.
         n_stalls: (n,) blocked steps.
-        drawn: (n,) what was drawn for each trial, by dotted name; `arena` has the centers of these.
+        drawn: (n,) numbers that were drawn for each trial, by dotted name. `arena` has their centers.
     """
 
     arena: Arena
@@ -65,7 +65,7 @@ class Trajectories:
         return int(self.arrays.stalled.shape[1])
 
     def number(self, name: str, value: float) -> NDArray[np.float64]:
-        """(n,) a number of each trial: what was drawn for it, or the value where it is not drawn."""
+        """Return a number of each trial, (n,): the drawn number, or the value if it is not drawn."""
         return self.drawn[name] if name in self.drawn else np.full(len(self), float(value))
 
     @property
@@ -75,7 +75,7 @@ class Trajectories:
 
     @cached_property
     def poses(self) -> NDArray[np.float64]:
-        """(n, t + 1, 3) x [m], y [m], heading [rad, 0 to 2 pi, counter-clockwise from +x]."""
+        """Poses x [m], y [m], heading [rad, 0 to 2 pi, counter-clockwise from +x], (n, t + 1, 3)."""
         start = self.arena.start
         poses = _trials_first(self.arrays.poses) * [1.0, 1.0, math.tau] + [start.x, start.y, 0.0]
         poses[..., 2] %= math.tau
@@ -83,7 +83,7 @@ class Trajectories:
 
     @cached_property
     def readings(self) -> NDArray[np.float64]:
-        """(n, t + 1, s) what sensors answered, 0 (nothing) to 1 (as near, bright or dark as can be told).
+        """Readings of sensors, 0 (nothing) to 1 (nearest, brightest, or darkest), (n, t + 1, s).
 
         With their noise on `sim`, without it on `jyro`.
         """
@@ -91,22 +91,22 @@ class Trajectories:
 
     @cached_property
     def inputs(self) -> NDArray[np.float64]:
-        """(n, t, i) what the networks saw."""
+        """Inputs of the networks, (n, t, i)."""
         return _trials_first(self.arrays.inputs)
 
     @cached_property
     def commands(self) -> NDArray[np.float64]:
-        """(n, t, 2) what they answered: move and turn, -1..1."""
+        """Commands of the networks, move and turn, -1..1, (n, t, 2)."""
         return _trials_first(self.arrays.commands)
 
     @cached_property
     def stalled(self) -> NDArray[np.bool_]:
-        """(n, t + 1) whether the step was blocked."""
+        """True if the step was blocked, (n, t + 1)."""
         return np.ascontiguousarray(self.arrays.stalled.T)
 
     @cached_property
     def wheels(self) -> NDArray[np.float64]:
-        """(n, t + 1, 2) way of the left and the right wheel since the start [m].
+        """Distances of the left and the right wheel since the start [m], (n, t + 1, 2).
 
         Raises:
             ValueError: The platform has no wheels, as `jyro`, which moves and turns as a whole.
@@ -119,7 +119,7 @@ class Trajectories:
         return _trials_first(self.arrays.wheels)
 
     def readings_of(self, kind: str) -> NDArray[np.float64]:
-        """(n, t + 1, k) the readings of the k sensors of a kind: range, light, line or bump.
+        """Return the readings of the k sensors of a kind: range, light, line or bump, (n, t + 1, k).
 
         Raises:
             ValueError: The robot has none of this kind.
@@ -132,7 +132,7 @@ class Trajectories:
 
     @property
     def light(self) -> NDArray[np.float64]:
-        """(n, t + 1, k) the readings of the light sensors, 0..1."""
+        """Readings of the light sensors, 0..1, (n, t + 1, k)."""
         return self.readings_of("light")
 
 

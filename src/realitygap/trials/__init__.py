@@ -1,4 +1,4 @@
-"""One controller on one robot, or a population on a platform."""
+"""Trials of one controller on one robot, or of a population on a platform."""
 
 from . import _picture  # noqa: F401  # registers the picture of a trajectory
 from ._batch import (

@@ -28,7 +28,7 @@ def paper_inputs(rules: NeatRules) -> tuple[str, ...]:
 
 
 def poses_of(poses: NDArray[np.floating], start: Pose) -> NDArray[np.float64]:
-    """(n, 3) x [m], y [m], heading [rad, 0 to 2 pi] of poses (n, >= 3) as kernels keep them."""
+    """Return x [m], y [m], heading [rad, 0 to 2 pi] of poses (n, >= 3) in the form of kernels, (n, 3)."""
     seen = poses[:, :3].astype(np.float64) * [1.0, 1.0, math.tau] + [start.x, start.y, 0.0]
     seen[:, 2] %= math.tau
     return seen
@@ -44,7 +44,7 @@ class TrialBatch:
         n_line: (n,) cells that the line crosses; the start counts.
         n_ends: (n,) cells in which steps end; the start counts.
         n_stalls: (n,) blocked steps.
-        drawn: (n, d) what was drawn for each trial of the numbers in `drawn_names`; none on `jyro`.
+        drawn: (n, d) numbers that were drawn for each trial, in the order of `drawn_names`; none on `jyro`.
         drawn_names: (d,) dotted names of the numbers that are drawn.
     """
 
@@ -57,12 +57,12 @@ class TrialBatch:
 
     @property
     def coverage_line(self) -> NDArray[np.float64]:
-        """(n,) visited share of the reachable cells along the line, 0..1."""
+        """Visited share of the reachable cells along the line, 0..1, (n,)."""
         return np.divide(self.n_line, self.cells.shape[1])
 
     @property
     def coverage_ends(self) -> NDArray[np.float64]:
-        """(n,) visited share of the reachable cells at the ends of steps, 0..1."""
+        """Visited share of the reachable cells at the ends of steps, 0..1, (n,)."""
         return np.divide(self.n_ends, self.cells.shape[1])
 
     def repeated(self, times: int) -> TrialBatch:
@@ -87,20 +87,19 @@ class Trajectory:
     """A trial step by step; row 0 is the start.
 
     Attributes:
-        step_s: How long a step lasts [s].
+        step_s: Duration of a step [s].
         poses: (t + 1, 3) x [m], y [m], heading [rad, counter-clockwise from +x].
         readings: (t + 1, s) distance each sensor measures [m], without noise.
-        inputs: (t, i) what the network saw: largest noisy reading, stall, time and, where it has one, the
-            constant.
-        commands: (t, 2) what it answered: move and turn.
-        stalled: (t + 1,) whether the step was blocked.
+        inputs: (t, i) inputs of the network: largest noisy reading, stall, time and, if it has one, the constant.
+        commands: (t, 2) commands of the network: move and turn.
+        stalled: (t + 1,) True if the step was blocked.
         coverage_line, coverage_ends: Visited share of the reachable cells, 0..1.
         cells: Cells along the line in order of first visit, columns * row + column.
         sensors: (s,) names of the range sensors.
-        wheels: (t + 1, 2) way of the left and the right wheel since the start [m]; no rows on `jyro`.
-        answers: (t + 1, a) what the sensors answered, noise and all, 0..1; on `jyro` without noise.
+        wheels: (t + 1, 2) distance of the left and the right wheel since the start [m]; no rows on `jyro`.
+        answers: (t + 1, a) readings of the sensors with their noise, 0..1; without noise on `jyro`.
         answer_names: (a,) names of these, such as `light.0`.
-        drawn: (d,) what was drawn for the trial, of the numbers in `drawn_names`.
+        drawn: (d,) numbers that were drawn for the trial, in the order of `drawn_names`.
         drawn_names: (d,) dotted names.
         others: The other robots of the trial, if several were in the arena. Coverage and cells are those of all.
     """
@@ -146,7 +145,7 @@ MOST_TEAMS = MAX_INDIVIDUALS // MOST_ROBOTS
 
 @dataclass(frozen=True)
 class NoiseKey:
-    """Which random numbers a trial draws: those of one individual of one run.
+    """The key of a trial's random numbers: those of one individual of one run.
 
     Raises:
         TypeError: One of them is not a whole number.
@@ -172,14 +171,14 @@ class NoiseKey:
 
 
 def counters_of_individuals(key: NoiseKey, individuals: Sequence[int]) -> NDArray[np.uint32]:
-    """(n, 3) the same for individuals in any order, those of the key's run and generation."""
+    """Return the fixed words of random numbers for any individuals of the key's run and generation, (n, 3)."""
     counters = counters_of(key, len(individuals))
     counters[:, 0] = np.array(individuals, np.uint32) << 8 | PURPOSE_NOISE
     return counters
 
 
 def counters_of(key: NoiseKey, n: int = 1) -> NDArray[np.uint32]:
-    """(n, 3) the fixed words of the random numbers of n individuals from that of the key on."""
+    """Return the fixed words of the random numbers of n individuals, starting at that of the key, (n, 3)."""
     counters = np.empty((n, 3), np.uint32)
     counters[:, 0] = np.arange(key.individual, key.individual + n) << 8 | int(PURPOSE_NOISE)
     counters[:, 1] = key.generation << 12 | key.repeat
@@ -188,7 +187,7 @@ def counters_of(key: NoiseKey, n: int = 1) -> NDArray[np.uint32]:
 
 
 def counters_of_robot(counters: NDArray[np.uint32], robot: int) -> NDArray[np.uint32]:
-    """(n, 3) the fixed words of the random numbers of one of several robots in each trial.
+    """Return the fixed words of the random numbers of one of several robots in each trial, (n, 3).
 
     Robot 0 draws what it would draw alone, and robot k what individual k * 1,048,576 further on would.
 
@@ -212,12 +211,12 @@ class Tried(NamedTuple):
     """The output of a platform for n trials.
 
     Attributes:
-        batch: Of all of them.
-        ends: (n, c) uint8 the cells in which steps end, in ascending order; no rows where they were not asked for.
+        batch: Batch of all trials.
+        ends: (n, c) uint8, cells in which steps end, in ascending order; no rows if not requested.
         ended: (n, 2) x and y at the end, from the arena's start [m].
-        trace: Every step; its arrays have no rows where it was not asked for.
-        distances: (t + 1, s, n) from each range sensor to what it sees, without noise, in the unit of
-            `PlatformTrials.distance_unit`; likewise.
+        trace: Every step. Its arrays have no rows if not requested.
+        distances: (t + 1, s, n) distance from each range sensor to what it sees, without noise, in the unit of
+            `PlatformTrials.distance_unit`; no rows if not requested.
     """
 
     batch: TrialBatch
@@ -233,12 +232,12 @@ class PlatformTrials(Protocol):
     One of these serves one thread. What it hands out may be written over by the next call.
 
     Attributes:
-        arena: Where, with what the platform's settings say of its numbers; of what is drawn, the centers.
-        step_s: How long a step lasts [s].
-        n_steps: Of each trial.
+        arena: Arena with the numbers that the platform's settings give. A drawn number has its center.
+        step_s: Duration of a step [s].
+        n_steps: Number of steps of each trial.
         sensors: Names of the readings in a trace.
-        distance_unit: Of the distances in `Tried` [m].
-        drawn_names: Of the numbers that are drawn for trials, runs or the study.
+        distance_unit: Unit of the distances in `Tried` [m].
+        drawn_names: Names of the numbers that are drawn for trials, runs, or the study.
     """
 
     arena: Arena
@@ -261,12 +260,12 @@ class PlatformTrials(Protocol):
         """Trial k is one of network `which[k]` with the random numbers of `counters[k]`.
 
         Args:
-            networks: At least one.
+            networks: Networks, at least one.
             which: (n,) int32.
-            key: Of the random numbers.
+            key: Key of the random numbers.
             counters: (n, 3) uint32, as `counters_of` makes them.
-            ends: Whether to list the cells at the ends of steps.
-            trace: Whether to keep every step.
+            ends: True to list the cells at the ends of steps.
+            trace: True to store every step.
         """
         ...
 

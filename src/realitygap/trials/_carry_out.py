@@ -55,15 +55,15 @@ def carry_out_on_robot(
 
     Args:
         robot: Connected. A simulated one is put at the start, a physical one has been put there.
-        plan: What to do.
-        observe: How much to look at.
-        observer: Who looks.
-        start: Where the robot is put.
-        keep: Given the trial when the robot has driven it, before the observer is asked what it saw; None if a trial
-            without the answer is of no use.
+        plan: Plan of the trial.
+        observe: Observation level.
+        observer: Observer of the robot.
+        start: Start of the robot.
+        keep: Function that gets the trial after the robot has driven it, before the observer is asked for a report.
+            None if a trial without the report is of no use.
 
     Returns:
-        The trial. A robot that fails, or an observer, ends it as LOST: then it has what was seen whole.
+        The trial. If the robot or the observer fails, it ends as LOST and has its completely observed part.
 
     Raises:
         ValueError: Commands that no robot takes.

@@ -20,7 +20,7 @@ class Draws:
     those that are drawn `together` share one random number.
 
     Args:
-        numbers: By dotted name; those that are no distributions are left aside.
+        numbers: Numbers by dotted name. Only distributions are drawn.
     """
 
     def __init__(self, numbers: Mapping[str, float | Distribution]) -> None:
@@ -28,10 +28,10 @@ class Draws:
         self.names = tuple(self._drawn)
 
     def draw(self, key: int, counters: NDArray[np.uint32]) -> NDArray[np.float64]:
-        """(n, d) what is drawn for n trials.
+        """Return the numbers that are drawn for n trials, (n, d).
 
         Args:
-            key: Of the random numbers.
+            key: Key of the random numbers.
             counters: (n, 3) the fixed words of each trial's random numbers.
         """
         words = {per: _counters(counters, per) for per in {drawn.per for drawn in self._drawn.values()}}

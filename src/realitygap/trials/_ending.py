@@ -13,9 +13,9 @@ class EndReason(StrEnum):
     """Why a trial on a robot ended."""
 
     STEP_LIMIT = "step limit"
-    """After its last step."""
+    """The trial ended after its last step."""
     ABORTED = "aborted"
-    """By the operator."""
+    """The operator aborted the trial."""
     LOST = "lost"
     """The robot, or the link to it, failed."""
     INTERRUPTED = "interrupted"
@@ -23,11 +23,11 @@ class EndReason(StrEnum):
     RUNNING = "running"
     """Not ended yet. After a crash, that is all that is known."""
     DRIVEN = "driven"
-    """After its last step; a person has yet to say what they saw of it."""
+    """The robot has driven its last step, and a person has yet to report what they saw."""
 
 
 def is_whole(trial: TrialRecord) -> bool:
-    """Return whether a trial came to its own end, and was not cut off."""
+    """Return whether a trial ended on its own and was not cut off."""
     return trial.end == EndReason.STEP_LIMIT
 
 
@@ -42,7 +42,7 @@ def is_taken_back(trial: TrialRecord) -> bool:
 
 
 def those_that_count(trials: Iterable[TrialRecord]) -> list[TrialRecord]:
-    """Return the trials that came to their own end and were not taken back.
+    """Return the trials that ended on their own and were not taken back.
 
     If trials of one plan were driven again, only the last of them is returned.
     """

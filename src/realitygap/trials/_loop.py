@@ -1,4 +1,4 @@
-"""One trial on one robot: sense, think, act, step by step, until it ends."""
+"""One trial on one robot: the loop of sensing, computing, and driving, until the trial ends."""
 
 from __future__ import annotations
 
@@ -50,18 +50,18 @@ def run_trial(
     sees_end: bool = False,
     channels: Sequence[str] = (),
 ) -> TrialRecord:
-    """Run one trial on a robot. The motors are stopped on every way out.
+    """Run one trial on a robot. Its motors are always stopped at the end.
 
     Args:
-        robot: Connected. A physical robot stands at its start already.
+        robot: Connected robot. A physical robot must already be at its start.
         controller: Makes a command of each observation.
         n_steps: Number of commands in a whole trial, >= 1.
         start: Pose at which a simulated robot is put; the robot's own start if not given.
         begin: Called once the robot is reset.
-        look: Called after each observation, and once the robot stands at the end.
+        look: Function that is called after each observation, and once when the robot is at rest at the end.
         watch: Called at each step, before its command is sent.
         clock: Clock by which steps are timed; the robot's own, or real time, if not given.
-        sees_end: Whether the robot is observed once more after the last command.
+        sees_end: True to observe the robot once more after the last command.
         channels: Names of the sensors that the controller sees besides range sensors.
 
     Returns:
@@ -141,7 +141,7 @@ def drive_trial(
     watch: Watch | None = None,
     sees_end: bool = False,
 ) -> TrialRecord:
-    """Run one trial of a network on a robot that stands at its start.
+    """Run one trial of a network on a robot that is at its start.
 
     The network sees what its interface names. A constant input is part of the network.
 
@@ -151,7 +151,7 @@ def drive_trial(
         n_steps: Number of commands in a whole trial, >= 1.
         interface: Names of the inputs; the paper's largest reading, stall and step / steps if not given.
         watch: Called at each step, before its command is sent.
-        sees_end: Whether the robot is observed once more after the last command.
+        sees_end: True to observe the robot once more after the last command.
 
     Returns:
         The trial. If the robot fails, it ended as LOST.

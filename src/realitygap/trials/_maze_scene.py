@@ -31,9 +31,9 @@ def maze_scene(
     """Return a maze as kernels read it, from the start of its trials.
 
     Args:
-        arena: Its walls, its start and its goal.
-        agent: Whose range finders see the walls.
-        precision: Of the arithmetic.
+        arena: Arena with walls, a start, and a goal.
+        agent: Agent whose range finders see the walls.
+        precision: Precision of the arithmetic.
 
     Raises:
         ValueError: The arena has no goal.

@@ -27,11 +27,11 @@ class Observer(Protocol):
         ...
 
     def look(self) -> None:
-        """Remember where the robot is: before each command, and after the last."""
+        """Record the robot's pose: before each command, and after the last."""
         ...
 
     def poses(self) -> NDArray[np.float64]:
-        """(n, 3) x [m], y [m], heading [rad] at each look of the trial."""
+        """Return x [m], y [m], heading [rad] at each look of the trial, (n, 3)."""
         ...
 
     def cells(self) -> tuple[int, ...]:
@@ -43,10 +43,10 @@ class PortObserver(Observer, Protocol):
     """Observes a robot on a port, which it has to meet and to put at the start of a trial.
 
     Attributes:
-        observes: The most that can be seen with it.
-        identity: Of the robot that was met, as `Target.identity`.
+        observes: Highest observation level of this observer.
+        identity: Identity of the connected robot, as in `Target.identity`.
         who: Enters the scores that it reports.
-        asks: Whether a person says after a trial what they saw.
+        asks: True if a person reports after a trial what they saw.
     """
 
     who: str
@@ -54,12 +54,12 @@ class PortObserver(Observer, Protocol):
 
     @property
     def observes(self) -> Observe:
-        """As above."""
+        """Highest observation level of this observer."""
         ...
 
     @property
     def identity(self) -> str:
-        """As above."""
+        """Identity of the connected robot, as in `Target.identity`."""
         ...
 
     def meet(self, robot: Robot, arena: Arena | None = None) -> None:
@@ -71,7 +71,7 @@ class PortObserver(Observer, Protocol):
         ...
 
     def ready(self) -> None:
-        """Put a robot that was met where it can turn on the spot, unless a person does."""
+        """Put a connected robot at a place where it can turn on the spot, unless a person does."""
         ...
 
     def clock(self, robot: Robot) -> Clock:
@@ -91,12 +91,12 @@ class PortObserver(Observer, Protocol):
         ...
 
     def settle(self, plan: TrialPlan, arena: Arena, trial: TrialRecord) -> TrialRecord | None:
-        """The trial that was under way when the program ended, as far as it counts; None: it is void."""
+        """Return the trial that was running when the program ended, as far as it counts; None if it is void."""
         ...
 
 
 class RobotObserver:
-    """Sees of a simulated robot what its simulation knows: `pose`, `visited_cells` and, where it has them, `encoders`.
+    """An observer of a simulated robot that reads `pose`, `visited_cells` and, if it has them, `encoders`.
 
     Args:
         robot: Whom to look at.
@@ -107,7 +107,7 @@ class RobotObserver:
         self._poses: list[tuple[float, float, float]] = []
 
     def battery_v(self) -> float:
-        """Not known, where the simulation has none [V]."""
+        """Battery voltage [V]; nan if the simulation has none."""
         self._poses = []
         return float(getattr(self._robot, "battery_v", float("nan")))
 
@@ -124,9 +124,9 @@ class RobotObserver:
         self._poses.append(tuple(self._robot.pose))
 
     def poses(self) -> NDArray[np.float64]:
-        """(n, 3) at each look."""
+        """Return the pose at each look, (n, 3)."""
         return np.array(self._poses, np.float64).reshape(-1, 3)
 
     def cells(self) -> tuple[int, ...]:
-        """Those along its line."""
+        """Return the cells along its line."""
         return tuple(self._robot.visited_cells)

@@ -17,9 +17,9 @@ from ._preflight import Preflight
 from ._target import TrialPlan
 
 Verdict = Literal["void", "driven"]
-"""What becomes of a trial that was cut off: driven again, or scored as it is."""
+"""Decision about a trial that was cut off: drive it again, or score it as it is."""
 Led = Literal["go", "redo", "stop"]
-"""What follows once a person was asked for the robot: the trial, the trial before again, or nothing for today."""
+"""Decision of a person who was asked to place the robot: the trial, the trial before again, or a stop for today."""
 
 
 @dataclass(frozen=True)
@@ -27,14 +27,14 @@ class Card:
     """The information on a trial for an operator.
 
     Attributes:
-        trial: Which one.
-        title: What to call it; a code when scoring is blind.
+        trial: Trial of the card.
+        title: Title of the trial; a code if scoring is blind.
         pen: The color to draw with.
         n_steps: Commands in it.
         n_left: Trials still to be driven for the generation, this one included.
-        key: Of the condition's random numbers.
-        arena: Where.
-        observe: How much has to be seen of it; with `readings` nobody counts its cells, and with `track` the score has
+        key: Key of the condition's random numbers.
+        arena: Arena of the trial.
+        observe: Required observation level. With `readings` no person counts its cells, and with `track` the score has
             its path.
     """
 
@@ -55,9 +55,9 @@ class Operator:
     terminal or at a page are subclasses.
 
     Args:
-        observer: Sees the trials from outside; None if nobody does until a person counts cells.
-        in_flight: What becomes of a trial that was cut off.
-        despite_preflight: Whether to drive whatever the pre-flight finds.
+        observer: Observer of the trials; None if a person counts cells later.
+        in_flight: Function that decides about a trial that was cut off.
+        despite_preflight: True to drive even if the pre-flight check finds a problem.
     """
 
     def __init__(
@@ -73,7 +73,7 @@ class Operator:
 
     @property
     def observes(self) -> Observe:
-        """The most that is seen of a trial; its cells if there is no observer."""
+        """Highest observation level of a trial: its cells if there is no observer."""
         return "cells" if self.observer is None else self.observer.observes
 
     def meet(self, robot: Robot) -> None:
@@ -111,14 +111,14 @@ class Operator:
         return False
 
     def drawn(self, card: Card, record: TrialRecord) -> Score | None:
-        """The score of a trial, if that is known as soon as the robot stands; else None, and `enter` will ask."""
+        """Return the score of a trial if it is known when the robot stops; otherwise None, and `enter` will ask."""
         if self.observer is None:
             return None
         self.observer.look()
         return self.observer.score(card.arena)
 
     def enter(self, cards: Sequence[Card], *, is_full: bool) -> Iterable[tuple[int, Score]]:
-        """Number and score of each of these trials, kept one by one; a trial left out is asked for later.
+        """Yield number and score of each of these trials, stored one by one. A trial left out is asked for later.
 
         Called with the trial just driven, and once the sheet is full with all of its trials that are not scored.
         """

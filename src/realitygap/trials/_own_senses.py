@@ -21,7 +21,7 @@ class OwnSenses:
 
     @property
     def has_encoders(self) -> bool:
-        """Whether the robot that was met has any."""
+        """True if the connected robot has encoders."""
         return bool(getattr(self._robot, "has_encoders", False))
 
     def _met(self, robot: Any) -> None:
@@ -37,7 +37,7 @@ class OwnSenses:
         return float(self._robot.volts()) if hasattr(self._robot, "volts") else math.nan
 
     def wheels(self) -> tuple[float, float] | None:
-        """Distance of the left and right wheel since the trial began, seen by the end that is ahead [m]."""
+        """Distance of the left and right wheel since the start of the trial, for the end that is ahead [m]."""
         if not self.has_encoders:
             return None
         left, right = self._robot.wheels()

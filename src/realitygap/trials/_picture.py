@@ -17,7 +17,7 @@ _SCALE = 0.1  # length of the scale [m]
 
 @picture_of.register(Trajectory)
 def path_picture(trajectory: Trajectory) -> Picture:
-    """The path of the robot's center from start to end, with the places where it was blocked and a scale of 0.1 m."""
+    """Return a drawing of the robot's path, with the places where it was blocked and a scale of 0.1 m."""
     xs, ys = trajectory.poses[:, 0], trajectory.poses[:, 1]
     across = max(_LEAST, float(np.ptp(xs)), 1.4 * float(np.ptp(ys))) + 2 * _MARGIN
     up = max(0.5 * _LEAST, float(np.ptp(ys))) + 2 * _MARGIN

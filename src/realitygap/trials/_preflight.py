@@ -1,4 +1,4 @@
-"""Before the first trial: is this the right robot, and is it fit to drive?"""
+"""A check before the first trial: the right robot, and fit to drive."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ class Preflight:
     """The result of a pre-flight check.
 
     Attributes:
-        facts: Name and value of each thing looked at, as a person reads them.
-        problems: What speaks against driving; empty when nothing does.
-        robot: What tells this robot from another: model, fluke and name.
+        facts: Name and value of each checked property, for people.
+        problems: Reasons against driving; empty if there are none.
+        robot: Identification of this robot: model, Fluke, and name.
     """
 
     facts: dict[str, str]
@@ -34,7 +34,7 @@ class Preflight:
     robot: dict[str, str] = field(default_factory=dict)
 
     def to_dict(self) -> dict[str, Any]:
-        """As the ledger keeps it."""
+        """Return the dictionary for the ledger."""
         return {"facts": self.facts, "problems": list(self.problems)}
 
 
@@ -43,7 +43,7 @@ def preflight(robot: Robot, known: Sequence[Mapping[str, str]] = ()) -> Prefligh
 
     Args:
         robot: Connected.
-        known: What the robots of earlier sittings were told by.
+        known: Identifications of the robots of earlier sessions.
 
     Raises:
         RobotError: It does not answer.

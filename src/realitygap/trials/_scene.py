@@ -37,10 +37,10 @@ class SceneTrack:
         times: (t + 1,) [s].
         poses: (t + 1, r, 3) x, y [m], heading [rad, 0 faces +y, counter-clockwise]; in [0, 2 pi) once the
             robot has moved, and as given until then.
-        stalls: (t + 1, r) 1 where the step was blocked.
+        stalls: (t + 1, r) 1 if the step was blocked.
         commands: (t + 1, r, 2) speed [m/s], turn rate [rad/s] used in the step; 0 in row 0.
         energies: (t + 1, r) Jyro's counter: 10000, less one for each step with a command other than 0.
-        readings: For each robot (t + 1, s), all devices in order: distance [m], bumper 0 or 1, light.
+        readings: (t + 1, s) for each robot, readings of all devices in order: distance [m], bumper 0 or 1, light.
     """
 
     times: NDArray[np.float64]
@@ -51,7 +51,7 @@ class SceneTrack:
     readings: list[NDArray[np.float64]]
 
     def write_csv(self, path: Path) -> None:
-        """Write one row per step and robot, numbers in full; an existing file gives way when all is written.
+        """Write a row per step and robot, with full numbers. An existing file is replaced once all is written.
 
         Columns: step, robot, time, x, y, heading, stall, cmd_v, cmd_w, energy, s0, s1, ... A robot with fewer
         sensors than another leaves its last columns empty.

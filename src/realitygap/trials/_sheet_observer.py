@@ -21,7 +21,7 @@ PickCells = Callable[[Arena], Sequence[int] | None]
 """Has a person say which cells a line crosses; None asks again."""
 
 Settle = Callable[[str, bool], Literal["void", "driven"]]
-"""Has a person say what becomes of a trial that was cut off: told what happened, and whether the trial can count."""
+"""A function that asks a person about a trial that was cut off. It gets the reason and whether the trial can count."""
 
 
 class SheetObserver(OwnSenses):
@@ -30,8 +30,8 @@ class SheetObserver(OwnSenses):
     Args:
         pick: Asks the person.
         without_line: Purposes of trials that draw no line.
-        stand: Has the robot put at the start of a trial; None where that was asked before.
-        settle: Asks about a trial that was under way when the program ended; if None, it is void.
+        stand: Function that has the robot put at the start of a trial; None if that was asked before.
+        settle: Function that asks about a trial that was running when the program ended; if None, the trial is void.
     """
 
     who = "person"
@@ -70,14 +70,14 @@ class SheetObserver(OwnSenses):
         self._plan, self._arena = plan, arena
 
     def look(self) -> None:
-        """Nobody sees where it is."""
+        """Do nothing, because the robot's pose is unknown."""
 
     def poses(self) -> NDArray[np.float64]:
         """None."""
         return np.empty((0, 3))
 
     def cells(self) -> tuple[int, ...]:
-        """Those that its line crosses."""
+        """Return the cells that its line crosses."""
         while self._plan is not None and self._plan.purpose not in self._without_line:
             cells = self._pick(self._arena)
             if cells is not None:

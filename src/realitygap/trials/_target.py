@@ -23,13 +23,13 @@ class TrialPlan:
     """The plan of a trial: with a controller, or command by command.
 
     Attributes:
-        start: Where the robot is put; the arena's start when None.
-        genome: The controller; None where commands are given.
-        commands: (t, 2) move and turn, -1..1; no rows where a controller drives.
+        start: Start of the robot. Default: the arena's start.
+        genome: Controller; None if commands are given.
+        commands: (t, 2) move and turn, -1..1; no rows if a controller drives.
         steps: Commands in the trial of a controller.
-        number: Of the trial: on simulated platforms its random numbers are a function of it.
-        purpose: What it is for, such as controller, path, sensors, motion, contact.
-        sees_end: Whether the robot is looked at once more after the last command.
+        number: Number of the trial. On simulated platforms, its random numbers are a function of it.
+        purpose: Purpose, such as controller, path, sensors, motion, contact.
+        sees_end: True to observe the robot once more after the last command.
     """
 
     start: Pose | None = None
@@ -49,16 +49,16 @@ class Target(Protocol):
     """A platform on which trials are run and observed.
 
     Attributes:
-        name: As the user named it, such as `twin:worn-1.toml`.
-        identity: What tells it from others whatever it is called: equal where it is the same twin or emulated robot.
-            Empty where only the name does.
-        label: What figures of its trials say.
-        arena: Where.
-        step_s: How long one command lasts [s].
+        name: Name, as the user gave it, such as `twin:worn-1.toml`.
+        identity: Identity that does not depend on the name: equal for the same twin or emulated robot. Empty if only
+            the name identifies the target.
+        label: Label of its trials in figures.
+        arena: Arena of the trials.
+        step_s: Duration of a command [s].
         n_sensors: Range sensors.
-        observes: The most that can be seen of it.
-        inputs: Names of what networks can see; None where trials are only looked up.
-        is_paced: Whether a command lasts as long as a robot's, so that a simulator can take its pace.
+        observes: Highest observation level.
+        inputs: Names of the inputs that networks can have; None if trials are only looked up.
+        is_paced: True if a command lasts as long as a robot's, so that a simulator can use its duration.
     """
 
     name: str
@@ -71,12 +71,12 @@ class Target(Protocol):
 
     @property
     def inputs(self) -> tuple[str, ...] | None:
-        """As above."""
+        """Names of the inputs that networks can have; None if trials are only looked up."""
         ...
 
     @property
     def identity(self) -> str:
-        """As above."""
+        """Identity that does not depend on the name; empty if only the name identifies the target."""
         ...
 
     def carry_out(
@@ -85,10 +85,11 @@ class Target(Protocol):
         """Run trials; entry k of the result is the observation of plan k.
 
         Args:
-            plans: In this order, where the order can matter.
-            observe: How much to look at; nothing else of the platform comes out.
-            tell: Called with the plan's index after each trial, so that it can be kept. A robot's trial is also told of
-                when it begins, and when the robot has driven and a person is asked; its `end` says which.
+            plans: Plans of the trials. They run in this order if the order can matter.
+            observe: Observation level. The result has no other data of the platform.
+            tell: Function that gets the plan's index and the trial after each trial, so that it can be stored. For a
+                robot, it is also called when a trial begins, and when the robot has driven and a person is asked. The
+                trial's `end` shows which.
 
         Raises:
             RobotError: The robot failed; what `tell` was given is not lost.
@@ -97,11 +98,11 @@ class Target(Protocol):
         ...
 
     def settle(self, plan: TrialPlan, trial: TrialRecord) -> TrialRecord | None:
-        """Return what counts of a trial that was under way when the program ended; None if it is void.
+        """Return the part that counts of a trial that was running when the program ended; None if it is void.
 
         Args:
             plan: The plan of the trial.
-            trial: What was told of it last.
+            trial: Last known state of the trial.
         """
         ...
 
@@ -117,7 +118,7 @@ class Target(Protocol):
 
 
 class RepeatableTarget(ClosedOnExit):
-    """A target whose trials come out the same again, so that one that was cut off is void."""
+    """A target whose trials can be repeated exactly, so that an interrupted one is void."""
 
     def settle(self, plan: TrialPlan, trial: TrialRecord) -> TrialRecord | None:
         """Return None: the trial is void."""
@@ -133,9 +134,9 @@ def check_plans(
     """Raise an error if a target cannot run these plans.
 
     Args:
-        plans: To be carried out.
-        observe: How much of them is to be seen.
-        target: By whom.
+        plans: Plans of the trials.
+        observe: Observation level of the trials.
+        target: Target that runs the trials.
         most_number: The greatest number of a trial.
 
     Raises:

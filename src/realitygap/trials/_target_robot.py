@@ -24,10 +24,10 @@ from ._observer import PortObserver
 from ._target import TellTrial, TrialPlan, check_plans
 
 OnLost = Literal["retry", "skip", "stop"]
-"""What follows a trial in which the link was lost: the same again, once; the next one; or nothing."""
+"""Reaction to a trial in which the link was lost: repeat it once, continue with the next one, or stop."""
 
 LATE = 0.02
-"""How much longer than said most commands of a trial may take before what they took is kept instead."""
+"""Share by which the median duration of commands may exceed the nominal one before it replaces that in the record."""
 
 
 class PacedRobot(ClosedOnExit):
@@ -38,8 +38,8 @@ class PacedRobot(ClosedOnExit):
 
     Args:
         robot: Whom to pace.
-        step_s: How long a command lasts [s].
-        clock: By which.
+        step_s: Duration of a command [s].
+        clock: Clock of the robot.
     """
 
     def __init__(self, robot: Any, step_s: float, clock: Clock) -> None:
@@ -59,19 +59,19 @@ class PacedRobot(ClosedOnExit):
         select_channels(self._robot, names)
 
     def reset(self, pose: Pose | None = None) -> None:
-        """As `Robot.reset`; a robot on a port stays where it was put."""
+        """Reset like `Robot.reset`. A robot on a port stays at its place."""
         self._robot.reset()
         self._lasted = []
 
     def observe(self) -> Observation:
-        """As `Robot.observe`; the first one begins the time."""
+        """Observe like `Robot.observe`. The first observation starts the time."""
         if not self._lasted:
             self._due = self._clock.now()
         seen: Observation = self._robot.observe()
         return seen
 
     def drive(self, command: Command) -> None:
-        """As `Robot.drive`; returns when its time is over, reckoned from the readings before it."""
+        """Drive like `Robot.drive`, and return at the end of the command's time, which includes its readings."""
         self._robot.drive(command)
         self._due += self.step_s
         late = self._clock.now() - self._due
@@ -104,11 +104,11 @@ class RobotTarget(ClosedOnExit):
 
     Args:
         open_robot: Opens the robot.
-        arena: Where.
+        arena: Arena of the trials.
         observer: Places it and says what it drew.
-        name: As the user named it.
-        step_s: How long a command lasts [s].
-        on_lost: What follows a trial in which the link was lost.
+        name: Name of the target, as the user gave it.
+        step_s: Duration of a command [s].
+        on_lost: Reaction to a trial in which the link was lost.
 
     Raises:
         RobotError: The robot cannot be reached, or not observed.
@@ -157,7 +157,7 @@ class RobotTarget(ClosedOnExit):
     def carry_out(
         self, plans: Sequence[TrialPlan], observe: Observe, tell: TellTrial | None = None
     ) -> list[TrialRecord]:
-        """As `Target.carry_out`; `tell` is called with trials that begin, that were driven, and that were lost, too."""
+        """Run trials like `Target.carry_out`. `tell` also gets trials that begin, were driven, or were lost."""
         check_plans(plans, observe, self)
         trials = []
         try:
@@ -221,7 +221,7 @@ class RobotTarget(ClosedOnExit):
         )
 
     def settle(self, plan: TrialPlan, trial: TrialRecord) -> TrialRecord | None:
-        """As `Target.settle`: the observer says."""
+        """Settle a trial like `Target.settle`; the observer decides."""
         return self._observer.settle(plan, self.arena, trial)
 
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""The observer of an emulated robot: a witness, which places the robot and sees where it drives."""
+"""The observer of an emulated robot: a witness, which places the robot and sees its path."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from realitygap.emulator import Witness
 
 PREFLIGHT_POSE = Pose(0.5334, 0.3048, 0.0)
-"""The middle of the paper's arena, where the robot can turn on the spot [m, rad]."""
+"""Middle of the paper's arena, where the robot can turn on the spot [m, rad]."""
 SHOWN_S = 0.05
 """Real time that may pass in one piece [s]: who watches an emulator sees it move, and not jump."""
 
@@ -31,7 +31,7 @@ class WitnessObserver(OwnSenses):
     Trial `number` has the sensor noise of that number, so that a trial comes out the same whenever it is driven.
 
     Args:
-        witness: Of the emulator; that of the robot's port when not given.
+        witness: Witness of the emulator. Default: that of the robot's port.
     """
 
     who = "witness"
@@ -56,7 +56,7 @@ class WitnessObserver(OwnSenses):
         return self._witness
 
     def meet(self, robot: Robot, arena: Arena | None = None) -> None:
-        """Take the witness that comes with the robot's port, unless there is one.
+        """Use the witness of the robot's port, unless there is another one.
 
         Raises:
             RobotError: The robot would count as REAL, there is no witness, or it drives in another arena.
@@ -102,7 +102,7 @@ class WitnessObserver(OwnSenses):
         self._times.append(self.witness.now())
 
     def poses(self) -> NDArray[np.float64]:
-        """(n, 3) at each look."""
+        """Return the pose at each look, (n, 3)."""
         poses = self._poses_at(self._times)
         poses[:, 2] %= math.tau
         return poses
@@ -112,7 +112,7 @@ class WitnessObserver(OwnSenses):
         return self.witness.cells()
 
     def settle(self, plan: TrialPlan, arena: Arena, trial: TrialRecord) -> TrialRecord | None:
-        """None: a trial that is driven again comes out the same."""
+        """Return None, because an emulated trial can be repeated exactly."""
         return None
 
     def score(self, arena: Arena) -> Score:
@@ -134,9 +134,9 @@ class WitnessClock:
     """The time of an emulator in another program, which is held: it passes as we let it, however busy the machine is.
 
     Args:
-        witness: Who tells it, and holds it.
-        real: By which is waited, so that it passes no faster than was asked for.
-        speed: How fast it was to pass: its seconds in one of real time; 0: as fast as it goes.
+        witness: Witness that reports and advances the time.
+        real: Clock of real time, which limits the speed.
+        speed: Seconds of the robot per second of real time; 0: as fast as possible.
     """
 
     def __init__(self, witness: Witness, real: Clock, speed: float) -> None:
@@ -157,7 +157,7 @@ class WitnessClock:
 
 
 def own_witness(robot: Robot) -> Witness | None:
-    """The witness that comes with an emulated robot in this program; None if it has none."""
+    """Return the witness of an emulated robot in this program; None if it has none."""
     port: Witness | None = getattr(getattr(robot, "port", None), "witness", None)
     return port or getattr(robot, "witness", None)
 

@@ -44,7 +44,7 @@ class Grid:
     Attributes:
         x, y: Lower left corner [m].
         cell: Size of a cell [m].
-        columns, rows: How many; at most 256 cells.
+        columns, rows: Number of columns and rows; at most 256 cells.
     """
 
     x: float
@@ -68,19 +68,19 @@ class Grid:
 
 @dataclass(frozen=True)
 class Arena:
-    """Straight walls, a grid of reachable cells, a start, and what else there may be.
+    """Straight walls, a grid of reachable cells, a start, and optional obstacles, lights, floor, and goal.
 
     Attributes:
-        name: What to call it.
+        name: Name of the arena.
         walls: (w, 4) x1, y1, x2, y2 of each wall [m].
         grid: The reachable cells.
-        start: Where every trial begins.
-        obstacles: What stands in it.
-        lights: What shines.
-        floor: What is on the floor.
-        goal: What is to be reached; None where nothing is.
-        vary: Which of its numbers are drawn, by dotted name ("arena.start.x"); the fields have their centers.
-        others: Starts of the other robots, where several are in it at once.
+        start: Start of every trial.
+        obstacles: Obstacles in it.
+        lights: Lights in it.
+        floor: Tape or image on the floor.
+        goal: Goal to reach; None if there is none.
+        vary: Numbers that are drawn, by dotted name ("arena.start.x"). The fields have their centers.
+        others: Starts of the other robots, if several are in it.
     """
 
     name: str
@@ -106,12 +106,12 @@ class Arena:
 
     @property
     def alone(self) -> Arena:
-        """The same arena with one robot."""
+        """Return the same arena with one robot."""
         return replace(self, others=()) if self.others else self
 
     @property
     def segments(self) -> tuple[Segment, ...]:
-        """(w, 4) walls and the straight sides of obstacles [m]."""
+        """Walls and straight sides of obstacles, (w, 4) [m]."""
         return (*self.walls, *(edge for obstacle in self.obstacles for edge in obstacle.edges()))
 
     def straight_walls(self) -> tuple[Segment, ...]:
@@ -156,7 +156,7 @@ class Arena:
         return {PREFIX + name: value for name, value in self._file().numbers().items()}
 
     def with_numbers(self, values: Mapping[str, float | Distribution | Mapping[str, Any]]) -> Arena:
-        """The same arena with other numbers.
+        """Return the same arena with other numbers.
 
         Args:
             values: Numbers, distributions or these as plain values, by dotted name.
@@ -242,8 +242,8 @@ def paper_arena(start: Pose | None = None) -> Arena:
     """The paper's arena: 42 x 24 in inside wooden blocks, cells of 3 in, the inner 12 x 6 reachable.
 
     Args:
-        start: Where trials begin; the paper does not say. Default: (0.1905, 0.1905) m, the center of cell
-            (1, 1), facing +x.
+        start: Start of trials, which the paper does not give. Default: (0.1905, 0.1905) m, the center of cell (1, 1),
+            facing +x.
 
     Source: Rosenzweig & Remy, section 2.1 and Figure 2. Differs: exact inches, where the paper prints
     .609 x 1.07 m.

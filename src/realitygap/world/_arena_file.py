@@ -272,7 +272,7 @@ class ArenaFile(Described):
         return "\n\n".join(parts) + "\n"
 
     def resolved_grid(self) -> GridEntry:
-        """Return the grid; where the file has none, 16 cells along the longer side of the walls, in their middle."""
+        """Return the grid. Default: 16 cells along the longer side of the walls, in their middle."""
         if self.grid is not None:
             return self.grid
         xs = [x for wall in self.wall for x in (wall.x1, wall.x2)] or [self.start.x - 0.5, self.start.x + 0.5]

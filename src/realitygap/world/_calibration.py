@@ -27,7 +27,7 @@ _HEAD = """\
 
 
 class Fitted(Settings):
-    """One parameter that was fitted.
+    """One fitted parameter.
 
     It may stand for several numbers of the robot: `body.length` for the x of all corners, `range.decay` for that of all
     sensors. `Calibration.numbers` and `Calibration.draws` have the robot's own names.
@@ -77,12 +77,12 @@ class Fitted(Settings):
 
     @property
     def is_bound(self) -> bool:
-        """Whether the interval begins at an end of the prior that may cut something off."""
+        """True if an end of the interval is at an end of the prior that may cut off values."""
         return _is_bound(self.model_dump())
 
     @property
     def is_at_end(self) -> bool:
-        """Whether the parameter is identified, and its estimate is at or beyond an end of the prior other than 0."""
+        """True if the parameter is identified, and its estimate is at or beyond an end of the prior other than 0."""
         ways = [self.estimate - self.prior_low if self.prior_low else math.inf]
         ways += [self.prior_high - self.estimate if self.prior_high else math.inf]
         return self.identified and min(ways) < NEAR_END * (self.prior_high - self.prior_low)
@@ -188,5 +188,5 @@ class Calibration(Settings):
 
 
 def is_calibration(values: Mapping[str, Any]) -> bool:
-    """Whether the values of a file are those of a calibration, of this version or another."""
+    """Return whether the values of a file are those of a calibration, of this version or another."""
     return str(values.get("format", "")).startswith("realitygap calibration")

@@ -156,7 +156,7 @@ class CaseDevice(_Part):
 
     @property
     def reads_light(self) -> bool:
-        """Whether this is a light device; all others measure distance."""
+        """True for a light device; all others measure distance."""
         return self.kind in DEVICES and DEVICES[self.kind].get("type") == "light"
 
 
@@ -187,7 +187,7 @@ class CaseController(_Part):
 
 
 class CaseRobot(_Part):
-    """A robot, where it starts, what it senses, and what drives it: commands or a controller."""
+    """A robot with its start, its devices, and its commands or controller."""
 
     name: str
     robot_class: Annotated[str, _one_of("class of robot", ROBOT_BODIES)] = Field(alias="class")
@@ -246,7 +246,7 @@ class Case(_Part):
 
         Args:
             data: The object; keys as in the introduction of this module.
-            source: What to call it in a message.
+            source: Name of the case in messages.
 
         Raises:
             CaseError: Something is missing, of the wrong kind, or contradicts the rest; the message lists

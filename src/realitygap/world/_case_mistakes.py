@@ -47,7 +47,7 @@ EXPECTED: dict[str, tuple[str, str]] = {
 
 
 def shown(value: object) -> str:
-    """A value as it came, in JSON, short enough for a message."""
+    """Return a value in JSON, short enough for a message."""
     if isinstance(value, list) and len(value) > 8:
         return f"a list of {len(value)}"
     text = json.dumps(value, default=repr)
@@ -84,7 +84,7 @@ def explained(error: Any) -> str:
 
 
 def listed(source: str, mistakes: Mapping[str, str]) -> str:
-    """One message for all mistakes."""
+    """Return one message for all mistakes."""
     in_order = sorted(mistakes, key=lambda path: [part.zfill(9) for part in re.split(r"(\d+)", path)])
     lines = [f"  {path}: {mistakes[path]}" for path in in_order]
     if len(lines) > MAX_LISTED:
@@ -101,7 +101,7 @@ def objects(value: object) -> list[tuple[int, Mapping[str, Any]]]:
 
 
 def contradictions(data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    """Mistakes that show only when two values are seen together; values of the wrong kind are passed over."""
+    """Return mistakes that concern two values together. Values of the wrong kind are ignored."""
     steps = data.get("steps")
     n_steps = steps if type(steps) is int else None
     n_columns = 1

@@ -68,12 +68,12 @@ class Distribution(Settings):
 
     @property
     def lowest(self) -> float:
-        """The least that can come."""
+        """Smallest possible value."""
         return self._limited(self._ends()[0])
 
     @property
     def highest(self) -> float:
-        """The most that can come."""
+        """Largest possible value."""
         return self._limited(self._ends()[1])
 
     @property
@@ -93,7 +93,7 @@ class Distribution(Settings):
             uniforms: Any shape, 0 <= u < 1.
 
         Returns:
-            As many numbers, of the same shape: increasing with u (choices in their order).
+            Numbers of the same shape that increase with u (choices in their order).
         """
         u = np.asarray(uniforms, dtype=np.float64)
         if self.uniform is not None:
@@ -128,5 +128,5 @@ class Distribution(Settings):
         return value if self.most is None else min(value, self.most)
 
     def to_dict(self) -> dict[str, object]:
-        """It as plain values, what was left out left out; `Distribution(**values)` is it again."""
+        """Return plain values without defaults; `Distribution(**values)` restores it."""
         return self.model_dump(mode="json", exclude_defaults=True)

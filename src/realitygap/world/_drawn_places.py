@@ -14,10 +14,10 @@ from ._robot_model import RobotModel
 
 START = "arena.start."
 PLACES = (START, "arena.obstacle.", "arena.wall.")
-"""What the names of numbers begin with that can bring a robot's start and something solid together."""
+"""First parts of the names of numbers that can put a robot's start into a solid object."""
 
 N_DRAWN = 64
-"""Draws that are looked at beside the ends: what goes wrong in one trial of twenty stays unseen in one of 25 arenas."""
+"""Number of draws to check in addition to the ends. A fault in one trial of twenty is missed in 1 of 25 arenas."""
 
 TOP = 1.0 - 2.0**-32
 """The largest of the random numbers that draws are made of."""

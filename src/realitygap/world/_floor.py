@@ -43,7 +43,7 @@ class FloorImage:
 
     @cached_property
     def gray(self) -> NDArray[np.uint8]:
-        """(rows, columns) 0 black to 255 white, the top row first."""
+        """Gray values, 0 black to 255 white, the top row first, (rows, columns)."""
         unpacker = zlib.decompressobj()
         data = unpacker.decompress(base64.b85decode(self.pixels), self.rows * self.columns)
         return np.frombuffer(data, np.uint8).reshape(self.rows, self.columns)
@@ -55,7 +55,7 @@ class FloorImage:
 
     @property
     def brightness(self) -> NDArray[np.float32]:
-        """(rows, columns) 0 black to 1 white, the row of lowest y first."""
+        """Brightness, 0 black to 1 white, the row of lowest y first, (rows, columns)."""
         return np.asarray(self.gray[::-1] / np.float32(255), dtype=np.float32)
 
     def at(self, x: float, y: float) -> float:
@@ -72,8 +72,8 @@ class Floor:
 
     Attributes:
         tape: (k, 4) x1, y1, x2, y2 along the middle of each strip [m].
-        tape_width: Of the strips [m].
-        image: What it is printed with.
+        tape_width: Width of the strips of tape [m].
+        image: Image that is printed on the floor.
     """
 
     tape: tuple[Segment, ...] = ()
@@ -87,7 +87,7 @@ class Floor:
         return 1.0 if self.image is None else self.image.at(x, y)
 
     def to_dict(self) -> dict[str, Any]:
-        """It as plain values, without what is not there."""
+        """Return plain values without empty ones."""
         values: dict[str, Any] = {}
         if self.tape:
             values |= {"tape": [list(strip) for strip in self.tape], "tape_width": self.tape_width}

@@ -32,7 +32,7 @@ CARDBOARD = "cardboard"  # what may be put around it, last
 
 
 def robot_names() -> list[str]:
-    """The robots that come with realitygap."""
+    """Return the names of the robots that come with realitygap."""
     alone = _names("robots")
     scribblers = [name for name in alone if name.startswith("scribbler")]
     equipped = [f"{name}-{board}" for name in scribblers for board in BOARDS]
@@ -96,7 +96,7 @@ def load_calibration(path: str | Path) -> Calibration:
 
 
 def read_calibration(robot: str | Path) -> Calibration | None:
-    """The calibration in a file; None where it is the name or the file of a robot, or of nothing.
+    """Return the calibration in a file; None for the name or file of a robot, or an unknown name.
 
     Raises:
         DescriptionError: It is a calibration with mistakes.
@@ -210,7 +210,7 @@ def _turned(values: Mapping[str, Any], origin: str) -> dict[str, Any]:
 
 
 def arena_names() -> list[str]:
-    """The arenas that come with realitygap."""
+    """Return the names of the arenas that come with realitygap."""
     return sorted({"paper", *_names("arenas")})
 
 

@@ -22,7 +22,7 @@ UNITS = {
     "_in": lambda value: value * INCH,
     "_deg": math.radians,
 }
-"""What the end of a key in a file says of its numbers; without one they are in meters or radians."""
+"""Units by the last part of a key in a file. Other keys are in meters or radians."""
 
 ANGLES = (
     "heading",
@@ -33,7 +33,7 @@ ANGLES = (
     "heading_noise_per_m",
     "heading_noise_per_s",
 )
-"""What is an angle; `width` is one of a light sensor and a length of an image."""
+"""Names of angles. `width` is the angle of a light sensor and the length of an image."""
 
 ROWS = {
     "corner": ("x", "y"),
@@ -121,7 +121,7 @@ class Described(Settings):
         return {name: limits for name, (_, limits) in _walk(self)}
 
     def with_numbers(self, values: Mapping[str, float | Distribution | Mapping[str, Any]]) -> Self:
-        """The same with other numbers.
+        """Return the same object with other numbers.
 
         Args:
             values: Numbers, distributions or these as plain values, by dotted name.

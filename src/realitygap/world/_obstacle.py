@@ -14,13 +14,13 @@ Segment = tuple[float, float, float, float]
 
 @dataclass(frozen=True)
 class Obstacle:
-    """A convex outline that stands somewhere: a box, a polygon or, with one corner, a disc.
+    """A convex outline in the arena: a box, a polygon or, with one corner, a disc.
 
     Attributes:
-        x, y: Where its own origin is [m].
-        heading: How far it is turned [rad, counter-clockwise].
-        corners: (c, 2) in its own frame [m], counter-clockwise.
-        radius: By how much it is grown to all sides [m].
+        x, y: Position of its own origin [m].
+        heading: Rotation [rad, counter-clockwise].
+        corners: (c, 2) corners in its own frame [m], counter-clockwise.
+        radius: Radius by which it is grown to all sides [m].
     """
 
     x: float
@@ -31,15 +31,15 @@ class Obstacle:
 
     @property
     def placed(self) -> Points:
-        """(c, 2) its corners in the arena [m], before they are grown."""
+        """Its corners in the arena before they are grown, (c, 2) [m]."""
         return tuple(self._at(x, y) for x, y in self.corners)
 
     def outline(self, *, step: float = math.pi / 16) -> Points:
-        """(p, 2) points around it in the arena [m], rounded corners as short lines."""
+        """Return points around it in the arena, (p, 2) [m]. Rounded corners become short lines."""
         return tuple(self._at(x, y) for x, y in rounded(self.corners, self.radius, step=step))
 
     def edges(self) -> Iterator[Segment]:
-        """Its straight sides in the arena [m], moved out by its radius; a disc has none."""
+        """Return its straight sides in the arena [m], moved out by its radius; a disc has none."""
         corners = self.placed
         for (x1, y1), (x2, y2) in zip(corners, (*corners[1:], corners[0]), strict=True):
             length = math.hypot(x2 - x1, y2 - y1)
@@ -67,8 +67,8 @@ class Light:
     """A light that shines from a point to all sides.
 
     Attributes:
-        x, y: Where [m].
-        strength: What a light sensor with gain 1 reads that looks at it from 1 m.
+        x, y: Position [m].
+        strength: Reading of a light sensor with gain 1 that faces it from 1 m.
     """
 
     x: float
@@ -81,8 +81,8 @@ class Goal:
     """A disc that a robot should reach.
 
     Attributes:
-        x, y: Its center [m].
-        radius: How near counts [m].
+        x, y: Center [m].
+        radius: Distance from the center within which it counts as reached [m].
     """
 
     x: float

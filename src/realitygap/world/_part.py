@@ -127,7 +127,7 @@ def why_no_part(corners: Sequence[tuple[float, float]], radius: float) -> str:
 
 
 def rounded(corners: Sequence[tuple[float, float]], radius: float, *, step: float = math.pi / 16) -> Points:
-    """(p, 2) points around a convex outline grown by a radius [m], counter-clockwise."""
+    """Return points around a convex outline grown by a radius, counter-clockwise, (p, 2) [m]."""
     if not radius:
         return tuple(corners)
     n = len(corners)

@@ -27,12 +27,12 @@ _WHOLE = 1e-6  # a length this near to whole inches was meant so [in]
 def arena_picture(
     arena: Arena, body: Body | RobotModel | None = None, sensors: RangeSensors | None = None
 ) -> Picture:
-    """The arena from above with all that is in it and, where given, the robot at its start, to scale.
+    """Return a drawing of the arena from above, to scale, and of the robot at its start if it is given.
 
     Args:
-        arena: What does not move.
+        arena: Arena to draw.
         body: Outline of the robot, or the robot itself, drawn at the start.
-        sensors: Its rays, drawn as far as they see.
+        sensors: Range sensors, whose rays are drawn up to their reach.
     """
     left, bottom, right, top = extent_of(arena)
     size = max(right - left, top - bottom) / PAPER_WIDTH  # 1 for the paper's arena
@@ -94,7 +94,7 @@ def _model_shapes(model: RobotModel, pose: Pose) -> list[Shape]:
 
 
 def extent_of(arena: Arena) -> tuple[float, float, float, float]:
-    """Left, bottom, right and top of what is to be seen [m]."""
+    """Return left, bottom, right, and top of the visible part [m]."""
     grid = arena.grid
     points = [(x, y) for x1, y1, x2, y2 in arena.walls for x, y in ((x1, y1), (x2, y2))]
     points += [(light.x, light.y) for light in arena.lights]

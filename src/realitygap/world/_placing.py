@@ -1,4 +1,4 @@
-"""Whether a robot fits where it is to start."""
+"""A check that a robot fits at its start."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def check_start(arena: Arena, robot: Body | RobotModel) -> None:
 
 
 def roomiest_starts(arena: Arena, n: int) -> tuple[Pose, ...]:
-    """Return n starts for further robots, each where it has most room; they face as the arena's start does.
+    """Return n starts for further robots, each at the place with the most room, with the heading of the arena's start.
 
     Each is the center of the reachable cell whose distance to walls and obstacles, or half of whose distance to the
     starts before it, whichever is less, is largest. Of several alike it is the first.
@@ -77,7 +77,7 @@ def roomiest_starts(arena: Arena, n: int) -> tuple[Pose, ...]:
 
 
 def is_inside(arena: Arena, x: float, y: float) -> bool:
-    """Whether a point lies inside the walls that enclose the arena; nothing does where none do."""
+    """Return whether a point is inside the walls that enclose the arena; False if no walls enclose it."""
     return _is_within(enclosing_walls(arena.walls), x, y)
 
 

@@ -22,7 +22,7 @@ class RangeSensors:
 
     Attributes:
         mounts: (s, 3) forward [m], left [m] of the center and direction [rad, positive to the left].
-        max_range: The reading where nothing is nearer [m].
+        max_range: Reading if nothing is nearer [m].
     """
 
     mounts: tuple[tuple[float, float, float], ...]

@@ -265,7 +265,7 @@ class SensorKind(NamedTuple):
 
     Attributes:
         ink: Color of their places in pictures.
-        is_signed: Whether they answer -1..1, not 0..1.
+        is_signed: True if they answer -1..1 instead of 0..1.
     """
 
     ink: str
@@ -278,7 +278,7 @@ SENSORS = {
     "line": SensorKind(Ink.PEN3),
     "bump": SensorKind(Ink.PEN4),
 }
-"""Kinds of sensors that are tables of their own in a robot file, in the order of their readings."""
+"""Kinds of sensors that have their own tables in a robot file, in the order of their readings."""
 
 
 class Encoders(Settings):

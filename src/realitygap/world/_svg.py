@@ -74,7 +74,7 @@ class Ink:
 
     Attributes:
         place: Map from the drawing's unit to meters.
-        is_filled: Whether closed shapes are filled, as far as groups set it.
+        is_filled: True if closed shapes are filled, as set by groups.
         kind: Kind of shape that a group sets.
     """
 
@@ -88,13 +88,13 @@ class Shape:
     """A shape of the drawing in the arena.
 
     Attributes:
-        tag: Of its element.
-        kind: What it is.
-        name: What to call it in messages.
-        points: Its corners, or its center [m].
-        closed: Whether the last corner joins the first.
-        radius: Of a circle or of rounded corners [m].
-        values: Its attributes.
+        tag: Tag of its element.
+        kind: Kind of the shape.
+        name: Name in messages.
+        points: Corners, or the center [m].
+        closed: True if the last corner joins the first.
+        radius: Radius of a circle or of rounded corners [m].
+        values: Attributes of the element.
     """
 
     tag: str

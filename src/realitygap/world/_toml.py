@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 DIGITS = 9
-"""Of a number: more than any measurement has, and few enough to be read."""
+"""Maximum number of digits of a number: more than any measurement has, and few enough to parse."""
 
 
 def toml_value(value: Any) -> str:
@@ -40,7 +40,7 @@ def toml_value(value: Any) -> str:
 
 
 def toml_key(key: str) -> str:
-    """A key, in quotes where it needs them."""
+    """Return a key, in quotes if it needs them."""
     is_bare = bool(key) and key.isascii() and all(letter.isalnum() or letter in "_-" for letter in key)
     return key if is_bare else toml_value(key)
 

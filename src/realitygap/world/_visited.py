@@ -15,7 +15,7 @@ class VisitedCells:
     """Cells along a line that grows, columns * row + column, in the order of first visits.
 
     Args:
-        grid: Of cells.
+        grid: Grid of cells.
     """
 
     def __init__(self, grid: Grid) -> None:
@@ -55,7 +55,7 @@ def cells_along(path: NDArray[np.float64], grid: Grid) -> tuple[int, ...]:
 
     Args:
         path: (n, >= 2) x and y of its points [m].
-        grid: Of cells.
+        grid: Grid of cells.
     """
     visited = VisitedCells(grid)
     visited.follow(path[:, :2].tolist())

@@ -92,7 +92,7 @@ CONTROLLERS = ("tanh_layers",)
 
 
 def complete_device(data: Mapping[str, Any]) -> dict[str, Any]:
-    """A device as given in a case, with what its kind knows put in where left out; nothing is checked."""
+    """Return a device of a case with the defaults of its kind; nothing is checked."""
     given = {key: value for key, value in data.items() if value is not None}
     given.setdefault("kind", "light" if given.get("type") == "light" else "range")
     kind = given["kind"]

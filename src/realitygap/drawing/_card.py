@@ -67,7 +67,7 @@ class Table:
         heads: (c,) head of each column.
         rows: (r, c) cells.
         title: Title; needed if it is closed.
-        closed: Whether only the title is shown until a reader opens it.
+        closed: True to show only the title until a reader opens it.
     """
 
     kind: ClassVar[str] = "table"
@@ -87,8 +87,8 @@ class Card:
     """An object as a notebook shows it.
 
     Attributes:
-        title: What it is.
-        labels: SIM, TWIN, EMULATED, or REAL: where its numbers come from.
+        title: Title.
+        labels: Labels of its numbers: SIM, TWIN, EMULATED, or REAL.
         lead: The finding, or the size, in a sentence.
         warning: What a reader must know before using it; empty if there is nothing.
         parts: Tables, pictures, and paragraphs, in order.

@@ -15,7 +15,7 @@ FONT = "'Helvetica Neue', Helvetica, Arial, 'Liberation Sans', 'DejaVu Sans', sa
 Point = tuple[float, float]
 
 NOT_XML = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")
-"""What a user's text may hold and XML may not."""
+"""Characters that a user's text may contain but XML may not."""
 
 
 @dataclass(frozen=True)
@@ -24,10 +24,10 @@ class Line:
 
     Attributes:
         points: (n, 2) in the picture's unit, y upwards.
-        color: of the line; None for none.
-        width: of the line [pt].
+        color: Color of the line; None for none.
+        width: Width of the line [pt].
         dash: lengths of strokes and gaps [pt]; empty for an unbroken line.
-        closed: whether the last point is joined to the first.
+        closed: True to join the last point to the first.
         fill: color of the area, None for none.
     """
 
@@ -46,9 +46,9 @@ class Disc:
     Attributes:
         x, y: center, in the picture's unit.
         radius: [pt].
-        color: of the rim; None for none.
+        color: Color of the rim; None for none.
         fill: color of the area.
-        width: of the rim [pt].
+        width: Width of the rim [pt].
     """
 
     x: float
@@ -64,15 +64,15 @@ class Text:
     """A line of text.
 
     Attributes:
-        x, y: in the picture's unit: where it starts, has its middle or ends, half-way up its height.
-        text: what it says.
+        x, y: Position in the picture's unit: its start, middle, or end, at half of its height.
+        text: Text to show.
         size: [pt].
-        anchor: which part of the text is at x.
+        anchor: Part of the text that is at x.
         shift: further to the right and up [pt].
-        color: of the letters.
-        bold: whether the letters are.
-        halo: whether a rim in the ground's color keeps lines behind it away.
-        upright: whether it runs from below to above.
+        color: Color of the letters.
+        bold: True for bold letters.
+        halo: True for a rim in the background's color, which separates the letters from lines.
+        upright: True for text that runs upwards.
     """
 
     x: float

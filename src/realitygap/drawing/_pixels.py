@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from PIL.ImageDraw import ImageDraw
 
 FINER = 3
-"""How many times finer shapes are drawn than shown, in both directions: that smooths their edges."""
+"""Factor by which shapes are drawn finer than shown, in both directions, which smooths their edges."""
 _POINTS = 480.0
 """Width of the picture for which line widths and letters have the size that they say [pt]."""
 
@@ -26,8 +26,8 @@ def to_image(picture: Picture, width: int = 720) -> Image:
     """The picture as an RGB image, line widths and letters as large in it as `to_svg` has them in 480 pt.
 
     Args:
-        picture: What to draw.
-        width: Of the image [pixels]; its height follows.
+        picture: Picture to draw.
+        width: Width of the image [pixels]; its height follows.
 
     Raises:
         ValueError: The picture's rectangle is empty, or the width is not above 0.

@@ -1,4 +1,4 @@
-"""One robot for Gymnasium."""
+"""A Gymnasium environment with one robot."""
 
 from __future__ import annotations
 
@@ -117,14 +117,14 @@ class RobotEnv(_OneRobot):
     Args:
         kind: coverage, avoid, light, wall or goal.
         task: Settings of the task, as `[task]` of a study has them: `{"cells": "ends"}`, `{"side": "left"}`.
-        controller: What is observed and what actions are, as `[controller]` of a study has it: `{"inputs": ["range.0",
-            "time"], "outputs": ["left", "right"]}`. The actions are move and turn when not given.
+        controller: Inputs and outputs, in the form of `[controller]` of a study: `{"inputs": ["range.0", "time"],
+            "outputs": ["left", "right"]}`. By default, actions are move and turn.
         noise: Level a: each reading is moved by a * U(-1, 1); 0 to 10. 0.1 on `jyro` and none elsewhere when not given.
         platform: The robot: `jyro`, `sim`, `sim:FILE` or `twin:FILE`, a platform, or settings of the default one. That
             is `jyro` for coverage, and for other tasks the Khepera on `sim` of the study of that name.
-        arena: Where, or its settings; the paper's for coverage, otherwise that of the study of that name.
-        dtype: Of observations and actions. With float64 and a platform of double precision, a network that drives the
-            environment drives its trial bit for bit.
+        arena: Arena, or its settings. Default: the paper's for coverage, otherwise that of the study of the same name.
+        dtype: Type of observations and actions. With float64 and a platform of double precision, a network in the
+            environment gives the same trial, bit for bit.
         render_mode: None or rgb_array.
 
     Raises:
@@ -168,7 +168,7 @@ class MazeEnv(_OneRobot):
 
     Args:
         maze: maze-medium or maze-hard.
-        dtype: Of observations and actions.
+        dtype: Type of observations and actions.
         render_mode: None or rgb_array.
 
     Raises:

@@ -55,31 +55,31 @@ class MazeFleet:
 
     @property
     def stalled(self) -> NDArray[np.bool_]:
-        """As `Fleet.stalled`; the agent does not feel it."""
+        """See `Fleet.stalled`. The agent does not sense it."""
         return np.zeros(self._n, np.bool_)
 
     @property
     def ranges(self) -> Array:
-        """As `Fleet.ranges`."""
+        """See `Fleet.ranges`."""
         return 1.0 - self._seen[:, : len(self.agent.rays)]
 
     def number(self, name: str, value: float) -> Array:
-        """As `Fleet.number`: nothing is drawn."""
+        """See `Fleet.number`. No number is drawn here."""
         return np.full(self._n, float(value))
 
     def bounds(self) -> NDArray[Any]:
-        """As `Fleet.bounds`."""
+        """See `Fleet.bounds`."""
         return np.repeat([[0.0], [1.0]], len(self.input_names), axis=1)
 
     def start(self, key: NoiseKey) -> None:
-        """As `Fleet.start`; nothing is random here."""
+        """See `Fleet.start`. Nothing is random here."""
         self._step = 0
         for lanes in self._blocks:
             maze._start(self._scene, lanes)
         self._look()
 
     def step(self, commands: Array) -> None:
-        """As `Fleet.step`; a robot at the exit stays there."""
+        """See `Fleet.step`. A robot at the exit stays there."""
         commands = limited_commands(commands)
         for block, lanes in enumerate(self._blocks):
             part = commands[block * LANES : (block + 1) * LANES]
@@ -94,11 +94,11 @@ class MazeFleet:
         self._seen = self._gathered([lanes.values[: self._neat.n_inputs] for lanes in self._blocks])
 
     def observe(self) -> Array:
-        """As `Fleet.observe`."""
+        """See `Fleet.observe`."""
         return self._seen
 
     def facts(self) -> dict[str, Array]:
-        """As `Fleet.facts`, and `arrived` (n,): 1 if the robot has reached the exit."""
+        """See `Fleet.facts`. The result also has `arrived`, (n,): 1 if the robot has reached the exit."""
         poses = [np.stack([lanes.x, lanes.y, lanes.heading]) for lanes in self._blocks]
         start = self.arena.start
         pose = self._gathered(poses) * [1.0, 1.0, math.tau] + [start.x, start.y, 0.0]
@@ -108,7 +108,7 @@ class MazeFleet:
         return {"pose": pose, "readings": readings, "arrived": (arrived >= 0).astype(np.float64)}
 
     def close(self) -> None:
-        """As `Fleet.close`: nothing is held."""
+        """See `Fleet.close`. There is nothing to close here."""
 
     def _gathered(self, blocks: list[NDArray[Any]]) -> Array:
         """(m, LANES) numbers of each block as (n, m)."""

@@ -1,4 +1,4 @@
-"""One robot in its arena as a picture: walls, cells, path, body and rays."""
+"""A picture of one robot in its arena: walls, cells, path, body, and rays."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def draw_robot(
     """Return a picture (h, w, 3) of one robot from above.
 
     Args:
-        arena: Where.
+        arena: Arena to draw.
         outline: The robot's.
         path: (t, 3) poses up to now: x [m], y [m], heading [rad].
         readings: (s,) distances that its range sensors measure [m].

@@ -13,8 +13,8 @@ ENV_IDS = {
     "realitygap/MazeMedium-v0": ("Maze", {"maze": "maze-medium"}),
     "realitygap/MazeHard-v0": ("Maze", {"maze": "maze-hard"}),
 }
-"""Of each environment the class and its arguments. A version goes up whenever the same commands would give other
-observations or rewards."""
+"""Class and arguments of each environment. A version goes up if the same commands would give other observations or
+rewards."""
 
 
 def register() -> None:

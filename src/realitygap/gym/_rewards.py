@@ -21,7 +21,7 @@ class Reward(Protocol):
         ...
 
     def step(self, fleet: Fleet, commands: Array) -> Array:
-        """(n,) what the step that these commands (n, 2) led to is worth."""
+        """Return the reward of the step that these commands (n, 2) caused, (n,)."""
         ...
 
 
@@ -32,11 +32,11 @@ class CoverageReward:
         self._column = 0 if task.cells == "line" else 1
 
     def start(self, fleet: Fleet) -> None:
-        """As `Reward.start`."""
+        """See `Reward.start`."""
         self._before = fleet.counts[:, self._column].copy()
 
     def step(self, fleet: Fleet, commands: Array) -> Array:
-        """As `Reward.step`."""
+        """See `Reward.step`."""
         now = fleet.counts[:, self._column].copy()
         gained, self._before = now - self._before, now
         reward: Array = np.divide(gained, fleet.arena.grid.n_cells)
@@ -50,10 +50,10 @@ class AvoidReward:
         self._task = task
 
     def start(self, fleet: Fleet) -> None:
-        """As `Reward.start`."""
+        """See `Reward.start`."""
 
     def step(self, fleet: Fleet, commands: Array) -> Array:
-        """As `Reward.step`."""
+        """See `Reward.step`."""
         readings = np.repeat(fleet.ranges.T[None], 2, axis=0)
         scores = np.empty(len(commands))
         every = np.arange(readings.shape[1])
@@ -76,11 +76,11 @@ class WallReward:
         self._walls = wall_outlines(fleet.arena)
 
     def start(self, fleet: Fleet) -> None:
-        """As `Reward.start`."""
+        """See `Reward.start`."""
         self._before = self._poses(fleet)
 
     def step(self, fleet: Fleet, commands: Array) -> Array:
-        """As `Reward.step`."""
+        """See `Reward.step`."""
         now = self._poses(fleet)
         scores = np.empty(len(commands))
         wall_scores(np.stack([self._before, now]), self._walls, self._side, self._within, scores)
@@ -98,12 +98,12 @@ class GrowingReward:
     """The worth of the trial so far, less its worth a step before."""
 
     def start(self, fleet: Fleet) -> None:
-        """As `Reward.start`."""
+        """See `Reward.start`."""
         self._worth = np.zeros(len(fleet.cells))
         self._begin(fleet)
 
     def step(self, fleet: Fleet, commands: Array) -> Array:
-        """As `Reward.step`."""
+        """See `Reward.step`."""
         now = self._worth_now(fleet)
         gained, self._worth = now - self._worth, now
         return gained
@@ -154,7 +154,7 @@ class LightReward(GrowingReward):
 
 
 class GoalReward(GrowingReward):
-    """The share of the way to the goal made good so far; 1 once it was reached.
+    """The share of the distance to the goal that the robot has covered; 1 once it has reached the goal.
 
     Raises:
         TaskError: The arena has no goal, or it is where trials start.

@@ -34,7 +34,7 @@ INPUTS: Mapping[str, tuple[str, ...]] = {
     "wall": _KHEPERA_RANGES,
     "goal": (*_KHEPERA_RANGES, *(f"goal_sector.{k}" for k in range(4))),
 }
-"""What a Khepera sees by default, as in the study of the same name, but for the constant."""
+"""Inputs of a Khepera by default, as in the study of the same name, without the constant."""
 
 KHEPERA: Mapping[str, Mapping[str, Any]] = {
     "avoid": {"steps": 400},
@@ -56,7 +56,7 @@ class Robots:
 
     Attributes:
         n: Number of robots.
-        noise_key: Which random numbers robot 0 draws.
+        noise_key: Key of the random numbers of robot 0.
         step_s: Duration of a command [s].
     """
 
@@ -80,7 +80,7 @@ class Robots:
 
     @property
     def is_over(self) -> bool:
-        """Whether all steps are done."""
+        """True if all steps are done."""
         return self._step == self._fleet.n_steps
 
     def observation_space(self) -> Any:
@@ -131,7 +131,7 @@ class Robots:
         """Drive one command of each robot.
 
         Args:
-            actions: (n, 2) outputs of controllers, limited to -1..1, and 0 where they are no number, as in a trial.
+            actions: (n, 2) outputs of controllers. They are limited to -1..1, and nan counts as 0, as in a trial.
 
         Returns:
             (n, i) observations and (n,) rewards.

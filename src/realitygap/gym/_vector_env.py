@@ -102,7 +102,7 @@ class RobotVectorEnv(_ManyRobots):
 
     Args:
         num_envs: Number of robots, >= 1.
-        kind, task, controller, noise, platform, arena, dtype, render_mode: As of `RobotEnv`.
+        kind, task, controller, noise, platform, arena, dtype, render_mode: Arguments of `RobotEnv`.
 
     Raises:
         TypeError: Something else than such settings.
@@ -141,7 +141,7 @@ class MazeVectorEnv(_ManyRobots):
 
     Args:
         num_envs: Number of agents, >= 1.
-        maze, dtype, render_mode: As of `MazeEnv`.
+        maze, dtype, render_mode: Arguments of `MazeEnv`.
 
     Raises:
         ValueError: There is no such maze.

@@ -43,10 +43,10 @@ class Fleet(Protocol):
     """n robots of one platform in one arena.
 
     Attributes:
-        arena: Where.
-        n_steps: Of a trial.
+        arena: Arena of the robots.
+        n_steps: Number of steps of a trial.
         step_s: Duration of a command [s].
-        outline: Of a robot.
+        outline: Outline of a robot.
         cells: (n, c) uint8; the first of a row are the cells along the line in order of first visit.
     """
 
@@ -58,25 +58,25 @@ class Fleet(Protocol):
 
     @property
     def counts(self) -> NDArray[np.int32]:
-        """(n, 2 or more) cells visited so far: along the line, at the ends of steps."""
+        """Numbers of visited cells, (n, 2 or more): along the line, at the ends of steps."""
         ...
 
     @property
     def stalled(self) -> NDArray[np.bool_]:
-        """(n,) whether the last step was blocked."""
+        """True if the last step was blocked, (n,)."""
         ...
 
     @property
     def ranges(self) -> Array:
-        """(n, s) what the range sensors answer, as tasks see it, 0..1; 1 is near."""
+        """Readings of the range sensors in the form for tasks, 0..1, (n, s); 1 is near."""
         ...
 
     def number(self, name: str, value: float) -> Array:
-        """(n,) a number of each trial: what was drawn for it, or the value if it is not drawn."""
+        """Return a number of each trial, (n,): the drawn number, or the value if it is not drawn."""
         ...
 
     def bounds(self) -> NDArray[Any]:
-        """(2, i) the minimum and the maximum of each input."""
+        """Return the minimum and the maximum of each input, (2, i)."""
         ...
 
     def start(self, key: NoiseKey) -> None:
@@ -88,7 +88,7 @@ class Fleet(Protocol):
         ...
 
     def observe(self) -> Array:
-        """(n, i) the inputs before the next step."""
+        """Return the inputs before the next step, (n, i)."""
         ...
 
     def facts(self) -> dict[str, Array]:

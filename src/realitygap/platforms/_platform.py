@@ -42,12 +42,12 @@ class Opening:
     Attributes:
         name: The platform as the user named it, such as `twin:worn-1.toml`.
         noise: Level a: each reading is moved by a * U(-1, 1), on top of the robot's own noise.
-        key: Of the random numbers of a simulator.
+        key: Key of a simulator's random numbers.
         processes: Number of processes of a twin; None: one for each processor.
         witness: Address of the witness of an emulated robot in another program, HOST:PORT.
-        observer: Who places a robot and reports the cells that it crossed; None: its witness.
+        observer: Observer, who places a robot and reports the cells that it crossed. Default: its witness.
         step_s: Duration of a robot's command [s]; None: that of its platform.
-        on_lost: What follows a trial in which the link to a robot was lost.
+        on_lost: Reaction to a trial in which the link to a robot was lost.
     """
 
     name: str
@@ -61,7 +61,7 @@ class Opening:
 
 
 class Platform(PlatformSettings):
-    """A named way to run trials: its settings, and how it is opened.
+    """A named way to run trials, with its settings.
 
     A subclass needs `name` and either `open_robot`, from which everything else follows, or `open` and `prepare`.
     """
@@ -78,7 +78,7 @@ class Platform(PlatformSettings):
         """Open one robot that is driven step by step.
 
         Args:
-            arena: Where. A simulated robot is placed at its start by `reset`.
+            arena: Arena of the robot. `reset` places a simulated robot at its start.
             noise: Level a.
 
         Raises:

@@ -13,7 +13,7 @@ from ._platform import Platform
 
 
 class PortPlatform(Platform):
-    """A robot that is driven over its own protocol; the port comes from the command line."""
+    """A robot with its own protocol. The port comes from the command line."""
 
     rest: ClassVar[str] = "PORT"
     rest_setting: ClassVar[str] = "port"
@@ -40,7 +40,7 @@ class PortPlatform(Platform):
 
     @property
     def needs_person(self) -> bool:
-        """Whether a person has to place the robot: not if it is emulated in this program."""
+        """True if a person has to place the robot, which is not the case for one that is emulated in this program."""
         return not is_in_this_program(self.port)
 
     def at_port(self, port: str) -> Self:

@@ -33,12 +33,12 @@ def retry_genomes(
 
     Args:
         platform: The robot as simulated.
-        arena: Where.
-        genomes: Of one kind, as in `try_genomes`; they may come from different runs.
+        arena: Arena of the trials.
+        genomes: Genomes of one kind, as in `try_genomes`. They may come from different runs.
         noise: Level a: each reading is moved by a * U(-1, 1).
-        noise_keys: (n,) which random numbers each draws; their own `repeat` gives way to those in `repeats`.
+        noise_keys: (n,) keys of the random numbers. `repeats` replaces their own `repeat`.
         repeats: Repeat 0 is the trial that a study has recorded; any other number is fresh noise.
-        inputs: What the networks see, as in `try_genomes`.
+        inputs: Inputs of the networks, as in `try_genomes`.
         partners: Genomes of the other robots in the arena, of each genome; its own when not given.
 
     Returns:
@@ -75,8 +75,7 @@ def score_genomes(
     """Try genomes as `retry_genomes` does, and score each trial by a task, as an evolution would.
 
     Args:
-        platform, arena, genomes, noise, noise_keys, repeats, inputs, partners: As in
-            `retry_genomes`.
+        platform, arena, genomes, noise, noise_keys, repeats, inputs, partners: Arguments of `retry_genomes`.
         task: The task; no trial is scored if not given.
 
     Returns:

@@ -21,11 +21,11 @@ class PlatformSettings(Settings):
 
     Attributes:
         name: The part before the colon.
-        summary: What it is, in a few words, a colon, and more of them.
-        rest: What users write after the colon, such as FILE; empty if nothing may follow.
+        summary: Summary: a few words, a colon, and details.
+        rest: Part of the name after the colon, such as FILE; empty if there is none.
         rest_setting: The setting that it fills.
-        needs_rest: Whether the name alone is no platform.
-        file_settings: Settings that may name a file beside the study file.
+        needs_rest: True if the name alone is no platform.
+        file_settings: Settings that may name a file next to the study file.
         default_noise: The paper's level a, if a study does not set it.
         takes_noise: Whether level a may be added to its readings.
         is_physical: Whether a person has to place its robots: their trials go into a ledger.
@@ -37,9 +37,9 @@ class PlatformSettings(Settings):
         is_for_studies: Whether a condition of a study can be on it.
         channels: Names of the sensors that its robots have besides range sensors, such as `light.0`.
         takes_several: Whether several robots can be tried in one arena.
-        full_scale: Raw reading that counts as 1 where trials are kept, whatever a study divides readings by.
+        full_scale: Raw reading that counts as 1 in stored trials, independent of a study's scale of readings.
         base_robot: Name of the robot file that calibrations of its robots build on.
-        emulated: How users name an emulated robot in this program, for a platform with robots on ports.
+        emulated: Name of an emulated robot in this program, for a platform with robots on ports.
         version: Version of its code, if another package or a file adds it: results of another version are not extended.
     """
 
@@ -162,7 +162,7 @@ class PlatformSettings(Settings):
         return self
 
     def in_double(self) -> Self:
-        """Return the platform with double precision, where it has a choice."""
+        """Return the platform with double precision, if it has a choice."""
         return (
             self.model_copy(update={"precision": "double"})
             if "precision" in type(self).model_fields

@@ -83,10 +83,10 @@ class SimTarget(RepeatableTarget):
 
     Args:
         platform: The robot as simulated.
-        arena: Where.
+        arena: Arena of the trials.
         noise: The paper's a, on top of the robot's own noise.
-        key: Of the random numbers.
-        name: As the user named it; the platform's when not given.
+        key: Key of the random numbers.
+        name: Name, as the user gave it. Default: the platform's.
     """
 
     label: Label = "SIM"
@@ -109,7 +109,7 @@ class SimTarget(RepeatableTarget):
 
     @cached_property
     def identity(self) -> str:
-        """Equal where the same robot is simulated, whatever random numbers it draws."""
+        """Identity, which is equal for the same simulated robot with any random numbers."""
         settings = json.dumps(self.platform.model_dump(mode="json"), sort_keys=True)
         digest = hashlib.sha256(settings.encode()).hexdigest()[:16]
         return f"{self.platform.name} {digest}, noise {self.noise:g}"
@@ -117,7 +117,7 @@ class SimTarget(RepeatableTarget):
     def carry_out(
         self, plans: Sequence[TrialPlan], observe: Observe, tell: TellTrial | None = None
     ) -> list[TrialRecord]:
-        """As `Target.carry_out`."""
+        """See `Target.carry_out`."""
         check_plans(plans, observe, self, MAX_INDIVIDUALS - 1)
         trials: list[TrialRecord] = []
         for first in range(0, len(plans), TOGETHER):
@@ -128,7 +128,7 @@ class SimTarget(RepeatableTarget):
         return trials
 
     def lasting(self, step_s: float) -> SimTarget:
-        """The same with commands of another length [s].
+        """Return the same target with commands of another duration [s].
 
         Raises:
             ValueError: The duration of a step is always the same.

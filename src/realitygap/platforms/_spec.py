@@ -105,16 +105,16 @@ def open_target(
     """Open a platform by its name for trials one by one.
 
     Args:
-        spec: Its name: `jyro`, `sim`, `sim:FILE` with the file of a robot or a calibration, `twin:FILE`,
+        spec: Name of the target: `jyro`, `sim`, `sim:FILE` with the file of a robot or a calibration, `twin:FILE`,
             `scribbler:PORT`, `thymio:PORT`, `recorded:FILE` with earlier trials, or a platform of another package.
-        arena: Where.
+        arena: Arena of the trials.
         processes: Number of processes of a twin; one for each processor when not given.
         witness: Address of the witness of an emulated robot in another program, HOST:PORT.
-        observer: Who places a robot and reports what it drew, if no witness does.
+        observer: Observer, who places a robot and reports what it drew, if there is no witness.
         step_s: Duration of a robot's command [s]; that of its platform when not given.
-        on_lost: What follows a trial in which the link to a robot was lost.
+        on_lost: Reaction to a trial in which the link to a robot was lost.
         noise: Level a of the paper, on top of a simulated robot's own noise.
-        key: Of the random numbers of a simulator.
+        key: Key of a simulator's random numbers.
         randomize: posterior draws the robot of each trial from the calibration in FILE.
 
     Raises:

@@ -47,7 +47,7 @@ class FollowedRobot:
 
     Args:
         robot: The robot, without such a list.
-        arena: Where.
+        arena: Arena of the robot.
     """
 
     def __init__(self, robot: Any, arena: Arena) -> None:
@@ -68,12 +68,12 @@ class FollowedRobot:
         self._robot.number = number
 
     def reset(self, pose: Pose | None = None) -> None:
-        """As `Robot.reset`."""
+        """See `Robot.reset`."""
         self._robot.reset(pose)
         self._path = [tuple(self._robot.pose)]
 
     def drive(self, command: Command) -> None:
-        """As `Robot.drive`."""
+        """See `Robot.drive`."""
         self._robot.drive(command)
         self._path.append(tuple(self._robot.pose))
 
@@ -89,7 +89,7 @@ class WitnessedRobot:
     Args:
         robot: The robot.
         witness: Its witness.
-        arena: Where.
+        arena: Arena of the robot.
     """
 
     def __init__(self, robot: Any, witness: Witness, arena: Arena) -> None:
@@ -117,7 +117,7 @@ class WitnessedRobot:
 
 
 def choose_number(robot: Any, number: int) -> None:
-    """Choose the noise of the trial that the next `reset` begins, where the robot has a choice."""
+    """Set the number, and so the noise, of the trial that begins with the next `reset`, if the robot has a choice."""
     if hasattr(robot, "number"):
         robot.number = number
 
@@ -128,12 +128,12 @@ def trial_of(
     """Run a trial of a network.
 
     Args:
-        robot: One that knows its pose, with `visited_cells`.
-        arena: Where.
+        robot: Robot with a `pose` and `visited_cells`.
+        arena: Arena of the trial.
         network: The controller.
         interface: Names of the inputs and outputs of the network.
         n_steps: Number of commands.
-        trace: Whether to return every step.
+        trace: True to return every step.
 
     Returns:
         Plain values for JSON: `cells` in order of first visit, `ends`, `stalls` and the last `pose`. With `trace` also
@@ -180,10 +180,10 @@ class StepwiseTrials:
     """A platform in an arena, ready to try networks of one kind one after the other; a `PlatformTrials`.
 
     Args:
-        platform: Its settings.
-        arena: Where.
+        platform: Settings of the platform.
+        arena: Arena of the trials.
         rules: NEAT's rules, of which only the network's kind counts.
-        robot: One that knows its pose, with `visited_cells`.
+        robot: Robot with a `pose` and `visited_cells`.
         inputs: Names of the network's inputs, in order.
         bias_value: Value of the constant input.
     """
@@ -227,7 +227,7 @@ class StepwiseTrials:
         ends: bool = False,
         trace: bool = False,
     ) -> Tried:
-        """As `PlatformTrials.carry_out`; distances are computed from readings, as for a robot."""
+        """See `PlatformTrials.carry_out`. Distances are computed from readings, as for a robot."""
         rows = {
             int(row): Network(networks, int(row), self._rules, self._bias_value).to_dict()
             for row in np.unique(which)
@@ -282,7 +282,7 @@ def trial_number(key: int, counter: NDArray[np.uint32]) -> int:
 
 
 def seen_of(robot: Any) -> dict[str, Any]:
-    """Return what a robot senses and where it is, as plain values for JSON."""
+    """Return the readings and the pose of a robot, as plain values for JSON."""
     seen = robot.observe()
     return {
         "readings": seen.readings,
@@ -299,12 +299,12 @@ class Robots(Protocol):
     Attributes:
         step_s: Duration of a command [s].
         n_sensors: Number of range sensors.
-        readings: (n, s) what the range sensors answer, 0..1.
-        stalled: (n,) whether the last step was blocked.
+        readings: (n, s) readings of the range sensors, 0..1.
+        stalled: (n,) True if the last step was blocked.
         poses: (n, 3) x [m], y [m], heading [rad].
         cells: The cells along each line, in order of first visit.
         channels: Names of the sensors that each has besides range sensors.
-        values: What the selected ones answer.
+        values: Readings of the selected sensors.
     """
 
     step_s: float
@@ -354,7 +354,7 @@ class OwnRobots(TakenRobots):
     """`Robots` in this process.
 
     Args:
-        robots: With `visited_cells`; at least one.
+        robots: Robots with `visited_cells`, at least one.
     """
 
     def __init__(self, robots: Sequence[Any]) -> None:
@@ -363,25 +363,25 @@ class OwnRobots(TakenRobots):
         self.channels = channels_of(robots[0])
 
     def select(self, names: Sequence[str]) -> None:
-        """As `Robots.select`."""
+        """See `Robots.select`."""
         for robot in self._robots:
             select_channels(robot, names)
 
     def begin(self, key: NoiseKey) -> None:
-        """As `Robots.begin`."""
+        """See `Robots.begin`."""
         for robot, counter in zip(self._robots, counters_of(key, len(self._robots)), strict=True):
             choose_number(robot, trial_number(key.key, counter))
             robot.reset()
         self._take([seen_of(robot) for robot in self._robots])
 
     def drive(self, commands: NDArray[np.float64]) -> None:
-        """As `Robots.drive`."""
+        """See `Robots.drive`."""
         for robot, (move, turn) in zip(self._robots, commands.tolist(), strict=True):
             robot.drive(Command(move, turn))
         self._take([seen_of(robot) for robot in self._robots])
 
     def close(self) -> None:
-        """As `Robots.close`."""
+        """See `Robots.close`."""
         for robot in self._robots:
             robot.close()
 
@@ -390,8 +390,8 @@ class StepwiseFleet:
     """A `Fleet` of robots that are asked for their readings one by one.
 
     Args:
-        platform: Its settings.
-        arena: Where.
+        platform: Settings of the platform.
+        arena: Arena of the robots.
         inputs: Names of the inputs.
         robots: Open; they are closed with the fleet, and if it cannot be made.
         n: Number of robots.
@@ -425,24 +425,24 @@ class StepwiseFleet:
 
     @property
     def stalled(self) -> NDArray[np.bool_]:
-        """As `Fleet.stalled`."""
+        """See `Fleet.stalled`."""
         return self._robots.stalled
 
     @property
     def ranges(self) -> Array:
-        """As `Fleet.ranges`, noise included."""
+        """See `Fleet.ranges`. Noise is included."""
         return self._robots.readings
 
     def number(self, name: str, value: float) -> Array:
-        """As `Fleet.number`: nothing is drawn that is known."""
+        """See `Fleet.number`. Drawn numbers are not known here."""
         return np.full(len(self.counts), float(value))
 
     def bounds(self) -> NDArray[Any]:
-        """As `Fleet.bounds`."""
+        """See `Fleet.bounds`."""
         return np.array([(-1.0 if is_signed(name) else 0.0, 1.0) for name in self._inputs]).T
 
     def start(self, key: NoiseKey) -> None:
-        """As `Fleet.start`."""
+        """See `Fleet.start`."""
         self._step = 0
         self._ends: list[set[int]] = [set() for _ in self.counts]
         self._last = np.zeros((len(self.counts), 2))
@@ -450,7 +450,7 @@ class StepwiseFleet:
         self._count()
 
     def step(self, commands: Array) -> None:
-        """As `Fleet.step`."""
+        """See `Fleet.step`."""
         self._last = limited_commands(commands)
         self._robots.drive(self._last)
         self._step += 1
@@ -464,7 +464,7 @@ class StepwiseFleet:
             self.counts[k] = len(cells), len(self._ends[k])
 
     def observe(self) -> Array:
-        """As `Fleet.observe`."""
+        """See `Fleet.observe`."""
         robots = self._robots
         each = zip(
             self.ranges.tolist(), self.stalled.tolist(), robots.values, self._last.tolist(), strict=True
@@ -477,11 +477,11 @@ class StepwiseFleet:
         )
 
     def facts(self) -> dict[str, Array]:
-        """As `Fleet.facts`; distances are computed from readings."""
+        """See `Fleet.facts`. Distances are computed from readings."""
         return {"pose": self._robots.poses.copy(), "readings": self._reach * (1.0 - self.ranges)}
 
     def close(self) -> None:
-        """As `Fleet.close`."""
+        """See `Fleet.close`."""
         self._robots.close()
 
 
@@ -489,11 +489,11 @@ class StepwiseTarget(RepeatableTarget):
     """A simulated robot of this process as a target.
 
     Args:
-        platform: Its settings.
-        arena: Where.
-        robot: One that knows its pose, with `visited_cells`.
+        platform: Settings of the platform.
+        arena: Arena of the trials.
+        robot: Robot with a `pose` and `visited_cells`.
         noise: Level a, with which the robot was opened.
-        name: As the user named it.
+        name: Name, as the user gave it.
     """
 
     observes: Observe = "track"
@@ -518,7 +518,7 @@ class StepwiseTarget(RepeatableTarget):
     def carry_out(
         self, plans: Sequence[TrialPlan], observe: Observe, tell: TellTrial | None = None
     ) -> list[TrialRecord]:
-        """As `Target.carry_out`."""
+        """See `Target.carry_out`."""
         check_plans(plans, observe, self)
         trials = []
         for k, plan in enumerate(plans):

@@ -1,4 +1,4 @@
-"""Networks tried on a platform: many in one call, or one kept step by step."""
+"""Trials of networks on a platform: many in one call, or one with every step."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from realitygap.world import Arena
 from ._platform import Platform
 
 TRACE_BYTES = 8_000_000
-"""Room for the steps that are kept at once [bytes]."""
+"""Memory for stored steps [bytes]."""
 
 
 def open_trials(
@@ -44,11 +44,11 @@ def open_trials(
 
     Args:
         platform: The robot as simulated.
-        arena: Where.
+        arena: Arena of the trials.
         rules: NEAT's, of which only the network's kind counts.
         inputs: Names of what the networks see, in order; the paper's when not given.
         noise: Level a: each reading is moved by a * U(-1, 1); on `sim` on top of the robot's own noise.
-        bias_value: Of the constant input.
+        bias_value: Value of the constant input.
 
     Raises:
         ValueError: The platform cannot give such inputs or takes no such number of robots, or the noise is not a
@@ -93,13 +93,13 @@ def try_genomes(
 
     Args:
         platform: The robot as simulated.
-        arena: Where.
-        genomes: With these inputs and 2 outputs; all of one kind: constant input, activation, recurrence and biases of
-            nodes are the same.
+        arena: Arena of the trials.
+        genomes: Genomes with these inputs and 2 outputs, all of one kind: constant input, activation, recurrence, and
+            biases of nodes are the same.
         noise: Level a: each reading is moved by a * U(-1, 1); on `sim` on top of the robot's own noise.
-        noise_key: Which random numbers; genome k draws those of individual `noise_key.individual` + k.
-        inputs: Names of what the networks see, in order (`Task.inputs`); the paper's obstacle, stall and time when not
-            given, and `bias` where the genomes have a constant input.
+        noise_key: Key of the random numbers. Genome k draws those of individual `noise_key.individual` + k.
+        inputs: Names of the inputs, in order (`Task.inputs`). Default: the paper's obstacle, stall, and time, and
+            `bias` if the genomes have a constant input.
 
     Raises:
         ValueError: No genome, one with other inputs or outputs, genomes of several kinds, noise that is not a
@@ -125,7 +125,7 @@ def trace_genomes(
 
 
 def traced_at_once(trials: PlatformTrials, n_inputs: int, *, is_single: bool) -> int:
-    """Return how many trials fit into `TRACE_BYTES` if every step is kept; at least one block of lanes."""
+    """Return how many trials fit into `TRACE_BYTES` if every step is stored; at least one block of lanes."""
     numbers = 10 + 2 * len(trials.sensors) + n_inputs
     numbers *= trials.arena.n_robots
     blocks = TRACE_BYTES // ((4 if is_single else 8) * numbers * (trials.n_steps + 1) * LANES)
@@ -181,7 +181,7 @@ def trace_genome(
     """Try one genome once and keep every step; arguments and errors as in `try_genomes`.
 
     Args:
-        platform, arena, genome, noise, noise_key, inputs: As in `try_genomes`.
+        platform, arena, genome, noise, noise_key, inputs: Arguments of `try_genomes`.
         partners: Genomes of the other robots in the arena; the same genome when not given.
     """
     which = np.arange(1 + len(partners), dtype=np.int32)[None]

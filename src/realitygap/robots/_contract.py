@@ -23,7 +23,7 @@ class Observation(NamedTuple):
     """The sensor values of a robot at one moment.
 
     Attributes:
-        readings: (s,) of the range sensors from left to right, 0 (nothing in range) to 1 (nearest).
+        readings: (s,) readings of the range sensors from left to right, 0 (nothing in range) to 1 (nearest).
         stalled: Whether the robot is blocked.
         raw: (s,) the same readings in the robot's native units.
         channels: Values of the sensors that `select_channels` chose, by name: `light.K`, `line.K` and `bump.K` from 0

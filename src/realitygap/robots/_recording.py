@@ -151,7 +151,7 @@ class Recording:
     """A recorded session.
 
     Attributes:
-        path: Its file.
+        path: Path of the file.
         header: Description of the robot, the set-up, and the software.
         lines: Exchanges in order: `t` [s], `kind`, `name`, and further values.
         is_whole: Whether the last line is complete. After a crash it may be incomplete, and is left out.

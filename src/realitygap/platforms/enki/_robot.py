@@ -31,7 +31,7 @@ class EnkiRobot(ProgramRobot):
     """A `Robot` that knows its pose.
 
     Args:
-        arena: Where.
+        arena: Arena of the robot.
         step_s: Duration of a command [s].
         speed: Speed of a wheel at full command [m/s].
 

@@ -44,20 +44,20 @@ class JyroFleet:
 
     @property
     def stalled(self) -> NDArray[np.bool_]:
-        """As `Fleet.stalled`."""
+        """See `Fleet.stalled`."""
         return _by_robot(self._fleet.stalled[:, None], self._n)[:, 0] > 0
 
     @property
     def ranges(self) -> Array:
-        """As `Fleet.ranges`, without noise."""
+        """See `Fleet.ranges`. Noise is not included."""
         return 1.0 - _by_robot(self._fleet.fractions, self._n)
 
     def number(self, name: str, value: float) -> Array:
-        """As `Fleet.number`: nothing is drawn."""
+        """See `Fleet.number`. No number is drawn here."""
         return np.full(self._n, float(value))
 
     def bounds(self) -> NDArray[Any]:
-        """As `Fleet.bounds`."""
+        """See `Fleet.bounds`."""
         noise = self._rules.noise[0] * (not self._rules.clip)
         bounds: NDArray[Any] = np.nextafter(
             [-noise, 1 + noise], [-np.inf, np.inf], dtype=noise.dtype
@@ -66,19 +66,19 @@ class JyroFleet:
         return np.stack([shares if name in ("stall", "time") else bounds for name in self._inputs], axis=1)
 
     def start(self, key: NoiseKey) -> None:
-        """As `Fleet.start`."""
+        """See `Fleet.start`."""
         self._key = np.uint64(key.key)
         counters = counters_of(key, self._n)
         start_robots(self._scene, self._rules, self._fleet, counters, self.cells, self.counts)
         self._step = 0
 
     def step(self, commands: Array) -> None:
-        """As `Fleet.step`."""
+        """See `Fleet.step`."""
         step_robots(self._scene, self._fleet, commands, self.cells, self.counts)
         self._step += 1
 
     def observe(self) -> Array:
-        """As `Fleet.observe`."""
+        """See `Fleet.observe`."""
         if self._inputs == PAPER_INPUTS:
             observations = np.empty((self._n, 3))
             observe_robots(self._rules, self._fleet, self._key, self._step, observations)
@@ -92,14 +92,14 @@ class JyroFleet:
         return np.stack([values[name] for name in self._inputs], axis=1)
 
     def facts(self) -> dict[str, Array]:
-        """As `Fleet.facts`."""
+        """See `Fleet.facts`."""
         return {
             "pose": poses_of(_by_robot(self._fleet.poses, self._n), self.arena.start),
             "readings": _by_robot(self._fleet.fractions, self._n) * self.platform.sensor_range,
         }
 
     def close(self) -> None:
-        """As `Fleet.close`: nothing is held."""
+        """See `Fleet.close`. There is nothing to close here."""
 
 
 def _by_robot(blocks: NDArray[Any], n: int) -> Array:
@@ -118,11 +118,11 @@ def noisy_readings(
     """Return what the sensors read in n trials, noise and all.
 
     Args:
-        platform: Its settings.
-        arena: Where.
+        platform: Settings of the platform.
+        arena: Arena of the robots.
         fractions: (t + 1, s, n) distances in units of the sensors' range.
-        counters: (n, 3) of the random numbers.
-        key: Of the random numbers.
+        counters: (n, 3) counters of the random numbers.
+        key: Key of the random numbers.
         noise: Level a.
 
     Returns:

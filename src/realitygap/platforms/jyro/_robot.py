@@ -34,9 +34,9 @@ class JyroRobot(ProgramRobot):
 
     Args:
         platform: The robot as simulated; the paper's when not given.
-        arena: Where; the paper's when not given.
+        arena: Arena. Default: the paper's.
         noise: Level a: each reading is moved by a * U(-1, 1).
-        noise_key: Which random numbers, the same in each trial until `noise_key` is set to others.
+        noise_key: Key of the random numbers, the same in each trial until `noise_key` is changed.
     """
 
     label: Label = "SIM"
@@ -92,7 +92,7 @@ class JyroRobot(ProgramRobot):
 
     @property
     def pose(self) -> Pose:
-        """Its pose."""
+        """Pose of the robot."""
         return Pose(*poses_of(self._fleet.poses[0, :, :1].T, self._placed.start)[0].tolist())
 
     @property

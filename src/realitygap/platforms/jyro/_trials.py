@@ -43,7 +43,7 @@ def _normals(walls: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def is_enclosed(platform: JyroSettings, walls: NDArray[np.float64], heading: float) -> bool:
-    """Whether a trial may take each wall for the whole line through it.
+    """Return whether a trial may treat each wall as the whole line through it.
 
     So it is where the walls close a convex room around the robot at its start, every sensor is mounted
     inside the body's outline, and no step moves the center as far as twice its distance from the nearest edge of
@@ -53,8 +53,8 @@ def is_enclosed(platform: JyroSettings, walls: NDArray[np.float64], heading: flo
 
     Args:
         platform: Body, sensors and speed.
-        walls: (w, 4) ends [m] as seen from the start.
-        heading: Of the start.
+        walls: (w, 4) ends, in the frame of the start [m].
+        heading: Heading of the start.
     """
     ends = [tuple(end) for wall in walls for end in (wall[:2], wall[2:])]
     if (
@@ -124,10 +124,10 @@ def jyro_rules(
     """Return the rules of a trial on `jyro`, in the form that kernels read.
 
     Args:
-        platform: Its settings.
+        platform: Settings of the platform.
         noise: Level a.
-        bias_input: Whether networks have the constant input.
-        bias_value: Its value.
+        bias_input: True if networks have the constant input.
+        bias_value: Value of the constant input.
         inputs: Names of all inputs of networks, in order; the paper's when not given.
 
     Raises:
@@ -156,11 +156,11 @@ class JyroTrials:
 
     Args:
         platform: The robot as simulated.
-        arena: Where.
+        arena: Arena of the trials.
         rules: NEAT's, of which only the network's kind counts.
         inputs: Names of the inputs of networks, in order.
         noise: Level a: each reading is moved by a * U(-1, 1).
-        bias_value: Of the constant input.
+        bias_value: Value of the constant input.
     """
 
     step_s = STEP_S
@@ -198,7 +198,7 @@ class JyroTrials:
         ends: bool = False,
         trace: bool = False,
     ) -> Tried:
-        """As `PlatformTrials.carry_out`."""
+        """See `PlatformTrials.carry_out`."""
         scene, n = self._scene, len(which)
         steps = make_trace(
             scene.heading,

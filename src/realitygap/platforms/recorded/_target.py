@@ -38,10 +38,10 @@ class RecordedTarget(RepeatableTarget):
 
     Args:
         path: A file of observed trials, or a log with a mapping next to it.
-        name: As the user named it.
+        name: Name, as the user gave it.
 
     Attributes:
-        controllers: Of each controller in the file, in the order in which they came, how many trials there are.
+        controllers: Number of trials of each controller in the file, in the order in which they were recorded.
         steps: Commands in most of them.
 
     Raises:
@@ -81,7 +81,7 @@ class RecordedTarget(RepeatableTarget):
     def carry_out(
         self, plans: Sequence[TrialPlan], observe: Observe, tell: TellTrial | None = None
     ) -> list[TrialRecord]:
-        """As `Target.carry_out`; where the robot stood, how long it drove and the number are as they were recorded.
+        """See `Target.carry_out`. Start, duration, and number of a trial are those of the record.
 
         Raises:
             RecordError: There are not so many trials of a controller.

@@ -15,11 +15,11 @@ if TYPE_CHECKING:
 FULL_SCALE = 6400.0
 """The largest reading of a Fluke's obstacle sensors: readings of robots and simulators are shares of it."""
 WATCHDOG_S = 1.0
-"""After so long a silence of the controlling loop the driver stops the motors [s]."""
+"""Time without a command after which the driver stops the motors [s]."""
 
 
 class ScribblerPlatform(PortPlatform):
-    """The Scribbler as the paper drove it; the port comes from the command line.
+    """The Scribbler with the paper's settings. The port comes from the command line.
 
     The robot moves on while a command's time runs, and until the next command. A reading is the raw value of an
     obstacle sensor, divided by `reading_max` and limited to 1; larger is nearer.

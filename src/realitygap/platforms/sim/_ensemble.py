@@ -29,13 +29,13 @@ from ._trials import sim_rules
 CHUNK_BYTES = 32_000_000  # of what a thread keeps at once
 START = ("arena.start.x", "arena.start.y", "arena.start.heading")
 KEPT = ("poses", "readings", "stalled", "wheels", "commands")
-"""What can be kept of every step."""
+"""Values that can be stored for every step."""
 
 Values = Mapping[str, ArrayLike]
 T = TypeVar("T")
 F = TypeVar("F", bound=np.generic)
 Finely = tuple[int, int]
-"""Parts of a step, and of its beginning while the command before goes on."""
+"""Parts of a step, and of its beginning while the previous command still has effect."""
 
 
 @dataclass(frozen=True)
@@ -46,12 +46,12 @@ class Rehearsal:
 
     Attributes:
         poses: (m, k, t + 1, 3) x [m], y [m], heading [rad, -pi to pi]; before the robot was put back to an anchor.
-        readings: (m, k, t + 1, s) of the range sensors, 0..1; row k is from before command k.
-        stalled: (m, k, t + 1) bool, likewise.
-        wheels: (m, k, t + 1, 2) way of the left and the right wheel since the start [m]: as encoders tell it where
-            the robot has some.
+        readings: (m, k, t + 1, s) readings of the range sensors, 0..1. Row k is from before command k.
+        stalled: (m, k, t + 1) bool, True if the robot was blocked, in the same rows.
+        wheels: (m, k, t + 1, 2) distance of the left and the right wheel since the start [m], as measured by encoders
+            if the robot has some.
         commands: (m, k, t, 2) move and turn.
-        cells: (m, k, c) bool, whether each cell of the arena's grid is on the line.
+        cells: (m, k, c) bool, True for each cell of the arena's grid on the line.
     """
 
     poses: NDArray[np.float32]
@@ -63,7 +63,7 @@ class Rehearsal:
 
     @property
     def coverage(self) -> NDArray[np.float64]:
-        """(m, k) visited share of the cells, 0..1."""
+        """Return the visited share of the cells, 0..1, (m, k)."""
         return np.asarray(self.cells.mean(axis=2))
 
 
@@ -74,11 +74,11 @@ class Play:
     Attributes:
         starts: (k, 3) x [m], y [m], heading [rad].
         n_steps: Commands in each.
-        commands: (k, n_steps, 2) move and turn; no rows where controllers drive.
-        genomes: Of each trial, where controllers drive.
-        anchors: (k, n_steps + 1, 3) where the robot is put back to before a step, x not a number for nowhere; no
-            rows for never. Wheels, queue of commands and averages go on: so each command can be predicted from
-            where the robot was seen before it (multiple shooting).
+        commands: (k, n_steps, 2) move and turn; no rows if controllers drive.
+        genomes: Genome of each trial, if controllers drive.
+        anchors: (k, n_steps + 1, 3) poses to which the robot is put back before a step; nan as x for none; no rows for
+            never. The wheels, the queue of commands, and averages continue. So each command can be predicted from the
+            observed pose before it (multiple shooting).
     """
 
     starts: NDArray[np.float64]
@@ -122,10 +122,10 @@ class SimEnsemble:
     Args:
         platform: The robot as simulated, with what no set says otherwise; of what it draws for each trial, each trial
             draws its own.
-        arena: Where.
+        arena: Arena of the trials.
         ranges: Least and most of the numbers that sets will give, by dotted name: so that queues of commands have the
             same length, and what a number can switch on is on, in every call. Numbers outside extend them.
-        threads: At work at once; all processors that may be used when not given.
+        threads: Number of threads. Default: all processors that may be used.
 
     Raises:
         ValueError: A number that robot or arena does not have, or that cannot be so.
@@ -161,16 +161,17 @@ class SimEnsemble:
         keep: Sequence[str] = KEPT,
         same_noise: bool = False,
     ) -> Rehearsal:
-        """The same commands given to all robots.
+        """Simulate the same commands with all robots.
 
         Args:
             starts: (k, 3) x [m], y [m], heading [rad].
             commands: (k, t, 2) move and turn, limited to -1..1.
-            values: Numbers by dotted name, each (m,) or, where trials differ, (m, k); none for one robot as it is.
-            key: Of the random numbers.
-            anchors: As in `Play`.
-            keep: Which of `KEPT`.
-            same_noise: Whether all robots draw the same random numbers; each its own otherwise.
+            values: Numbers by dotted name, each (m,) or, if trials differ, (m, k); none for one robot with its own
+                numbers.
+            key: Key of the random numbers.
+            anchors: Poses to which robots are put back, as in `Play`.
+            keep: Names among `KEPT` of the values to store.
+            same_noise: True if all robots draw the same random numbers. Otherwise each draws its own.
 
         Raises:
             ValueError: Arrays that do not fit, or a number that cannot be so.
@@ -195,7 +196,7 @@ class SimEnsemble:
         keep: Sequence[str] = KEPT,
         same_noise: bool = False,
     ) -> Rehearsal:
-        """The same controllers on all robots: genome j from start j in trial j.
+        """Simulate the same controllers with all robots: genome j from start j in trial j.
 
         Arguments and errors as in `replay`; also of genomes as in `try_genomes`.
         """
@@ -216,7 +217,7 @@ class SimEnsemble:
         keep: Sequence[str] = KEPT,
         same_noise: bool = False,
     ) -> NDArray[F]:
-        """(m, ...) what `of` makes of the trials, some robots at a time: memory stays flat.
+        """Return the summary `of` of the trials, (m, ...), for some robots at a time, so that memory stays constant.
 
         Args:
             play: The trials.

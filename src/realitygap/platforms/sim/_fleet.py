@@ -54,27 +54,27 @@ class SimFleet:
 
     @property
     def counts(self) -> NDArray[np.int32]:
-        """As `Fleet.counts`."""
+        """See `Fleet.counts`."""
         line = self._gathered([room.lanes.n_line[None] for room in self._rooms])
         ends = self._gathered([np.bitwise_count(room.lanes.ends) for room in self._rooms])
         return np.stack([line[:, 0], ends.sum(axis=1)], axis=1).astype(np.int32)
 
     @property
     def stalled(self) -> NDArray[np.bool_]:
-        """As `Fleet.stalled`."""
+        """See `Fleet.stalled`."""
         return self._gathered([room.lanes.stalled[None] for room in self._rooms])[:, 0] > 0
 
     @property
     def ranges(self) -> Array:
-        """As `Fleet.ranges`, noise included."""
+        """See `Fleet.ranges`. Noise is included."""
         return self._gathered([room.lanes.readings[: self._n_range] for room in self._rooms])
 
     def number(self, name: str, value: float) -> Array:
-        """As `Fleet.number`."""
+        """See `Fleet.number`."""
         return self._drawn[name] if name in self._drawn else np.full(self._n, float(value))
 
     def bounds(self) -> NDArray[Any]:
-        """As `Fleet.bounds`: a linear response and what is added to it has no limits unless the platform clips it."""
+        """See `Fleet.bounds`. A linear response with its offset has no limits unless the platform clips it."""
         linear = [not self._clip and sensor.response == "linear" for sensor in self._scene.robot.range]
         bounds = []
         for name in self._inputs:
@@ -85,7 +85,7 @@ class SimFleet:
         return np.array(bounds).T
 
     def start(self, key: NoiseKey) -> None:
-        """As `Fleet.start`."""
+        """See `Fleet.start`."""
         self._key, self._step = np.uint64(key.key), 0
         counters = counters_of(key, self._n)
         drawn = self._draws.draw(key.key, counters)
@@ -98,7 +98,7 @@ class SimFleet:
             start_sim(shape, table, self._rules, self._key, counters[block], n, room, self.cells[block])
 
     def step(self, commands: Array) -> None:
-        """As `Fleet.step`."""
+        """See `Fleet.step`."""
         commands = limited_commands(commands)
         for block, room in zip(self._blocks, self._rooms, strict=True):
             n = block.stop - block.start
@@ -109,19 +109,19 @@ class SimFleet:
         self._step += 1
 
     def observe(self) -> Array:
-        """As `Fleet.observe`."""
+        """See `Fleet.observe`."""
         for room in self._rooms:
             observe(self._scene.shape, self._rules, room.lanes, self._step)
         return self._gathered([room.lanes.values[: len(self._inputs)] for room in self._rooms])
 
     def facts(self) -> dict[str, Array]:
-        """As `Fleet.facts`."""
+        """See `Fleet.facts`."""
         poses = [np.stack(room.lanes.pose[:3]) for room in self._rooms]
         near = [room.lanes.senses.near[: self._n_range] for room in self._rooms]
         return {"pose": poses_of(self._gathered(poses), self.arena.start), "readings": self._gathered(near)}
 
     def close(self) -> None:
-        """As `Fleet.close`: nothing is held."""
+        """See `Fleet.close`. There is nothing to close here."""
 
     def _gathered(self, blocks: list[NDArray[Any]]) -> Array:
         """(m, LANES) numbers of each block as (n, m)."""

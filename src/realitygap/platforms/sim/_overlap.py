@@ -6,7 +6,7 @@ from realitygap.world import Arena, Obstacle
 
 
 def overlaps(part: Obstacle, other: Obstacle) -> bool:
-    """Whether two rounded convex outlines have an area in common, or more than a point where one is a line."""
+    """Return whether two rounded convex outlines share an area, or more than a point if one is a line."""
     if not (_is_beside(part, other) or _is_beside(other, part)):
         return True
     gaps = [other.distance(x, y) - part.radius for x, y in part.placed]

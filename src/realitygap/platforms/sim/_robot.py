@@ -43,9 +43,9 @@ class SimRobot(ProgramRobot):
 
     Args:
         platform: The robot as simulated; the default one when not given.
-        arena: Where; the paper's when not given.
+        arena: Arena. Default: the paper's.
         noise: The paper's a, on top of the robot's own noise.
-        noise_key: Which random numbers, the same in each trial until `noise_key` is set to others.
+        noise_key: Key of the random numbers, the same in each trial until `noise_key` is changed.
     """
 
     label: Label = "SIM"
@@ -127,7 +127,7 @@ class SimRobot(ProgramRobot):
 
     @property
     def readings(self) -> NDArray[np.float64]:
-        """(a,) what all its sensors answer, in the order of `sensors`, 0..1."""
+        """Readings of all its sensors, in the order of `sensors`, 0..1, (a,)."""
         readings: NDArray[np.float64] = self._room.lanes.readings[:, 0].astype(np.float64)
         return readings
 
@@ -139,7 +139,7 @@ class SimRobot(ProgramRobot):
 
     @property
     def distances(self) -> NDArray[np.float64]:
-        """(rays,) to what is nearest along the rays of the range sensors in turn, without noise [m]."""
+        """Distances to the nearest object along the rays of all range sensors in turn, without noise, (rays,) [m]."""
         distances: NDArray[np.float64] = self._room.lanes.distances[:, 0].astype(np.float64)
         return distances
 
@@ -174,7 +174,7 @@ class SimRobot(ProgramRobot):
 
     @property
     def pose(self) -> Pose:
-        """Its pose."""
+        """Pose of the robot."""
         pose = self._room.lanes.pose
         here = np.array([[pose.x[0], pose.y[0], pose.heading[0]]])
         return Pose(*poses_of(here, self._scene.arena.start)[0].tolist())

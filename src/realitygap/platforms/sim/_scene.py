@@ -34,12 +34,12 @@ class SimScene:
     """A robot in an arena, of which some numbers may be drawn.
 
     Attributes:
-        platform: With what settings.
-        robot: As it is with them.
-        arena: Likewise.
-        shape: What all trials share.
-        numbers: Of robot and arena, by dotted name.
-        rows: Where each is in the table.
+        platform: Settings of the platform.
+        robot: Robot with these settings.
+        arena: Arena with these settings.
+        shape: Values that all trials share.
+        numbers: Numbers of robot and arena, by dotted name.
+        rows: Row of each number in the table.
     """
 
     platform: SimSettings
@@ -56,15 +56,15 @@ class SimScene:
 
     @property
     def origin(self) -> tuple[float, float]:
-        """From where trials measure positions: the start [m]."""
+        """Origin of the positions in trials: the start [m]."""
         return self.arena.start.x, self.arena.start.y
 
     def table(self, values: Mapping[str, float | NDArray[np.float64]]) -> NDArray[np.floating]:
-        """(p, n) the numbers of n trials, from values in meters and radians; or (p, 1)."""
+        """Return the numbers of n trials, (p, n), or (p, 1), from values in meters and radians."""
         return sim_table(self.shape, values, REAL[self.platform.precision], self.origin)
 
     def rows_of(self, values: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64]:
-        """(d, n) some rows of the table, in the order of the names."""
+        """Return some rows of the table, in the order of the names, (d, n)."""
         return np.array([in_table(name, value, self.origin) for name, value in values.items()])
 
     @property
@@ -81,7 +81,7 @@ def sim_scene(platform: SimSettings, arena: Arena, inputs: Sequence[str], noise:
 
     Args:
         platform: The robot as simulated.
-        arena: Where; its numbers in `platform.set` are laid over it.
+        arena: Arena. The numbers in `platform.set` replace its own.
         inputs: Names of what networks see, in order.
         noise: The paper's a, on top of the robot's own noise: each range reading is moved by a * U(-1, 1).
 
@@ -144,7 +144,8 @@ N_SECTORS = 4
 """Pie slices around a robot of which it knows whether the goal is in them."""
 
 MOST_PARTS = 1_000
-"""Of a step, in which contact is looked for: a body that goes hundreds of its own sizes in a step is a mistake."""
+"""Maximum number of parts of a step, in each of which contact is checked. More parts mean a body that moves by hundreds
+of its own sizes in a step, which is a mistake."""
 
 IN_PARTS = tuple(
     f"drive.{name}"
@@ -205,7 +206,7 @@ def parts_of_step(
     """Return the parts with contact checks: of a step, and of its start while the previous command continues.
 
     Args:
-        robot: Whose bodies they are.
+        robot: Robot with the bodies.
         most: The largest magnitude of each of the numbers `IN_PARTS`; of any number of robots.
         step_s: Between commands [s].
         halves: The half width of each body, of as many robots [m]; the robot's own when not given.

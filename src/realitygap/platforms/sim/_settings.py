@@ -45,7 +45,7 @@ NOISE = (
 """The last parts of names of numbers that are noise: 0 is none."""
 
 ARENA = "arena."
-"""What the names of an arena's numbers begin with."""
+"""First part of the names of an arena's numbers."""
 
 POSTERIOR = "posterior"
 """The word by which numbers drawn from a calibration are drawn together."""
@@ -238,7 +238,7 @@ class SimSettings(SimulatedPlatform):
 
     @functools.cached_property
     def model(self) -> RobotModel:
-        """The robot with its numbers as set, the contact chosen, and without noise where there is to be none."""
+        """The robot with its numbers as set, with the chosen contact, and without noise if the settings exclude it."""
         robot = self.robot
         if self.contact != "robot":
             contact = robot.contact.model_copy(update={"model": self.contact})
@@ -256,7 +256,7 @@ class SimSettings(SimulatedPlatform):
 
     @property
     def arena_numbers(self) -> dict[str, float | Distribution]:
-        """Those of `set` that are the arena's."""
+        """Numbers of the arena among `set`."""
         return {name: value for name, value in self.set.items() if name.startswith(ARENA)}
 
     @property
@@ -287,7 +287,7 @@ class SimSettings(SimulatedPlatform):
 
     @property
     def spec(self) -> str:
-        """Its name: results store the whole robot, and not the file."""
+        """Its name. Results store the whole robot instead of the file."""
         return self.name
 
     @property
@@ -297,7 +297,7 @@ class SimSettings(SimulatedPlatform):
 
     @property
     def is_randomized(self) -> bool:
-        """Whether its robots are drawn from a calibration."""
+        """True if its robots are drawn from a calibration."""
         return self.randomize == "posterior"
 
     def randomized(self, how: str) -> Self:

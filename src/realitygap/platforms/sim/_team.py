@@ -33,11 +33,11 @@ class SimTeam:
 
     Args:
         platform: The robots as simulated.
-        arena: Where, with the starts of all robots.
+        arena: Arena with the starts of all robots.
         rules: NEAT's, of which only the network's kind counts.
         inputs: Names of what networks see, in order.
         noise: The paper's a, on top of the robots' own noise.
-        bias_value: Of the constant input.
+        bias_value: Value of the constant input.
 
     Raises:
         ValueError: As `team_scenes`.
@@ -84,7 +84,7 @@ class SimTeam:
         ends: bool = False,
         trace: bool = False,
     ) -> Tried:
-        """As `PlatformTrials.carry_out`; `which` may also be (n, r), the network of each robot."""
+        """See `PlatformTrials.carry_out`. `which` may also be (n, r), the network of each robot."""
         n, n_robots = len(which), len(self.scenes)
         n_cells = self.arena.grid.n_cells
         each = np.stack([counters_of_robot(counters, robot) for robot in range(n_robots)])

@@ -26,11 +26,11 @@ class SimTrials:
 
     Args:
         platform: The robot as simulated.
-        arena: Where.
+        arena: Arena of the trials.
         rules: NEAT's, of which only the network's kind counts.
         inputs: Names of what networks see, in order.
         noise: The paper's a, on top of the robot's own noise.
-        bias_value: Of the constant input.
+        bias_value: Value of the constant input.
     """
 
     distance_unit = 1.0
@@ -71,7 +71,7 @@ class SimTrials:
         ends: bool = False,
         trace: bool = False,
     ) -> Tried:
-        """As `PlatformTrials.carry_out`."""
+        """See `PlatformTrials.carry_out`."""
         n, dtype = len(which), REAL[self.scene.platform.precision]
         drawn = self._draws.draw(key, counters)
         hidden_room = networks.place.shape[1]

@@ -26,7 +26,7 @@ from ._scene import sim_scene
 from ._trials import sensor_names, sim_rules
 
 PENS = ("royalblue3", "darkorange3", "seagreen4", "orchid3", "goldenrod3", "firebrick3")
-"""What robots are drawn in when nobody says."""
+"""Default colors of robots."""
 
 _NO_INPUTS = ("time",)  # no network looks at what a driven robot sees
 
@@ -45,12 +45,12 @@ class SimWorld:
     a robot slides along another as along an obstacle that stands firm. One robot alone does what `SimRobot` does.
 
     Args:
-        arena: What does not move; the paper's when not given.
-        step_s: How long a command lasts [s]; as the robot added first has it when not given.
+        arena: Arena. Default: the paper's.
+        step_s: Duration of a command [s]. Default: that of the robot added first.
         seed: Key of all random numbers.
 
     Attributes:
-        robots: In the order of adding.
+        robots: Robots in the order of adding.
         n_steps: Steps since the start or the last reset.
     """
 
@@ -91,13 +91,13 @@ class SimWorld:
         """Put a robot into the world, and get it.
 
         Args:
-            robot: By name, from a file, or with settings.
-            start: Where it begins; the arena's start when not given.
-            name: What `world[name]` finds it by; its kind and a number when not given.
+            robot: Robot by name, from a file, or with settings.
+            start: Start of the robot. Default: the arena's start.
+            name: Name for `world[name]`. Default: its kind and a number.
             color: An X11 name or `#rrggbb`.
-            brain: Called with the robot in each step, when its turn to move has come.
+            brain: Function that is called with the robot in each step, before it moves.
             noise: The paper's a, on top of the robot's own noise.
-            noise_key: Which random numbers; by the world's seed and the robot's number when not given.
+            noise_key: Key of the random numbers. Default: one from the world's seed and the robot's number.
 
         Raises:
             RobotError: The world has begun, the name is taken, or it stands in a wall or another robot.
@@ -148,8 +148,8 @@ class SimWorld:
         """Simulate some steps.
 
         Args:
-            n_steps: How many.
-            brains: Whether robots are asked for commands; otherwise they keep their last commands.
+            n_steps: Number of steps.
+            brains: True to ask robots for commands. Otherwise they keep their last commands.
         """
         self._prepare()
         for _ in range(n_steps):
@@ -213,7 +213,7 @@ class SimWorld:
 
 
 class SimWorldRobot(ProgramRobot):
-    """One robot of a `SimWorld`, made by `SimWorld.add`; also a robot under the contract that a physical one meets.
+    """One robot of a `SimWorld`, made by `SimWorld.add`. It has the contract of a physical robot.
 
     Under the contract `drive` is a command and one step of the whole world, and `reset` is one of the whole world.
 
@@ -223,12 +223,12 @@ class SimWorldRobot(ProgramRobot):
     | turn | -1 | 1 | likewise, to the left |
 
     Attributes:
-        name: What `world[name]` finds it by.
-        color: Of its trail and outline.
-        brain: Called with the robot in each step, when its turn to move has come.
-        start: Where it begins.
-        keep_trail: Whether poses are kept in `trail`.
-        trail: (t, 3) poses since the start, where they are kept.
+        name: Name for `world[name]`.
+        color: Color of its trail and outline.
+        brain: Function that is called with the robot in each step, before it moves.
+        start: Start of the robot.
+        keep_trail: True to store poses in `trail`.
+        trail: (t, 3) poses since the start, if they are stored.
     """
 
     label: Label = "SIM"
@@ -267,7 +267,7 @@ class SimWorldRobot(ProgramRobot):
 
     @property
     def pose(self) -> Pose:
-        """Its pose; the heading lies in -pi..pi."""
+        """Pose of the robot, with the heading in -pi..pi."""
         self.world._prepare()
         return self._pose
 
@@ -277,7 +277,7 @@ class SimWorldRobot(ProgramRobot):
 
     @property
     def stalled(self) -> bool:
-        """Whether it was held up in its last step, as its own kind of stall sensor has it."""
+        """True if it was blocked in its last step, according to its kind of stall sensor."""
         self.world._prepare()
         return bool(self._room.lanes.stalled[0] > 0)
 
@@ -289,7 +289,7 @@ class SimWorldRobot(ProgramRobot):
 
     @property
     def distances(self) -> NDArray[np.float64]:
-        """(rays,) how far the nearest wall or robot is along each ray of the range sensors [m], without noise."""
+        """Distance to the nearest wall or robot along each ray of the range sensors, without noise, (rays,) [m]."""
         self.world._prepare()
         found: NDArray[np.float64] = self._room.lanes.distances[:, 0].astype(np.float64)
         return found
@@ -328,7 +328,7 @@ class SimWorldRobot(ProgramRobot):
         self.world.step()
 
     def stop(self) -> None:
-        """Tell it to stand from the next step on."""
+        """Stop it from the next step on."""
         self.command = Command(0.0, 0.0)
 
     # what the world asks

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class ThymioPlatform(PortPlatform):
-    """A Thymio II on a cable, on a dongle, or in Aseba's playground; the port comes from the command line.
+    """A Thymio II on a cable, on a dongle, or in Aseba's playground. The port comes from the command line.
 
     The robot moves on while a command's time runs, and until the next command, or for 0.2 s. A reading is the raw value
     of an infrared sensor, divided by `reading_max` and limited to 1; larger is nearer. Nobody has tried it on a robot.

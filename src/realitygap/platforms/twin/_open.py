@@ -25,8 +25,8 @@ class SimTwin(SimRobot):
 
     Args:
         model: The twin, whose engine is sim.
-        arena: Where.
-        number: Of the trial: it chooses the noise.
+        arena: Arena of the robot.
+        number: Number of the trial, which selects the noise.
     """
 
     label: Label = "TWIN"
@@ -63,7 +63,7 @@ class SimTwin(SimRobot):
         self._points.append(self.pose)
 
     def path(self) -> NDArray[np.float64]:
-        """(n, 3) x [m], y [m] and heading [rad] at the start and after each command."""
+        """Poses x [m], y [m] and heading [rad] at the start and after each command, (n, 3)."""
         return np.array(self._points)
 
     @property
@@ -82,8 +82,8 @@ def open_twin(model: TwinModel, arena: Arena, *, number: int = 0) -> TwinRobot |
 
     Args:
         model: The twin.
-        arena: Where.
-        number: Of the trial: it chooses the noise.
+        arena: Arena of the robot.
+        number: Number of the trial, which selects the noise.
 
     Raises:
         MissingExtraError: MuJoCo is not installed, and the twin's engine is that.

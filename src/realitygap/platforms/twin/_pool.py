@@ -23,7 +23,7 @@ from realitygap.trials import usable_processors
 from realitygap.world import Arena
 
 TOLD = 2000
-"""Of what a process that ended said last, so many characters are told."""
+"""Maximum number of characters that are reported of the last output of a process that ended."""
 
 
 class _EndedError(Exception):
@@ -31,7 +31,7 @@ class _EndedError(Exception):
 
 
 class TwinProcess:
-    """One process with a twin.
+    """A process with one twin.
 
     Args:
         setup: The request by which the twin is opened.
@@ -49,7 +49,7 @@ class TwinProcess:
         return None if self._process is None else self._process.pid
 
     def start(self) -> Any:
-        """Start it, unless it runs, and open the twin there: what is known of that, or None where it runs already."""
+        """Start it, unless it runs, and open the twin there. Return its properties, or None if it already runs."""
         if self._process is not None:
             return None
         self._said.truncate(0)
@@ -123,15 +123,15 @@ class TwinPool:
     A process that ends is started again, and its trial is tried once more. All end with the pool.
 
     Args:
-        file: Of the twin.
-        arena: Where.
-        processes: How many; one a processor that may be used when not given.
+        file: File of the twin.
+        arena: Arena of the robot.
+        processes: Number of processes. Default: one for each processor that may be used.
 
     Attributes:
-        step_s: How long one command lasts [s].
+        step_s: Duration of a command [s].
         n_sensors: Range sensors of the twin.
         channels: Names of its other sensors.
-        sha256: Of its file as the process that read it found it.
+        sha256: Hash of its file when it was read.
 
     Raises:
         DescriptionError: There is no such file, or it cannot be used.
@@ -165,7 +165,7 @@ class TwinPool:
 
     @property
     def is_closed(self) -> bool:
-        """Whether its processes have ended for good."""
+        """True if its processes have ended for good."""
         return self._closed.is_set()
 
     @property
@@ -174,7 +174,7 @@ class TwinPool:
         return tuple(pid for process in self._processes if (pid := process.pid) is not None)
 
     def ask_all(self, requests: Sequence[Mapping[str, Any]]) -> Iterator[Any]:
-        """The answers, in order, as they come.
+        """Yield the answers in order.
 
         Raises:
             RobotError: A process ended twice in the same trial; the others go on to the end of theirs.

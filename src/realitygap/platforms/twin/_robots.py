@@ -21,18 +21,18 @@ class TwinRobots(TakenRobots):
     Commands from outside drive the trials that `try_genomes` gives networks with these commands and the same key.
 
     Args:
-        file: Of the twin.
-        arena: Where.
+        file: File of the twin.
+        arena: Arena of the robots.
         n: Number of robots.
 
     Attributes:
         step_s: Duration of a command [s].
-        readings: (n, s) what the range sensors answer, 0..1.
-        stalled: (n,) whether the last step was blocked.
+        readings: (n, s) readings of the range sensors, 0..1.
+        stalled: (n,) True if the last step was blocked.
         poses: (n, 3) x [m], y [m], heading [rad].
         cells: The cells along each line, in order of first visit.
         channels: Names of the sensors that each has besides range sensors.
-        values: What the selected ones answer.
+        values: Readings of the selected sensors.
 
     Raises:
         DescriptionError: There is no such file, or it cannot be used.

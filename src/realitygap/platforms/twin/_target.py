@@ -21,10 +21,10 @@ class TwinTarget(RepeatableTarget):
     Trial `number` is the same whenever it is carried out, by whichever process.
 
     Args:
-        file: Of the twin.
-        arena: Where.
-        processes: How many; one a processor that may be used when not given.
-        name: As the user named it; twin:FILE when not given.
+        file: File of the twin.
+        arena: Arena of the trials.
+        processes: Number of processes. Default: one for each processor that may be used.
+        name: Name, as the user gave it. Default: twin:FILE.
 
     Raises:
         DescriptionError: There is no such file, or it cannot be used.
@@ -62,7 +62,7 @@ class TwinTarget(RepeatableTarget):
     def carry_out(
         self, plans: Sequence[TrialPlan], observe: Observe, tell: TellTrial | None = None
     ) -> list[TrialRecord]:
-        """As `Target.carry_out`; on Ctrl-C its processes end."""
+        """See `Target.carry_out`. Ctrl-C ends its processes."""
         check_plans(plans, observe, self)
         requests = [{"do": "carry_out", "plan": plan_to_dict(plan), "observe": observe} for plan in plans]
         trials: list[TrialRecord] = []

@@ -33,7 +33,7 @@ class TwinTrials(StepwiseTrials):
 
 
 def release_twins() -> None:
-    """Keep no twin for the next trials: the processes of those that nobody else uses end."""
+    """Release the twins that are stored for further trials. The processes of unused ones end."""
     with _lock:
         _last.clear()
 

@@ -30,7 +30,7 @@ OPENING = 2 * math.pi / 3
 
 
 class Column(NamedTuple):
-    """One column of a camera's picture.
+    """A column of a camera's picture.
 
     Attributes:
         color: Color of the wall or robot, as given.
@@ -118,7 +118,7 @@ class Camera(Device):
 
     @property
     def image(self) -> NDArray[np.uint8]:
-        """(height, width, 3) red, green and blue, 0 to 255."""
+        """Red, green and blue, 0 to 255, (height, width, 3)."""
         from PIL import Image, ImageDraw
 
         image = Image.new("RGB", (self.width, self.height), "white")
@@ -127,7 +127,7 @@ class Camera(Device):
 
     @property
     def pixels(self) -> NDArray[np.float32]:
-        """(height, width, 3) red, green and blue, 0 to 1."""
+        """Red, green and blue, 0 to 1, (height, width, 3)."""
         return self.image.astype(np.float32) / np.float32(255)
 
     def _paint(self, draw: ImageDraw) -> None:
@@ -200,7 +200,7 @@ class DepthCamera(Camera):
 
     Args:
         max_range: Distance at which bars are black [m].
-        width, height, field: As for `Camera`.
+        width, height, field: Arguments of `Camera`.
 
     Source: Jyro 0.3.2. Differs: as `Camera`. Its key is `robot["depth-camera"]`, so that a robot can have both cameras.
     """

@@ -97,7 +97,7 @@ class Gripper(Device):
 
     @property
     def readings(self) -> NDArray[np.float64]:
-        """(5,) first and second beam broken, closed, open, moving: 0 or 1."""
+        """First and second beam broken, closed, open, moving, each 0 or 1, (5,)."""
         return np.array([*self.beams, self.is_closed, self.is_open, self.is_moving], np.float64)
 
     def read(self) -> None:

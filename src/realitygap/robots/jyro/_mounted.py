@@ -21,8 +21,8 @@ class MountedSensors(Device):
         groups: Names of groups of sensors.
 
     Attributes:
-        mounts: (s, 3) as given.
-        max_range: As given [m].
+        mounts: (s, 3) mounts of the sensors.
+        max_range: Largest range [m].
         groups: Indices of the sensors of each group, by name.
     """
 
@@ -45,7 +45,7 @@ class MountedSensors(Device):
 
     @property
     def readings(self) -> NDArray[np.float64]:
-        """(s,) in the order of the mounts; a copy."""
+        """Readings in the order of the mounts, (s,); a copy."""
         return self._readings.copy()
 
     def group(self, name: str) -> NDArray[np.float64]:

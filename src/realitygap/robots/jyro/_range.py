@@ -50,7 +50,7 @@ class RangeSensor(MountedSensors):
 
     @property
     def nearness(self) -> NDArray[np.float64]:
-        """(s,) the readings from 0, nothing within range, to 1, touching."""
+        """Nearness from 0, nothing within range, to 1, touching, (s,)."""
         return 1.0 - self._readings / self.max_range
 
     def read(self) -> None:
@@ -99,7 +99,7 @@ class Bumper(RangeSensor):
 
     @property
     def nearness(self) -> NDArray[np.float64]:
-        """(s,) the readings: 1 touching."""
+        """Nearness, 1 if touching, (s,)."""
         return self.readings
 
     def read(self) -> None:

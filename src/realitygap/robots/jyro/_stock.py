@@ -57,7 +57,7 @@ class _Sonars(RangeSensor):
 
 
 class PioneerFrontSonar(_Sonars):
-    """One sonar in the center that looks ahead."""
+    """A sonar in the center that faces ahead."""
 
     _groups: ClassVar[_Groups] = {"all": (0,)}
 
@@ -121,8 +121,8 @@ class MyroLightSensors(LightSensor):
     """Two light sensors at the front of a Scribbler, to the left and the right.
 
     Args:
-        max_range: Where linear light has faded [m].
-        mode: How light fades.
+        max_range: Distance at which linear light has faded [m].
+        mode: Law by which light fades.
 
     Source: Jyro 0.3.2. Differs: there making one fails, because its range is not defined; here the range is given.
     """

@@ -157,12 +157,12 @@ class JyroWorld:
 
     @property
     def walls(self) -> tuple[tuple[float, float, float, float], ...]:
-        """(w, 4) x1, y1, x2, y2 of all walls [m], those of boxes too."""
+        """Walls x1, y1, x2, y2, including those of boxes, (w, 4) [m]."""
         return tuple(self._walls)
 
     @property
     def wall_colors(self) -> tuple[str, ...]:
-        """(w,) the color of each wall."""
+        """Color of each wall, (w,)."""
         return tuple(self._wall_colors)
 
     def add(self, robot: AnyRobot) -> AnyRobot:
@@ -360,7 +360,7 @@ class JyroWorld:
 
         Args:
             path: The file; an existing one is replaced.
-            width: Of a .png [pixels].
+            width: Width of a .png [pixels].
 
         Raises:
             ValueError: The path ends in something else.
@@ -373,9 +373,9 @@ class JyroWorld:
 
         Args:
             path: Ends in .gif.
-            n_steps: How many steps.
+            n_steps: Number of steps.
             every: Steps from one picture to the next.
-            width: Of the movie [pixels].
+            width: Width of the movie [pixels].
 
         Raises:
             ValueError: The path ends in something else, or a number is below 1.

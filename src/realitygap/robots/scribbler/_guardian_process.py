@@ -76,7 +76,7 @@ def stop_motors(port: int, stop: bytes = b"") -> bool:
         stop: Bytes to send three times to a robot that does not answer them. Empty for a Scribbler.
 
     Returns:
-        Whether the robot answered, or whether all bytes were sent.
+        True if the robot answered, or if all bytes were sent.
     """
     if stop:
         return _send_often(port, stop)

@@ -109,7 +109,7 @@ class Exchange(NamedTuple):
         time_s: Time of sending, by the port's clock [s].
         took_s: Time until the answer was complete, or given up [s].
         name: Name of the command.
-        sent: Its bytes.
+        sent: Bytes of the command.
         answered: The bytes that arrived.
         outcome: "ok", or the error.
     """

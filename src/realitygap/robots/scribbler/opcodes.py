@@ -232,4 +232,4 @@ FLUKE_2_COMMANDS: dict[Op, FlukeLengths] = {
     Op.ENABLE_PAN: FlukeLengths(2, 0),
     Op.SET_WINDOW: FlukeLengths(11, 0),
 }
-"""Likewise of the Fluke 2, whose windows have coordinates of two bytes."""
+"""Commands of the Fluke 2, whose windows have coordinates of two bytes."""

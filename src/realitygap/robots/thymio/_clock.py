@@ -13,9 +13,9 @@ from ._program import TICK_S
 CLOCK_STANDS_S = 2.0
 """Time after which a clock on board that does not advance counts as stopped [s]."""
 UNREAD_S = 0.25
-"""Robot time for which the clock runs on without a reading while somebody waits [s]."""
+"""Robot time for which the clock advances without a reading while a program waits [s]."""
 PAUSE_S = 1.0
-"""Time without a reading after which the clock's origin may move, so that it need not stand [s]."""
+"""Time without a reading after which the clock's origin may move, so that it can advance [s]."""
 SHORTEST_S = 1e-6
 """Time that is too short to wait for: rounding may hide that it passed [s]."""
 RATE_S = 2.0
@@ -40,7 +40,7 @@ class BoardClock:
         self._anchor: tuple[float, float] | None = None
 
     def note(self, ticks: int) -> None:
-        """Take a reading of the 16-bit counter that has just come.
+        """Process a reading of the 16-bit counter.
 
         Raises:
             RobotError: The counter stands still.

@@ -51,7 +51,7 @@ MOST_PROGRAM_WORDS = 200
 Span = tuple[int, int]
 """Offset and number of words."""
 Tell = Callable[[str, bytes, bytes], None]
-"""Called with what happened, the bytes sent, and the bytes that came."""
+"""A function that gets an event, the bytes sent, and the bytes received."""
 
 
 def open_port(name: str) -> Any:
@@ -96,8 +96,8 @@ class Description:
     """A robot as it describes itself.
 
     Attributes:
-        name: Its name, such as thymio-II.
-        node: Its number.
+        name: Name, such as thymio-II.
+        node: Number of the node.
         variables: Offset and number of words of each variable, by name.
         events: Names of its events.
         first_free: Offset of the first word after its variables.
@@ -122,7 +122,7 @@ class Link:
 
     Args:
         port: An open port of pyserial.
-        name: Its name, for messages.
+        name: Name for messages.
     """
 
     def __init__(self, port: Any, name: str) -> None:
@@ -311,7 +311,7 @@ class Link:
             self._send(messages.control(Kind.RESET, robot.node))
 
     def send(self, data: bytes) -> None:
-        """Send messages that nobody answers."""
+        """Send messages that have no answer."""
         with self.lock:
             self._send(data)
 

@@ -51,8 +51,8 @@ class Message(NamedTuple):
 
     Attributes:
         source: Number of the node that sent it; 0 for a host.
-        kind: Its type, one of `Kind` or a user event.
-        payload: Its bytes, at most 516.
+        kind: Type: one of `Kind` or a user event.
+        payload: Bytes of the message, at most 516.
     """
 
     source: int
@@ -99,7 +99,7 @@ class Decoder:
 
     @property
     def is_empty(self) -> bool:
-        """Whether no byte waits for the rest of its message."""
+        """True if no byte waits for the rest of its message."""
         return not self._held
 
     def next(self) -> Message | None:

@@ -12,7 +12,7 @@ from realitygap.robots.scribbler._ports import PortGuess
 
 VENDOR = 0x0617
 PRODUCTS = {0x000A: "a Thymio", 0x000C: "a Thymio's dongle"}
-"""What is behind a USB device of the vendor, by its product number. Source: epfl-mobots/thymio-python."""
+"""Devices of the vendor, by USB product number. Source: epfl-mobots/thymio-python."""
 _PSEUDO_TERMINAL = re.compile(
     r"/dev/(pts/\d+|pty\w+)$" if sys.platform != "darwin" else r"/dev/(ttys\d+|pty\w+)$"
 )
@@ -37,7 +37,7 @@ def find_ports() -> list[PortGuess]:
 
 
 def label_of(name: str, variables: Any) -> Label:
-    """Return REAL for a robot on a serial device that describes a battery, else EMULATED."""
+    """Return REAL for a robot on a serial device that describes a battery, otherwise EMULATED."""
     name = port_name(name)
     is_device = "://" not in name and not _PSEUDO_TERMINAL.match(os.path.realpath(name))
     return "REAL" if is_device and "_vbat" in variables else "EMULATED"

@@ -33,7 +33,7 @@ from realitygap.errors import RobotError
 DRIVE = 0
 """User event that sets both motors, for a life in ticks; its last value is the sum of the others and `CHECK`."""
 CHECK = 1234
-"""What the sum of a command's values begins with; a command that is moved by a byte has another sum."""
+"""First value of the check sum of a command's values. A command that is shifted by a byte has another sum."""
 TICK_S = 0.02
 """Duration of a tick of the program's clock [s]."""
 OWN = ("life", "halted", "taps", "left_sum", "right_sum", "clock")

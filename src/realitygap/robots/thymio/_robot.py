@@ -35,8 +35,9 @@ MOTOR_S = 0.01
 LIFE_MARGIN_S = 0.2
 """Time for which a command outlives its step, so that the next one finds the motors running [s]."""
 EMULATED_MARGIN_S = 0.06
-"""The same in a playground, two of its steps [s]: a robot that stands for a moment loses no speed there, and a delay of
-this program would take it far if its time is faster than ours."""
+"""Time for which a command outlives its step in a playground, two of the playground's steps [s]. A robot that stops for
+a moment loses no speed there. A longer time would move it far during a delay of this program if its time is faster than
+real time."""
 RENEW_S = 0.2
 """Time after which a long command is sent again [s]."""
 START_S = 2.0
@@ -57,7 +58,7 @@ class ThymioInfo:
 
     Attributes:
         name: Name in its description.
-        node: Its number on the network.
+        node: Number on the network.
         firmware: Version of its firmware.
         port: Port that it answers on.
         label: REAL or EMULATED.
@@ -106,9 +107,9 @@ class Thymio:
         port: Name of its port, with or without `thymio:` before it; or an open port of pyserial.
         step_s: Duration of a command of `drive` [s].
         full_speed: Target of the wheels for a command of 1, at most 1000.
-        reading_max: Infrared reading that is as near as can be told.
+        reading_max: Infrared reading of the nearest distance that the sensor can measure.
         ground_white, ground_black: Readings of the ground sensors on a white and on a black floor.
-        record: A new file for all that is said, message by message.
+        record: New file for all messages, one by one.
 
     Raises:
         RobotError: The port cannot be opened, no Thymio answers, or several do.
@@ -116,7 +117,7 @@ class Thymio:
 
     n_sensors = 7
     lasts_s = 0.0
-    """Least time for which a command has to last, where somebody else waits for its end [s]."""
+    """Minimum duration of a command, if another program waits for its end [s]."""
     platform: Any = None
     """The platform that opened it, for figures."""
 

@@ -1,4 +1,4 @@
-"""Whether the wheels of a Thymio are blocked, by their measured speeds."""
+"""Detection of blocked wheels of a Thymio, by their measured speeds."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class StallRule:
 
         Args:
             now: The robot's time [s].
-            targets: Of both wheels [units].
+            targets: Target speeds of both wheels [units].
             speeds: Measured [units].
         """
         is_held = any(

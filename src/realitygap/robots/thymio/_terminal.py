@@ -12,7 +12,7 @@ __all__ = ["battery", "find_ports", "info", "open_robot", "sense"]
 
 
 def open_robot(port: str, record: Path | None, watchdog_s: float | None) -> Thymio:
-    """Connect to a Thymio, whose program on board stops it when no command comes.
+    """Connect to a Thymio. Its program on board stops it if no command arrives.
 
     Raises:
         RobotError: It cannot be reached.

@@ -18,8 +18,8 @@ class Ambient:
 
     Args:
         model: The twin.
-        arena: Where.
-        number: Of the trial.
+        arena: Arena of the robot.
+        number: Number of the trial.
     """
 
     def __init__(self, model: TwinModel, arena: Arena, number: int) -> None:

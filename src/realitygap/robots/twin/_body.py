@@ -33,13 +33,13 @@ class TwinBody:
 
     Args:
         model: The twin.
-        arena: Where.
+        arena: Arena of the robot.
 
     Attributes:
-        identity: Equal where the twin is the same.
-        pose: Of the pen; the heading is that of the end without the caster.
-        stalled: Whether the caster rolls too little for what the wheels turn.
-        rolls: Whether it still moves, or will, though the firmware asks for nothing.
+        identity: Identity, equal for the same twin.
+        pose: Pose of the pen; the heading is that of the end without the caster.
+        stalled: True if the caster rolls too little for the turns of the wheels.
+        rolls: True if it still moves, or will, without a command of the firmware.
 
     Raises:
         MissingExtraError: MuJoCo is not installed.
@@ -87,7 +87,7 @@ class TwinBody:
         """Move on for a short time with the firmware asking for wheels at `left` and `right` [m/s].
 
         Returns:
-            How far its encoders tell that each wheel turned [m].
+            The distance of each wheel as measured by its encoder [m].
         """
         for _ in range(max(1, round(seconds / STEP_S))):
             turned = self._step(-right / NOMINAL, -left / NOMINAL)

@@ -1,4 +1,4 @@
-"""Pictures of a twin in its arena as MuJoCo draws it, where this machine can draw without a screen."""
+"""Pictures of a twin in its arena, drawn by MuJoCo, if this machine can draw without a screen."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ class TwinCamera(ClosedOnExit):
 
     Args:
         model: The twin.
-        arena: Where.
-        width, height: Of pictures [px].
+        arena: Arena of the robot.
+        width, height: Size of pictures [px].
 
     Raises:
         MissingExtraError: MuJoCo is not installed.
@@ -66,7 +66,7 @@ class TwinCamera(ClosedOnExit):
         view.distance = 1.15 * max(across / 2 / math.tan(wide / 2), up / 2 / math.tan(FIELD / 2)) + up / 4
 
     def picture(self, pose: Pose) -> NDArray[np.uint8]:
-        """(height, width, 3) the twin at a pose, in red, green and blue."""
+        """Return the picture of the twin at a pose, in red, green and blue, (height, width, 3)."""
         mj, physics = self._mujoco, self._physics
         physics.stand(pose)
         mj.mjv_updateScene(

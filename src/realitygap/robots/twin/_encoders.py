@@ -13,7 +13,7 @@ class Encoders:
 
     Args:
         model: The twin.
-        number: Of the trial.
+        number: Number of the trial.
     """
 
     def __init__(self, model: TwinModel, number: int) -> None:

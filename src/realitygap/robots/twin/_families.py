@@ -29,10 +29,10 @@ class Family(NamedTuple):
     """A kind of twin.
 
     Attributes:
-        meaning: What is wrong with it.
-        numbers: What is drawn, or set, besides what every twin draws; by dotted name.
-        oddities: Of an alien: groups of numbers, of which `n_oddities` are taken.
-        n_oddities: How many.
+        meaning: Defect of the family.
+        numbers: Numbers that are drawn or set in addition to those of every twin, by dotted name.
+        oddities: Groups of numbers of an alien, from which `n_oddities` are taken.
+        n_oddities: Number of groups.
     """
 
     meaning: str
@@ -68,7 +68,7 @@ EVERY: dict[str, Range | Value] = {
     "ir.noise": Range(0.05, 0.15),
     "ir.missed": Range(0.0, 0.03),
 }
-"""What is drawn for twins of every family but `same`; a family's own limits come before these."""
+"""Numbers that are drawn for twins of every family except `same`. A family's own limits have priority."""
 
 _ODDITIES: dict[str, dict[str, Range | Value]] = {
     "tilted floor, weak motors": {
@@ -169,16 +169,16 @@ FAMILIES: dict[str, Family] = {
     "same": Family("`sim` itself behind the same wall: no gap at all", {"engine": "sim"}),
     "alien": Family("two things that no numbers of `sim` can express", {}, _ODDITIES, 2),
 }
-"""By name; the numbers of each are drawn by `sample_twin`."""
+"""Families by name. `sample_twin` draws their numbers."""
 
 
 class FamilyRow(NamedTuple):
     """A number that a family draws.
 
     Attributes:
-        number: Its dotted name.
-        low, high: Between which it is drawn evenly; the same where it is set.
-        part: What it belongs to: the family itself, what every twin draws, or one of an alien's oddities.
+        number: Dotted name of the number.
+        low, high: Limits between which it is drawn uniformly; equal if it is set.
+        part: Origin of the number: the family itself, every twin, or one of an alien's oddities.
     """
 
     number: str
@@ -191,7 +191,7 @@ def family_rows(name: str) -> list[FamilyRow]:
     """All numbers that a family draws.
 
     Args:
-        name: One of `FAMILIES`, or every, for what twins of every family draw.
+        name: One of `FAMILIES`, or `every` for the numbers of all families.
 
     Raises:
         ValueError: There is no such family.

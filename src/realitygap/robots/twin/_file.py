@@ -15,7 +15,7 @@ def load_twin(path: str | Path) -> TwinModel:
     """A twin from its file.
 
     Args:
-        path: Of a TOML file, as `TwinModel.to_toml` writes one. Keys may end in _mm, _cm or _in, angles in _deg.
+        path: Path of a TOML file, as written by `TwinModel.to_toml`. Keys may end in _mm, _cm or _in, angles in _deg.
 
     Raises:
         DescriptionError: There is no such file, or it cannot be used: every mistake with its place.

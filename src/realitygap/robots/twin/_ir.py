@@ -1,4 +1,4 @@
-"""A twin's infrared sensors: light sent in a cone, what comes back of it, and the pulses that are counted."""
+"""A twin's infrared sensors: light sent in a cone, the part that returns, and the counted pulses."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class IrSensors:
 
     Args:
         model: The twin.
-        number: Of the trial.
+        number: Number of the trial.
     """
 
     def __init__(self, model: TwinModel, number: int) -> None:
@@ -45,7 +45,7 @@ class IrSensors:
         self._held: tuple[int, NDArray[np.float64]] | None = None
 
     def light(self, physics: Physics, volts: float) -> NDArray[np.float64]:
-        """(s,) light that comes back to each sensor; 1 where half the pulses are seen."""
+        """Return the light that returns to each sensor, (s,); 1 if half of the pulses are detected."""
         ir = self._ir
         found: dict[tuple[float, float, float], float] = {}
         values = []
@@ -62,7 +62,7 @@ class IrSensors:
     def readings(
         self, physics: Physics, volts: float, step: int, stronger: float = 1.0
     ) -> NDArray[np.float64]:
-        """(s,) the share of pulses counted before command `step`, 0..1; light may go farther than usual."""
+        """Return the share of pulses counted before command `step`, 0..1, (s,). Light may reach farther than usual."""
         odd = self._odd
         if odd.latch and self._held is not None and step - self._held[0] <= odd.latch:
             return self._held[1]
@@ -74,7 +74,7 @@ class IrSensors:
         return readings
 
     def count(self, light: NDArray[np.float64], step: int) -> NDArray[np.int64]:
-        """(s,) pulses counted of light (s,), with the noise of a step."""
+        """Return the pulses counted for light (s,), with the noise of a step, (s,)."""
         ir = self._ir
         random = numbers_for(self._seed, self._number, LIGHT, step)
         bright = light

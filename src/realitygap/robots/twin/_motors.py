@@ -1,4 +1,4 @@
-"""From commands to the speeds of a twin's motors: an S2's steps, delay, lag, gains, and oddities."""
+"""The motors of a twin, from commands to speeds: an S2's steps, delay, lag, gains, and oddities."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class SpeedSteps:
 
     @property
     def is_steady(self) -> bool:
-        """Whether the speed stays as it is."""
+        """True if the speed is constant."""
         return self._step == self._target
 
     def tick(self) -> tuple[float, float]:
@@ -66,7 +66,7 @@ class PlainSpeeds:
         self._shares = left, right
 
     def tick(self) -> tuple[float, float]:
-        """As they were commanded."""
+        """Return the commanded speeds."""
         return self._shares
 
 
@@ -84,7 +84,7 @@ class Servo:
     Attributes:
         volts: Battery voltage now [V].
         time: Time since the trial began [s].
-        is_steady: Whether the lag had caught up when speeds were last asked for.
+        is_steady: True if the lag had ended when speeds were last computed.
     """
 
     def __init__(self, model: TwinModel, number: int) -> None:
@@ -104,9 +104,9 @@ class Servo:
         """Speeds for the motors in a short time, left and right [m/s].
 
         Args:
-            left, right: What the regulator wants, in shares of full speed.
-            pose: Where the robot is.
-            seconds: How long.
+            left, right: Target speeds of the regulator, in shares of full speed.
+            pose: Pose of the robot.
+            seconds: Duration [s].
         """
         motors, odd = self._motors, self._odd
         if motors.ahead < 0:

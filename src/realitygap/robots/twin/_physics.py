@@ -39,7 +39,7 @@ class Physics:
 
     Args:
         model: The twin.
-        arena: Where.
+        arena: Arena of the robot.
 
     Raises:
         MissingExtraError: MuJoCo is not installed.
@@ -117,11 +117,12 @@ class Physics:
 
         Args:
             x, y: Ahead of the pen and to the left of it [m].
-            directions: (r,) of the rays, positive to the left of the body's x [rad].
+            directions: (r,) directions of the rays, positive to the left of the body's x [rad].
             reach: Length of the rays [m].
 
         Returns:
-            (r,) distances [m], `reach` where nothing is met; (r,) cosines between ray and the normal of what is met.
+            (r,) distances [m], `reach` if a ray meets nothing; (r,) cosines between a ray and the normal of the
+            surface.
         """
         here = self.pose
         sine, cosine = math.sin(here.heading), math.cos(here.heading)

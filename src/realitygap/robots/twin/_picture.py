@@ -16,7 +16,7 @@ PAD = 0.03  # [m]
 
 
 def outline_of(model: TwinModel) -> tuple[Point, ...]:
-    """(b, 2) points around what meets walls, x and y [m]."""
+    """Return points around the outline that meets walls, x and y [m], (b, 2)."""
     return rounded(*shell_of(model))
 
 

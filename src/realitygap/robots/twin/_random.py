@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 DELAYS, WHEELS, LIGHT, ENCODERS, FAMILY, AMBIENT = range(6)
-"""What they are for."""
+"""Purposes of the random numbers."""
 
 
 def numbers_for(seed: int, number: int, purpose: int, step: int = 0) -> np.random.Generator:

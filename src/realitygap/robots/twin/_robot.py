@@ -49,8 +49,8 @@ class TwinRobot(ProgramRobot):
 
     Args:
         model: The twin.
-        arena: Where.
-        number: Of the trial: it chooses the noise.
+        arena: Arena of the robot.
+        number: Number of the trial, which selects the noise.
 
     Raises:
         MissingExtraError: MuJoCo is not installed.
@@ -210,7 +210,7 @@ class TwinRobot(ProgramRobot):
 
     @property
     def wheels(self) -> tuple[float, float]:
-        """The same: a twin shows what a robot shows."""
+        """Distances of the wheels, the same as `encoders`, because a twin shows only what a robot shows."""
         return self.encoders
 
     @property
@@ -219,11 +219,11 @@ class TwinRobot(ProgramRobot):
         return self._servo.volts
 
     def path(self) -> NDArray[np.float64]:
-        """(n, 3) x [m], y [m] and heading [rad] since the start, each 40 ms or more often: the line of the pen."""
+        """Line of the pen since the start, at least every 40 ms: x [m], y [m] and heading [rad], (n, 3)."""
         return np.array(self._points)
 
     def times(self) -> NDArray[np.float64]:
-        """(n,) since the start of each point of `path` [s]."""
+        """Time of each point of `path` since the start, (n,) [s]."""
         return np.array(self._times)
 
     @property

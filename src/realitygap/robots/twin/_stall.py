@@ -16,7 +16,7 @@ class Idler:
 
     Args:
         model: The twin.
-        pose: Where it begins.
+        pose: Start of the robot.
     """
 
     def __init__(self, model: TwinModel, pose: Pose) -> None:
@@ -35,9 +35,9 @@ class Idler:
         """Take note of a short time.
 
         Args:
-            pose: Where the robot is after it.
-            left, right: How far the wheels turned in it [m].
-            seconds: How long it was.
+            pose: Pose of the robot after it.
+            left, right: Distances of the wheels in it [m].
+            seconds: Duration [s].
         """
         point = self._point(pose)
         way = math.dist(point, self._was)

@@ -270,8 +270,8 @@ def _list(ledger: Ledger, *, as_json: bool) -> None:
     from rich.table import Table
 
     table = Table(box=None, padding=(0, 2, 0, 0))
-    for head in ("trial", "code", "sheet", "state", "cells", "what"):
-        table.add_column(head, no_wrap=head != "what")
+    for head in ("trial", "code", "sheet", "state", "cells", "description"):
+        table.add_column(head, no_wrap=head != "description")
     hidden = _is_blind(ledger)
     for each in found:
         what = "" if hidden and not each.is_closed else each.name

@@ -69,8 +69,8 @@ def run_client(command: str, port: str) -> int:
     """Run a client program in a shell until it ends, and return its status.
 
     Args:
-        command: What to run; {port} in it becomes the port's name.
-        port: What the client opens.
+        command: Command to run; {port} in it is replaced by the port's name.
+        port: Port for the client.
 
     Raises:
         RobotError: It cannot be started.

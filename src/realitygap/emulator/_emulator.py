@@ -42,16 +42,16 @@ class Emulator:
     Args:
         model: "s1" or "s2", which an S3 is too.
         fluke: "none", "1" or "2".
-        arena: Where it stands: an arena, or a scene of one. Default: the paper's arena.
-        seed: Of the noise of its sensors, and of faults.
-        faults: What goes wrong on the link; nothing by default.
-        timing: Whether bytes, tones, sensors and writing to memory take their time.
+        arena: Arena of the robot, or a scene of one. Default: the paper's arena.
+        seed: Seed of the noise of its sensors, and of faults.
+        faults: Faults of the link. Default: none.
+        timing: True if bytes, tones, sensors, and writing to memory take their time.
         state: The file in which it keeps name, password, data, forwardness, echo mode and volume.
-        robot: What moves behind it, instead of a box on two wheels in the arena; one of its own infrared and battery
-            is asked for these, too.
+        robot: Simulated robot behind it, which replaces a box on two wheels in the arena. If it has its own infrared
+            and battery, these are used, too.
 
     Attributes:
-        identity: What is emulated, in words that are equal where it is the same, whatever its port and seed.
+        identity: Identity of the emulated robot, which does not depend on its port and seed.
 
     Raises:
         RobotError: There is no such model, or the file of its state cannot be read.
@@ -195,7 +195,7 @@ class Emulator:
             self._check_supply()
 
     def next_event(self, wanted: int = 1) -> int | None:
-        """When something happens next that may bring output [ns], or `wanted` bytes are out; None for never."""
+        """Return the time of the next event that may bring output, or at which `wanted` bytes are out [ns], or None."""
         while self._events and (is_due := self._events[0][3]) is not None and not is_due():
             heapq.heappop(self._events)
         times = [self._line.due(wanted)]
@@ -207,7 +207,7 @@ class Emulator:
 
     @property
     def is_talking(self) -> bool:
-        """Whether bytes are on their way, to it or from it."""
+        """True while bytes are transmitted to it or from it."""
         return bool(self._incoming) or self._line.due(1) is not None
 
     # bytes
@@ -229,7 +229,7 @@ class Emulator:
         self.advance_to(self._now)
 
     def transmit(self) -> bytes:
-        """The bytes that have come out by now and were not fetched before."""
+        """Return the bytes that have been sent since the last call."""
         if not self._is_plain and not self.is_connected:
             self._line.drop()
             return b""
@@ -249,7 +249,7 @@ class Emulator:
 
     @property
     def is_connected(self) -> bool:
-        """Whether the link is there; a fault of it may take it away for a while."""
+        """True if the link works; a fault may interrupt it for a while."""
         if self._is_plain:
             return True
         self._check_supply()
@@ -321,7 +321,7 @@ class Emulator:
         return (0.0 - right, 0.0 - left) if self.fluke_ahead else (left, right)
 
     def path(self) -> NDArray[np.float64]:
-        """(t, 4) time [s], x [m], y [m] and heading [rad] of the pen since it was placed, up to now."""
+        """Return time [s], x [m], y [m] and heading [rad] of the pen since it was placed, (t, 4)."""
         pose = self.pose
         points = np.frombuffer(self.table.points, dtype=float).reshape(-1, 4).copy()
         points[:, 3] += self._turn

@@ -19,11 +19,11 @@ class Faults:
 
     Attributes:
         drop: Share of the bytes that are lost, either way, 0 to 1.
-        extra: Share of the bytes that are followed by one that nobody sent, either way, 0 to 1.
-        flip: Share of the bytes of which one bit is turned, either way, 0 to 1.
-        delay: Longest time that a piece of data comes late [s]; each is late by a random part of it.
-        hangup: Mean time between hang-ups [s], 0 for none. The link is away for one to three seconds; the robot goes
-            on with what it was told.
+        extra: Share of the bytes that are followed by a random one, either way, 0 to 1.
+        flip: Share of the bytes with one flipped bit, either way, 0 to 1.
+        delay: Maximum delay of a piece of data [s]. The delay is random.
+        hangup: Mean time between hang-ups [s], 0 for none. The link is interrupted for one to three seconds, in which
+            the robot continues with its last command.
         sag: Share of its voltage that the supply loses while the motors work as hard as they can, 0 to 1. Below 5.5 V
             Bluetooth drops out.
     """
@@ -63,7 +63,7 @@ class Faults:
 
     @property
     def any_on_the_wire(self) -> bool:
-        """Whether bytes may get lost, changed, added or late."""
+        """True if bytes may be lost, changed, added, or late."""
         return bool(self.drop or self.extra or self.flip or self.delay)
 
 
@@ -88,7 +88,7 @@ class FaultyLink:
         return now + nanoseconds(self._random.expovariate(1 / self._faults.hangup))
 
     def is_up(self, now: int) -> bool:
-        """Whether the link is there at a time [ns]."""
+        """Return whether the link works at a time [ns]."""
         while self._next_hang_up is not None and self._next_hang_up <= now:
             self.hang_up(self._next_hang_up, self._random.uniform(*HANG_UP_S))
             self._next_hang_up = self._after(self.away_until)

@@ -61,15 +61,15 @@ class Fluke:
 
     Args:
         model: "1" or "2".
-        robot: What it is plugged into.
-        table: Where it stands.
-        senses: What its IR reads.
-        camera: What it sees.
-        battery: What its gauge reads.
-        memory: What it keeps.
+        robot: Robot that it is plugged into.
+        table: Table with the robot's body and motors.
+        senses: Senses, for its IR.
+        camera: Camera.
+        battery: Battery, for its gauge.
+        memory: Memory.
         schedule: Calls back at a time [ns].
         answer: Takes what goes to the client.
-        timing: Whether bytes and readings take their time.
+        timing: True if bytes and readings take their time.
     """
 
     def __init__(

@@ -58,7 +58,7 @@ class Line:
         self._n_waiting = 0
 
     def due(self, n: int) -> int | None:
-        """When `n` bytes are out [ns], of those that have been sent; None where there are fewer."""
+        """Return the time at which `n` of the queued bytes have been sent [ns]; None if there are fewer."""
         for chunk in self._chunks:
             left = len(chunk.data) - chunk.next
             if n <= left:

@@ -30,11 +30,11 @@ class Memory:
         broadcast: Whether the name is sent once a second after switching on.
         quiet: Whether the speaker is off.
         volume: Volume of an S2's speaker, 0 to 100.
-        pages: Of the Fluke's serial memory, those ever written.
+        pages: Pages of the Fluke's serial memory that were ever written.
 
     Args:
         model: "s1" or "s2", which differ in their first password.
-        file: Where it is kept; in memory only when not given.
+        file: File of the memory. Default: none.
 
     Raises:
         RobotError: The file is there and cannot be read, or cannot be written.
@@ -67,7 +67,7 @@ class Memory:
 
     @property
     def fluke_ahead(self) -> bool:
-        """Which end is ahead."""
+        """End that is ahead."""
         return self.read_page(0, 0) != SCRIBBLER_AHEAD
 
     def set_echo(self, value: int) -> None:

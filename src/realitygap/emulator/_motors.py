@@ -62,9 +62,9 @@ class S1Motors:
     """Two pulses a motor turns after; nothing is measured.
 
     Args:
-        trim: The first four bytes of its data: for fast ahead, slow ahead, slow back and fast back, 127 for none.
-            Ahead, above 127 the left wheel is slowed by (trim - 127) / 127 of full speed, below 127 the right one;
-            back, it is the other way round.
+        trim: First four bytes of its data: for fast ahead, slow ahead, slow back and fast back, 127 for none. Ahead, a
+            value above 127 slows the left wheel by (trim - 127) / 127 of full speed, and one below 127 the right wheel.
+            Back, the wheels are swapped.
 
     Source: scribbler_server.bs2 and the comment on it in Myro's robots/scribbler.py.
     """
@@ -115,7 +115,7 @@ class Segment:
     """A motion of the S2 by distance.
 
     Attributes:
-        left, right: What each wheel drives [counts], signed.
+        left, right: Distance of each wheel [counts], signed.
         speed: The largest step of speed.
         rolls_on: Whether the wheels keep turning at its end.
     """
@@ -169,7 +169,7 @@ class S2Motors:
         self._left, self._rolls_on, self._next = None, False, None
 
     def post(self, segment: Segment) -> bool:
-        """Whether a motion was accepted: at most one waits while another is under way."""
+        """Accept a motion, and return whether it was accepted: at most one waits during another."""
         if self.tripped:
             return True
         if self._left is not None:
@@ -190,7 +190,7 @@ class S2Motors:
 
     @property
     def ready(self) -> bool:
-        """Whether no motion by distance is under way, so that the next one is accepted immediately."""
+        """True if no motion by distance is active, so that the next one is accepted immediately."""
         return self._left is None
 
     @property

@@ -37,7 +37,7 @@ class EmulatorClock:
     """The emulator's time for those who use its port.
 
     Args:
-        port: Whose.
+        port: Port with the clock.
     """
 
     def __init__(self, port: EmulatedPort) -> None:
@@ -57,8 +57,8 @@ class EmulatedPort(SerialBase):  # type: ignore[misc]  # pyserial has no types
 
     Attributes:
         emulator: The robot; None before it was first opened.
-        clock: Its time.
-        witness: Who sees it and may move it.
+        clock: Clock of the emulated robot.
+        witness: Witness of the emulated robot.
     """
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
@@ -208,7 +208,7 @@ class EmulatedPort(SerialBase):  # type: ignore[misc]  # pyserial has no types
         """Nothing waits to be sent."""
 
     def reset_input_buffer(self) -> None:
-        """Discard what has come and was not read."""
+        """Discard received bytes that were not read."""
         self._check()
         with self._lock:
             self._fetch()
@@ -251,7 +251,7 @@ class EmulatedPort(SerialBase):  # type: ignore[misc]  # pyserial has no types
 
     @property
     def cd(self) -> bool:
-        """Whether the link is there."""
+        """True if the link works."""
         return self.emulator is not None and self._robot.is_connected
 
 

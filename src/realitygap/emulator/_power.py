@@ -18,7 +18,7 @@ class Battery:
 
     Args:
         sag: Share of the voltage lost under full load, of weak cells.
-        own_volts: What a robot that has cells of its own says of them under a load of 0 to 1 [V].
+        own_volts: Function of a load of 0 to 1 that returns the voltage of a robot with its own battery [V].
     """
 
     def __init__(self, sag: float = 0.0, own_volts: Callable[[float], float] | None = None) -> None:

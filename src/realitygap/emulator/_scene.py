@@ -40,5 +40,5 @@ class Scene:
 
 
 def paper_scene() -> Scene:
-    """The paper's arena and nothing else."""
+    """Return the paper's arena as a scene."""
     return Scene(paper_arena())

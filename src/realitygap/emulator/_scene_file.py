@@ -12,7 +12,7 @@ def open_scene(name: str) -> Scene:
     """The scene of that name, or of a file.
 
     Args:
-        name: Of an arena, or the path of its TOML or SVG file.
+        name: Name of an arena, or the path of its TOML or SVG file.
 
     Raises:
         RobotError: There is no such arena or file, or the file cannot be used; the text says where and why.

@@ -50,7 +50,7 @@ LEDS = {
     Op.SET_LED_ALL_ON: (0b111, 0b111),
     Op.SET_LED_ALL_OFF: (0, 0),
 }
-"""What each command switches on, and what it leaves as it is: left, center, right."""
+"""Bits that each LED command sets, and a mask of the bits that it keeps: left, center, right."""
 
 
 class Schedule(Protocol):
@@ -65,13 +65,13 @@ class Scribbler:
     """An S1 or S2 behind its serial line.
 
     Args:
-        model: Which.
-        table: Its body and motors.
-        senses: What it reads.
-        memory: What it keeps.
+        model: Model of the robot.
+        table: Table with its body and motors.
+        senses: Senses with its readings.
+        memory: Memory.
         schedule: Calls back at a time [ns].
         send: Takes what it sends.
-        timing: Whether bytes, tones and sensors take their time.
+        timing: True if bytes, tones and sensors take their time.
     """
 
     def __init__(

@@ -59,9 +59,9 @@ class Senses:
     """The sensors of one robot.
 
     Args:
-        robot: Where they are.
-        scene: What lights there are and what is on the floor.
-        seed: Of their noise.
+        robot: Table with the robot.
+        scene: Scene with lights and floor.
+        seed: Seed of their noise.
     """
 
     def __init__(self, robot: SimulatedRobot, scene: Scene, seed: int) -> None:
@@ -80,7 +80,7 @@ class Senses:
         return float(ranges[:3].min()), float(ranges[3:].min())
 
     def ir(self, threshold: int = 0) -> tuple[bool, bool]:
-        """Whether something is near, left and right; a higher threshold sees only what is nearer.
+        """Return whether an object is near, left and right; a higher threshold detects only nearer ones.
 
         Args:
             threshold: 1 to 100, 0 for the usual one.
@@ -90,7 +90,7 @@ class Senses:
         return left < reach + self._random.gauss(0, 0.002), right < reach + self._random.gauss(0, 0.002)
 
     def ir_level(self, side: int) -> int:
-        """The answer to GET_DISTANCE: 0 (touching) to 99 (nothing seen), as coarse as its tests."""
+        """Return the answer to GET_DISTANCE: 0 (touching) to 99 (nothing), with the resolution of its tests."""
         seen = self.ir_distances()[side] / _ir_reach(1)
         return 99 if seen >= 1 else int(seen * IR_TESTS) * 99 // IR_TESTS
 
@@ -125,7 +125,7 @@ class Senses:
         Args:
             emitter: "left", "center" or "right".
             power: Power of the emitters, 0 to 255.
-            in_pulses: Whether it is a Fluke 2, which sends ten pulses from its only emitter.
+            in_pulses: True for a Fluke 2, which sends ten pulses from its only emitter.
         """
         if self._own is not None:
             return self._own.obstacle(emitter, _stronger(power, in_pulses=in_pulses))

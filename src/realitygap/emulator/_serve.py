@@ -64,10 +64,10 @@ class Channel(Protocol):
 
 
 class PtyChannel:
-    """A pseudo-terminal; the emulator keeps its other side open, so that clients may come and go.
+    """A pseudo-terminal. The emulator keeps its other side open, so that clients may come and go.
 
     Args:
-        link: Where a symbolic link to it is made.
+        link: Path of a symbolic link to it.
 
     Raises:
         RobotError: There are no pseudo-terminals here, or the link cannot be made.
@@ -130,7 +130,7 @@ class PtyChannel:
         selector.modify(self._master, selectors.EVENT_READ | (selectors.EVENT_WRITE if wanted else 0), self)
 
     def hang_up(self) -> None:
-        """A pseudo-terminal goes silent; what was on its way is lost."""
+        """Interrupt the link: a pseudo-terminal goes silent, and bytes in transit are lost."""
         with contextlib.suppress(OSError):
             import termios
 
@@ -152,7 +152,7 @@ class TcpChannel:
     """A port on this machine, for one client at a time.
 
     Args:
-        port: Its number; 0 for any that is free.
+        port: Number of the port; 0 for any free one.
 
     Raises:
         RobotError: The port cannot be had.
@@ -165,7 +165,7 @@ class TcpChannel:
         self._selector: selectors.BaseSelector | None = None
 
     def watch(self, selector: selectors.BaseSelector) -> None:
-        """New clients may come."""
+        """Register the port for new clients with the selector."""
         self._selector = selector
         selector.register(self._listening, selectors.EVENT_READ, self)
 
@@ -257,8 +257,8 @@ class WitnessDoor:
     """Serves an emulator's witness as lines of JSON on a TCP port of this machine.
 
     Args:
-        witness: Who answers.
-        port: Its number; 0 for any that is free.
+        witness: Witness that answers.
+        port: Number of the port; 0 for any free one.
     """
 
     def __init__(self, witness: ServedWitness, port: int = 0) -> None:
@@ -270,7 +270,7 @@ class WitnessDoor:
         self._holder: socket.socket | None = None  # who holds an emulator's time that passes by itself
 
     def watch(self, selector: selectors.BaseSelector) -> None:
-        """New clients may come."""
+        """Register the port for new clients with the selector."""
         self._selector = selector
         selector.register(self._listening, selectors.EVENT_READ, self)
 
@@ -327,7 +327,7 @@ class Server:
 
     Args:
         emulator: The robot.
-        channel: Where clients connect.
+        channel: Channel for clients.
         speed: Seconds of the emulator in one of real time; 0: its time passes only while it answers, and when its
             witness lets it.
         witness: The port on which its witness is served, 0 for any; None for not at all.
@@ -335,9 +335,9 @@ class Server:
         watch_s: See there [s].
 
     Attributes:
-        name: What a client opens.
+        name: Name that a client opens.
         witness: The witness, in this process.
-        witness_address: Where it is served, host:port.
+        witness_address: Address of the served witness, host:port.
     """
 
     def __init__(
@@ -531,7 +531,7 @@ def serve_pty(
 
     Args:
         emulator: The robot.
-        link: Where a symbolic link to it is made.
+        link: Path of a symbolic link to it.
         speed: Seconds of the emulator in one of real time.
         witness: The port on which its witness is served, 0 for any; None for not at all.
     """

@@ -21,23 +21,23 @@ class SimulatedRobot(Protocol):
     One that has an `identity`, a text that no other robot has, is told by it from others; else its class is.
 
     Attributes:
-        pose: Where it is: the point midway between its wheels, and where the Scribbler's end without the caster
-            looks.
-        stalled: Whether it was blocked when it last tried to move.
+        pose: Pose of the point midway between its wheels; the heading is that of the Scribbler's end without the
+            caster.
+        stalled: True if it was blocked at its last attempt to move.
     """
 
     pose: Pose
     stalled: bool
 
     def place(self, pose: Pose) -> None:
-        """Put it somewhere else."""
+        """Put it at another place."""
         ...
 
     def advance(self, left: float, right: float, seconds: float) -> tuple[float, float]:
         """Move on for a short time with the wheels at `left` and `right` [m/s].
 
         Returns:
-            How far each wheel turned [m]; the wheels of a blocked robot slip.
+            The distance of each wheel [m]; the wheels of a blocked robot slip.
         """
         ...
 
@@ -56,7 +56,7 @@ class RobotOfItsOwn(SimulatedRobot, Protocol):
     """A simulated robot that also models noise, a Fluke's infrared, and a battery.
 
     Attributes:
-        rolls: Whether it still moves, or will, though its motors are off.
+        rolls: True if it still moves, or will, although its motors are off.
     """
 
     rolls: bool
@@ -80,12 +80,12 @@ class RobotOfItsOwn(SimulatedRobot, Protocol):
 
 
 class BoxOnWheels:
-    """A box with two wheels between walls and obstacles: blocked it stays where it is, as in Jyro, and its wheels slip.
+    """A box with two wheels between walls and obstacles. If blocked, it does not move, as in Jyro, and its wheels slip.
 
     Args:
         arena: The walls, the obstacles, and the start.
-        spacing: Of its wheels [m].
-        body: Its outline.
+        spacing: Distance between its wheels [m].
+        body: Outline of the body.
     """
 
     def __init__(self, arena: Arena, spacing: float, body: Body = SCRIBBLER_BODY) -> None:
@@ -97,7 +97,7 @@ class BoxOnWheels:
         self.place(arena.start)
 
     def place(self, pose: Pose) -> None:
-        """Put it somewhere else."""
+        """Put it at another place."""
         self.pose = Pose(*map(float, pose))
         self.stalled = False
         self._free = 0.0  # how far the origin can go before the outline may touch something [m]

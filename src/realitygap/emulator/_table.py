@@ -18,9 +18,9 @@ class Table:
     """A simulated robot, its motors and its battery.
 
     Args:
-        robot: What moves.
-        motors: What turns its wheels.
-        battery: What feeds them.
+        robot: Simulated robot.
+        motors: Motors of its wheels.
+        battery: Battery of the motors.
         arena: The cells that the pen may visit.
     """
 
@@ -71,7 +71,7 @@ class Table:
 
     @property
     def stalled(self) -> bool:
-        """Whether the motors work in vain."""
+        """True if the motors run but the robot is blocked."""
         return self.motors.turning and self.robot.stalled
 
     def _begin_path(self) -> None:

@@ -27,7 +27,7 @@ class LiveView:
     """Shows an emulator while it is served; its `show` is what a server calls.
 
     Args:
-        title: What to say above the picture.
+        title: Text above the picture.
     """
 
     def __init__(self, title: str) -> None:

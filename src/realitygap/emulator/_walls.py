@@ -13,7 +13,7 @@ Floats = NDArray[np.float64]
 
 
 class Walls:
-    """Straight walls and discs as arrays; an obstacle is its sides and, where it is round, its corners' discs.
+    """Straight walls and discs as arrays. An obstacle becomes its sides and, if it is round, the discs of its corners.
 
     Args:
         segments: (w, 4) x1, y1, x2, y2 of each wall [m]; there may be none.
@@ -52,7 +52,7 @@ class Walls:
         return min(to_disc, float(np.hypot(to_x - along * self._along_x, to_y - along * self._along_y).min()))
 
     def touch(self, xs: Floats, ys: Floats) -> bool:
-        """Whether an outline with corners (b,) [m] in order meets a wall or a disc."""
+        """Return whether an outline with corners (b,) [m] in order touches a wall or a disc."""
         if len(self._discs) and self._touch_disc(xs, ys):
             return True
         if not self.n:
@@ -78,7 +78,7 @@ class Walls:
         return self.hits(xs, ys, angles, reach)[0]
 
     def hits(self, xs: Floats, ys: Floats, angles: Floats, reach: float) -> tuple[Floats, NDArray[np.intp]]:
-        """Likewise, and which it is, discs after walls; -1 where none is within reach."""
+        """Return distances along rays, and indices of the objects, discs after walls, or -1 if none is within reach."""
         ray_x, ray_y = np.cos(angles)[:, None], np.sin(angles)[:, None]
         far = np.hstack([self._to_walls(xs, ys, ray_x, ray_y), self._to_discs(xs, ys, ray_x, ray_y)])
         if not far.shape[1]:

@@ -49,7 +49,7 @@ class Witness(Protocol):
         ...
 
     def path(self) -> NDArray[np.float64]:
-        """(t, 4) time [s], x [m], y [m] and heading [rad] of the pen since it was placed."""
+        """Return time [s], x [m], y [m] and heading [rad] of the pen since it was placed, (t, 4)."""
         ...
 
     def cells(self) -> tuple[int, ...]:
@@ -80,8 +80,8 @@ class DirectWitness:
     Args:
         emulator: Whom to watch.
         lock: Held while doing so.
-        waits: Whether the emulator's time passes only when somebody lets it.
-        speed: Seconds of the emulator in one of real time, where they pass by themselves; 0: as fast as it goes.
+        waits: True if the emulator's time passes only when a program advances it.
+        speed: Seconds of the emulator per second of real time, if they pass automatically; 0: as fast as possible.
     """
 
     def __init__(
@@ -96,7 +96,7 @@ class DirectWitness:
         """Let the emulator's time pass from now on only with `advance`, and while it answers.
 
         Returns:
-            How fast it was to pass: its seconds in one of real time; 0: as fast as it goes.
+            Speed at which time would pass: seconds of the emulator per second of real time; 0: as fast as possible.
         """
         self.waits = True
         return self._speed
@@ -144,7 +144,7 @@ class DirectWitness:
             return self._emulator.wheel_speeds()
 
     def path(self) -> NDArray[np.float64]:
-        """(t, 4) path of the pen."""
+        """Return the path of the pen, (t, 4)."""
         with self._lock:
             return self._emulator.path()
 
@@ -207,7 +207,7 @@ class RemoteWitness:
 
     Args:
         address: Host and port, as in 127.0.0.1:7002.
-        timeout_s: How long to wait for an answer.
+        timeout_s: Maximum time to wait for an answer [s].
 
     Raises:
         RobotError: Nobody answers there.
@@ -248,7 +248,7 @@ class RemoteWitness:
         return bool(self._ask("waits"))
 
     def hold(self) -> float | None:
-        """As `DirectWitness.hold`, until this connection ends; None if its time cannot be held, as a playground's."""
+        """Hold the time like `DirectWitness.hold`, until this connection ends. Return None if that is impossible."""
         speed = self._ask("hold")
         return None if speed is None else float(speed)
 
@@ -282,7 +282,7 @@ class RemoteWitness:
         return left, right
 
     def path(self) -> NDArray[np.float64]:
-        """(t, 4) path of the pen."""
+        """Return the path of the pen, (t, 4)."""
         return np.array(self._ask("path"), dtype=float).reshape(-1, 4)
 
     def cells(self) -> tuple[int, ...]:

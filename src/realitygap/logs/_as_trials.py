@@ -19,7 +19,7 @@ from ._source import Floats
 FAR_M = 100.0
 """Distance of the walls of an open plane."""
 SLOW = 0.2
-"""Share of the usual way of a step below which the path shows no direction."""
+"""Share of the typical distance of a step below which the path shows no direction."""
 MOST_TRIAL_STEPS = 20_000
 """Steps of one trial in a file; a longer stretch becomes several."""
 MOST_COMMAND = 1.0005
@@ -41,7 +41,7 @@ def head_of(path: str | Path, log_map: LogMap, robot: str, log: Log) -> Observat
 
     Args:
         path: The log.
-        log_map: Its mapping.
+        log_map: Mapping of the log.
         robot: The robot by name or file.
         log: One of its trials.
     """
@@ -62,7 +62,7 @@ def trials_of(log: Log, log_map: LogMap, first: int = 0) -> Iterator[TrialRecord
 
     Args:
         log: One trial of a log.
-        log_map: Its mapping.
+        log_map: Mapping of the log.
         first: Number of the first stretch.
 
     Raises:
@@ -133,8 +133,8 @@ def path_headings(xy: Floats, forward: Floats) -> Floats:
     Where it hardly moves the heading is interpolated.
 
     Args:
-        xy: (n + 1, 2) positions [m]; nan where it was not seen.
-        forward: (n,) positive if it was told to go ahead.
+        xy: (n + 1, 2) positions [m]; nan if unknown.
+        forward: (n,) positive if the command is ahead.
     """
     steps = np.diff(xy, axis=0) * np.where(forward < 0, -1, 1)[:, None]
     way = np.hypot(*steps.T)

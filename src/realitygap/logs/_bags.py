@@ -52,7 +52,7 @@ class BagSource:
         return self._columns
 
     def batches(self, names: Sequence[str], rows: str = "") -> Iterator[Batch]:
-        """As `Source.batches`; all columns have to be of one topic, or the same field of several.
+        """Yield batches like `Source.batches`. All columns must be of one topic, or the same field of several.
 
         Several topics give the rows of the first one, with the last value that each of the others had by then.
         """

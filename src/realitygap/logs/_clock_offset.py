@@ -26,7 +26,7 @@ class ClockOffset:
         seconds: Positive if the second signal is later [s].
         low: Lower end of its 90 % interval [s].
         high: Upper end [s].
-        correlation: At this offset, the root of the mean squared correlation of the signals.
+        correlation: Correlation at this offset: the root of the mean squared correlation of the signals.
     """
 
     seconds: float
@@ -47,9 +47,9 @@ def clock_offset(told: Floats, seen: Floats, step_s: float, *, seed: int = 0) ->
 
     Args:
         told: (n, k) signals, such as speed and turn rate by the wheels.
-        seen: (n, k) the same signals by the poses; nan where unknown.
+        seen: (n, k) the same signals, from the poses; nan if unknown.
         step_s: Between two rows [s].
-        seed: Of the draws.
+        seed: Seed of the draws.
 
     Source: peak of the cross-correlation, with a parabola through its neighbors; interval by a bootstrap of blocks
         of time (Künsch 1989).

@@ -24,15 +24,15 @@ class Convert(Protocol):
     width: int
 
     def __call__(self, times: Floats, raw: Floats) -> Floats:
-        """Return (b, width) values of (b,) times [s] and (b, k) numbers of the log, after all that came before."""
+        """Return values (b, width) for times (b,) [s] and numbers (b, k) of the log, which follow all earlier ones."""
 
 
 def converter(part: Part, speed: float, track: float) -> Convert:
     """Return what converts a part.
 
     Args:
-        part: Of the mapping.
-        speed: Of a wheel at full command [m/s].
+        part: Part of the mapping.
+        speed: Speed of a wheel at full command [m/s].
         track: Between the wheels [m].
 
     Raises:

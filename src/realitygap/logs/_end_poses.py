@@ -1,4 +1,4 @@
-"""Tables of trials of one task on several platforms: where something began and ended."""
+"""Tables of trials of one task on several platforms, with the start and the end of each motion."""
 
 from __future__ import annotations
 

@@ -34,7 +34,7 @@ TURN = {"turn", "angular", "ang", "w", "wz", "omega", "vth", "yawrate", "rotatio
 TIME = ("time", "t", "timestamp", "stamp", "sec", "secs", "seconds", "elapsed", "clock", "ts")
 HEADING = {"theta", "yaw", "heading", "th", "phi", "psi", "angle", "orientation", "rz", "a"}
 TRUTH = {"gt", "true", "truth", "mocap", "vicon", "optitrack", "camera", "cam", "tracker", "ground"}
-"""What tells poses that were seen from those that the robot believes."""
+"""Words in names of columns that distinguish observed poses from those that the robot estimates."""
 SENSOR = re.compile(r"^(.*?(?:ir|prox|ps|range|sonar|sensor|ds|us|tof)\D*?)(\d+)\D*$", re.IGNORECASE)
 UNITS = {
     "mm": "mm", "millimeters": "mm", "cm": "cm", "centimeters": "cm", "m": "m", "meters": "m", "in": "in",
@@ -50,7 +50,7 @@ def guess_log_map(path: str | Path, text: TextFormat | None = None) -> LogMap:
 
     Args:
         path: The log.
-        text: How a text file is written, as far as it is not to be found out.
+        text: Format of a text file, as far as it is known.
 
     Raises:
         LogError: The names do not say which columns are the wheels; the message lists them, and what a mapping has.

@@ -29,10 +29,10 @@ class ImportReport:
         n_trials: Trials that were written.
         n_steps: Their steps.
         step_s: Length of a step [s].
-        observe: What was seen of the robot.
-        notes: What was done to the rows of the first trial.
-        mistakes: What in the log cannot be as the mapping says, each kind once.
-        offset: By how much poses follow commands in the longest trial; None if the log does not show it.
+        observe: Observation level of the trials.
+        notes: Notes on changes to the rows of the first trial.
+        mistakes: Mistakes that contradict the mapping, one of each kind.
+        offset: Delay of poses after commands in the longest trial; None if the log does not show it.
     """
 
     n_trials: int = 0
@@ -45,13 +45,13 @@ class ImportReport:
 
 
 def map_beside(path: str | Path) -> Path:
-    """Return the file that is the mapping of a log if nobody names another: LOG.map.toml, or map.toml in a folder."""
+    """Return the default mapping of a log: LOG.map.toml, or map.toml in a folder."""
     path = Path(path)
     return path / "map.toml" if path.is_dir() else path.with_name(f"{path.name.split('.')[0]}.map.toml")
 
 
 def mapping_of(path: str | Path, map_file: str | Path | None = None) -> tuple[LogMap, str]:
-    """Return the mapping of a log, and where it comes from in words.
+    """Return the mapping of a log, and its origin in words.
 
     Args:
         path: The log.
@@ -71,7 +71,7 @@ def robot_of(log_map: LogMap, base: str | None = None) -> tuple[str, RobotModel]
 
     Args:
         log_map: The mapping.
-        base: The robot, in place of the one that the mapping names.
+        base: Robot that replaces the one of the mapping.
 
     Raises:
         LogError: Neither names a robot.
@@ -101,7 +101,7 @@ def import_log(
         out: The file to write, such as trials.jsonl; one that is there is replaced.
         log_map: The mapping of the log.
         base: The robot that drove, by name or file.
-        drop_bad_rows: Whether rows with mistakes are left out.
+        drop_bad_rows: True to leave out rows with mistakes.
 
     Raises:
         LogError: The log and the mapping do not go together, or a row has a mistake; nothing is written.

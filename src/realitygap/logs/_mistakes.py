@@ -23,7 +23,7 @@ CLEAR = 0.75
 """Concentration of angles around one direction, 0 to 1, beyond which they are one direction."""
 FEWEST_WINDOWS = 8
 MOST_STEPS = 20_000
-"""Of a log that are compared."""
+"""Maximum number of steps of a log that are compared."""
 MOST_LATE_S = 0.5
 """A robot's own lag and delay: what follows later is a clock."""
 SCALES = {1000.0: ("millimeters", "mm"), 100.0: ("centimeters", "cm"), 1 / 0.0254: ("inches", "in")}
@@ -37,7 +37,7 @@ class Mistake:
     Attributes:
         kind: swapped, reversed, left reversed, right reversed, degrees, millimeters, centimeters, inches, unit,
             half track, double track, clockwise, heading offset, or clock.
-        message: What was found, and what to do.
+        message: Observation, and the next step.
     """
 
     kind: str
@@ -49,10 +49,10 @@ class Diagnosis:
     """A comparison of the wheels and the poses of a log.
 
     Attributes:
-        mistakes: What cannot be.
-        offset: By how much poses follow commands; None if the log does not show it.
+        mistakes: List of mistakes.
+        offset: Delay of poses after commands; None if the log does not show it.
         track: Between the wheels, by the poses [m]; nan if unknown.
-        gain: Way by the poses over way by the wheels; nan if unknown.
+        gain: Distance by the poses divided by the distance by the wheels; nan if unknown.
     """
 
     mistakes: tuple[Mistake, ...] = ()
@@ -66,7 +66,7 @@ def diagnose(log: Log, speed: float, track: float) -> Diagnosis:
 
     Args:
         log: A trial.
-        speed: Of a wheel at full command [m/s].
+        speed: Speed of a wheel at full command [m/s].
         track: Between the wheels, as the robot's file has it [m].
     """
     log = _begin(log)

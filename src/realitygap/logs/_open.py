@@ -25,7 +25,7 @@ def open_source(path: Path, text: TextFormat | None = None) -> Source:
 
     Args:
         path: A file, or the folder of a bag or a dataset.
-        text: How a text file is written, as far as it is not to be found out.
+        text: Format of a text file, as far as it is known.
 
     Raises:
         LogError: There is no such file, or it is none of the known kinds.

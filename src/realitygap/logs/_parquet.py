@@ -53,7 +53,7 @@ class ParquetSource:
         return list(self._columns)
 
     def batches(self, names: Sequence[str], rows: str = "") -> Iterator[Batch]:
-        """As `Source.batches`."""
+        """Yield batches like `Source.batches`."""
         if rows:
             raise LogError(f"{self.path} is Parquet: `rows` is for text files. Leave it out of the mapping.")
         check_columns(self, names)

@@ -22,7 +22,7 @@ from ._text import TextSource
 from ._units import ANGLES, LENGTHS, unit_factor
 
 BITS = (8, 10, 12, 16)
-"""Of converters whose largest number may be the full scale of a table."""
+"""Bit widths of converters whose largest number may be the full scale of a table."""
 _HEAD = re.compile(rb"\s*((?:[-+0-9.]+\s+){4}[-+0-9.]+)\s+TURN", re.IGNORECASE)
 
 
@@ -33,11 +33,11 @@ class RangeTable:
     Attributes:
         sensor: (n,) index of the range sensor, from 0.
         distance: (n,) to the wall [m].
-        bearing: (n,) of the wall, as the table counts it [rad].
+        bearing: (n,) bearing of the wall in the sign of the table [rad].
         readings: (n,) 0 to 1.
         measured_from: The point that distances are measured from.
-        clockwise: Whether bearings grow clockwise; None if the table does not say.
-        notes: What was found out about the table.
+        clockwise: True if bearings grow clockwise; None if the table does not show it.
+        notes: Notes on the table.
     """
 
     sensor: NDArray[np.int64]
@@ -54,7 +54,7 @@ class RangeTable:
         return int(self.sensor.max()) + 1
 
     def bearing_left(self, *, clockwise: bool) -> Floats:
-        """(n,) bearings, positive to the left of the heading [rad]."""
+        """Bearings, positive to the left of the heading, (n,) [rad]."""
         return -self.bearing if clockwise else self.bearing
 
 
@@ -66,7 +66,7 @@ def read_range_table(path: str | Path, table_map: TableMap | None = None) -> Ran
 
     Args:
         path: The table.
-        table_map: Its mapping; found out by the names of its columns if not given.
+        table_map: Mapping of the table. Default: guessed from the names of its columns.
 
     Raises:
         LogError: The file is not such a table, is cut off, or has mistakes.

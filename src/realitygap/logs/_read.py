@@ -21,7 +21,7 @@ from ._source import RECORDED, Floats, Source, check_columns
 from ._units import TIMES, unit_factor
 
 REGULAR = 0.25
-"""Share by which most intervals may differ from their median where a step is taken from them."""
+"""Share by which most intervals may differ from their median if the step is estimated from them."""
 SAME_STEP = 0.01
 """Share by which the mean of intervals may differ from their median if no row is missing."""
 FEWEST_STEPS = 2
@@ -29,20 +29,20 @@ FEWEST_STEPS = 2
 
 @dataclass(frozen=True)
 class Log:
-    """One trial of n steps out of a log.
+    """One trial of n steps from a log.
 
     Attributes:
-        name: What tells it from the others of its file; empty if it is alone.
-        start_s: Its first time, by the log's clock [s].
+        name: Name within its file; empty if it is the only trial.
+        start_s: Time of its start, by the log's clock [s].
         step_s: Length of a step [s].
         commands: (n, 2) left and right wheel during each step, as shares of full speed.
-        poses: (n + 1, 3) x [m], y [m], heading [rad] at the begin of each step and at the end; nan where it was
-            not seen, and in the third column if the log has no headings. No rows if it has no poses.
-        wheels: (n + 1, 2) way of the left and the right wheel since the start [m]; nan where unknown. No rows if
-            the log has none.
-        readings: (n + 1, s) of each range sensor, 0 to 1; nan where unknown. No rows if the log has none.
+        poses: (n + 1, 3) x [m], y [m], heading [rad] at the start of each step and at the end; nan if unknown, and in
+            the third column if the log has no headings. No rows if it has no poses.
+        wheels: (n + 1, 2) distance of the left and the right wheel since the start [m]; nan if unknown. No rows if the
+            log has none.
+        readings: (n + 1, s) reading of each range sensor, 0 to 1; nan if unknown. No rows if the log has none.
         raw_headings: (n + 1,) headings before full turns were counted [rad]; as many rows as poses.
-        notes: What was done to the rows.
+        notes: Notes on changes to the rows.
     """
 
     name: str
@@ -57,7 +57,7 @@ class Log:
 
     @property
     def time_s(self) -> Floats:
-        """(n + 1,) the times of the steps, from 0 [s]."""
+        """Times of the steps, from 0, (n + 1,) [s]."""
         return np.arange(len(self.commands) + 1, dtype=np.float64) * self.step_s
 
     @property
@@ -75,9 +75,9 @@ def read_logs(
 
     Args:
         path: The log, or the folder that the files of the mapping are in.
-        log_map: Which column is what.
+        log_map: Mapping of the columns.
         robot: The robot that drove: its speed and track, unless the mapping has its own.
-        drop_bad_rows: Whether rows without numbers, or with times that do not grow, are left out.
+        drop_bad_rows: True to leave out rows without numbers, or with times that do not increase.
 
     Raises:
         LogError: The log and the mapping do not go together, or a row has a mistake.

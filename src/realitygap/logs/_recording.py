@@ -43,7 +43,7 @@ class RecordingSource:
         return list(dict.fromkeys(name for rows in self._rows.values() for row in rows for name in row))
 
     def batches(self, names: Sequence[str], rows: str = "") -> Iterator[Batch]:
-        """As `Source.batches`; all columns have to be of one kind of call."""
+        """Yield batches like `Source.batches`. All columns must be of one kind of call."""
         topics = {name.rpartition("/")[0] for name in names if name != RECORDED}
         if len(topics) != 1:
             raise LogError(

@@ -15,7 +15,7 @@ from realitygap.errors import LogError
 from ._source import Floats
 
 MOST_STEPS = 2_000_000
-"""Of one trial, so that it fits into memory."""
+"""Maximum number of steps of one trial, so that it fits into memory."""
 GAP_INTERVALS = 3.0
 """Usual intervals between samples beyond which nothing is known in between."""
 
@@ -61,7 +61,7 @@ class HeldMean:
         self._at_edge = np.zeros(width)  # the sum at the last edge
 
     def push(self, times: Floats, values: Floats) -> None:
-        """Take (b,) times and (b, k) values, after all that came before."""
+        """Add times (b,) and values (b, k), which follow all earlier ones."""
         if math.isnan(self._time):
             self._time, self._value = float(times[0]), values[0]
             self._n = 1
@@ -79,7 +79,7 @@ class HeldMean:
         self._time, self._value, self._sum = float(times[-1]), values[-1], sums[-1]
 
     def rows(self, n: int) -> Floats:
-        """(n, k) the means over the first n steps; nan beyond the last sample."""
+        """Return the means over the first n steps, (n, k); nan after the last sample."""
         return _padded(np.concatenate(self._parts), n)
 
 
@@ -115,7 +115,7 @@ class _AtPoints(ABC):
 
 
 class Interpolated(_AtPoints):
-    """Values at each point, by straight lines between samples; nan where samples are too far apart."""
+    """Values at each point by linear interpolation between samples; nan if samples are too far apart."""
 
     def _at(self, points: Floats, times: Floats, values: Floats) -> Floats:
         points[-1] = min(points[-1], times[-1])

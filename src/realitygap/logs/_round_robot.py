@@ -30,9 +30,9 @@ def round_robot(table: RangeTable, radius: float, name: str, *, clockwise: bool)
 
     Args:
         table: Readings at bearings all around.
-        radius: Of the disc [m].
-        name: What to call the robot.
-        clockwise: Whether the bearings of the table grow clockwise.
+        radius: Radius of the disc [m].
+        name: Name of the robot.
+        clockwise: True if the bearings of the table grow clockwise.
 
     Raises:
         LogError: A sensor reads nothing, or the table has no bearings.

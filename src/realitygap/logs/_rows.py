@@ -1,4 +1,4 @@
-"""The rows of a part: times that grow, and numbers where numbers have to be."""
+"""Checks of the rows of a part: times must increase, and numbers must be numbers."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ class RowChecker:
 
     Args:
         path: The log, for messages.
-        part: Its name, such as commands.
-        names: Its columns.
-        needs_all: Whether a missing number is a mistake. It is not for poses: nobody saw the robot there.
-        drop: Whether rows with mistakes are left out.
+        part: Name of the part, such as commands.
+        names: Names of its columns.
+        needs_all: True if a missing number is a mistake. For poses it is not: the robot was not observed there.
+        drop: True to leave out rows with mistakes.
     """
 
     def __init__(self, path: Path, part: str, names: list[str], *, needs_all: bool, drop: bool) -> None:

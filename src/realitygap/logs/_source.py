@@ -23,7 +23,7 @@ class Batch:
 
     Attributes:
         first: Number of its first row, counted from 1.
-        columns: (b,) float64 of each column; nan where there is no number. Times are in the unit of the log.
+        columns: (b,) float64 of each column; nan for a missing number. Times are in the unit of the log.
     """
 
     first: int
@@ -31,11 +31,11 @@ class Batch:
 
 
 class Source(Protocol):
-    """A file or folder that numbers of a log come from.
+    """A file or folder with the numbers of a log.
 
     Attributes:
         path: The file or folder.
-        is_table: Whether its columns have the same rows. The columns of a bag have those of their topics.
+        is_table: True if its columns have the same rows. The columns of a bag have the rows of their topics.
         rate_hz: Rows each second, if the format says so; 0 otherwise.
     """
 

@@ -1,4 +1,4 @@
-"""Text tables: CSV and what else programs write, with any separator, read block by block."""
+"""Text tables: CSV and similar formats of other programs, with any separator, read block by block."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ SNIFFED_BYTES = 1 << 18
 COMMENTS = (b"#", b"%", b"//")
 SEPARATORS = {"tab": "\t", "space": " "}
 NOTHING = ("", "nan", "null", "none", "na", "n/a", "-nan", "nan(ind)")
-"""Texts that stand for a missing number."""
+"""Texts for a missing number."""
 _BLANKS = re.compile(rb"[ \t]+")
 _SPACE_AT_END = re.compile(rb"(?m)^ | $")
 
@@ -116,7 +116,7 @@ class TextSource:
         return list(self._names)
 
     def batches(self, names: Sequence[str], rows: str = "") -> Iterator[Batch]:
-        """As `Source.batches`."""
+        """Yield batches like `Source.batches`."""
         chosen = {name: self._index(name) for name in names}
         first = 1
         # numbers stand for the names, so that rows may be shorter than the widest, and names may be anything

@@ -43,7 +43,7 @@ class BagReport:
     """A trial that was written.
 
     Attributes:
-        bag: Its file or folder.
+        bag: File or folder of the bag.
         mapping: The mapping that `realitygap import` finds.
         n_messages: Number of messages by topic.
     """

@@ -16,7 +16,7 @@ class Posed(Protocol):
 
     @property
     def poses(self) -> NDArray[np.float64]:
-        """(t + 1, 3) x [m], y [m], heading [rad]; row 0 is the start."""
+        """Poses x [m], y [m], heading [rad], (t + 1, 3); row 0 is the start."""
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,7 @@ class Divergence:
 
     Attributes:
         distance: (n, t + 1) between the two robots [m].
-        heading: (n, t + 1) between their headings, the short way round [rad, 0 to pi].
+        heading: (n, t + 1) difference of their headings, the shorter angle [rad, 0 to pi].
     """
 
     distance: NDArray[np.float64]
@@ -49,7 +49,7 @@ def measure_divergence(one: Sequence[Posed], other: Sequence[Posed]) -> Divergen
 
     Args:
         one: n trials.
-        other: n trials, each beside one of those.
+        other: n trials, each compared with one of `trials`.
 
     Raises:
         ValueError: There is none, or there are more of the one than of the other.

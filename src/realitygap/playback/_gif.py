@@ -1,4 +1,4 @@
-"""Pictures as a GIF: the same bytes every time, small where little changes from one picture to the next."""
+"""Pictures as a GIF: the same bytes every time, and small if little changes between pictures."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ def gif_bytes(
     Pixels that stay as they are are left out, and all pictures share one palette, so that nothing flickers.
 
     Args:
-        pictures: in red, green and blue.
-        shown_cs: how long each is shown [1/100 s].
-        colors: that the palette must have, at most 40 of them; those that pictures need beside are found in them.
-        comment: what is in it.
+        pictures: Pictures in red, green and blue.
+        shown_cs: Duration of each picture [1/100 s].
+        colors: Colors that the palette must have, at most 40. Other colors are selected from the pictures.
+        comment: Comment in the file.
     """
     from PIL import Image
     from PIL.GifImagePlugin import getdata

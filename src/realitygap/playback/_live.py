@@ -32,9 +32,9 @@ class Page(Protocol):
     """A page that shows a robot.
 
     Attributes:
-        scene: What stands still.
+        scene: Fixed part of the picture.
         trials: The trial, as far as it can be played.
-        live: Whether it goes on.
+        live: True if it continues.
     """
 
     scene: dict[str, Any]
@@ -42,7 +42,7 @@ class Page(Protocol):
     live: bool
 
     def send(self, content: dict[str, Any]) -> None:
-        """Tell it where the robot is."""
+        """Send it the robot's pose."""
         ...
 
     def on_msg(self, handler: Callable[[Any, dict[str, Any], Any], None]) -> None:
@@ -51,7 +51,7 @@ class Page(Protocol):
 
 
 class WatchedRobot:
-    """A robot, and below the notebook's cell what it does: where it is, what it sees, the cells that it visits.
+    """A robot with a view below the notebook's cell: its pose, its readings, and its visited cells.
 
     It meets the contract of robots and passes everything on. Where the robot is comes from the robot itself where it
     knows (a simulated one), from the witness of an emulator, or from `pose`; a robot of which nobody knows is shown
@@ -60,11 +60,11 @@ class WatchedRobot:
 
     Args:
         robot: any robot under the contract.
-        arena: where it drives; the robot's or its witness's own where not given.
-        shape: what is drawn; found from the robot's platform where not given.
-        pose: says where the robot is; may be called from another thread.
+        arena: Arena of the robot. Default: that of the robot or of its witness.
+        shape: Shape to draw. Default: that of the robot's platform.
+        pose: Function that returns the robot's pose. It may be called from another thread.
         speed: 2 is twice as fast as it is; None does not hold a simulated robot back.
-        page: what shows it; a widget below a notebook's cell when not given.
+        page: Page with the view. Default: a widget below a notebook's cell.
 
     Raises:
         RealityGapError: anywidget is not there, and no page is given.

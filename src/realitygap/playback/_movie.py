@@ -39,16 +39,17 @@ if TYPE_CHECKING:
 
 ENDINGS = (".gif", ".mp4")
 WIDTH = 720
-"""Of a movie [px]."""
+"""Width of a movie [px]."""
 
 LEAST_S, MOST_S = 0.02, 0.1
-"""How long a picture of a GIF is shown: programs show shorter ones longer, and longer ones look like a slide show."""
+"""Minimum and maximum duration of a picture of a GIF. Programs show shorter ones longer, and longer ones look like
+slides."""
 
 MOST_PICTURES = 600
-"""In a movie; a longer trial shows every second step, or every third, and so on."""
+"""Maximum number of pictures in a movie. A longer trial shows every second step, or every third, and so on."""
 
 HOLD_S = 1.5
-"""How long the last picture of a GIF stays before it begins anew; an MP4 simply ends."""
+"""Duration of the last picture of a GIF before it restarts. An MP4 just ends."""
 
 VIDEO_RATE = 30
 """Pictures a second of an MP4."""
@@ -76,11 +77,11 @@ def save_movie(
     It lasts as long as the trials did, divided by the speed; a GIF then rests on its last picture for 1.5 s.
 
     Args:
-        trials: one, or up to eight in one arena, each with a pen of its own. Shorter ones wait at their end.
-        path: ends in .gif or .mp4; a file that is there gives way once the new one is complete.
+        trials: One trial, or up to eight in one arena, each with its own pen. Shorter ones wait at their end.
+        path: Path that ends in .gif or .mp4. An existing file is replaced once the new one is complete.
         speed: 1 is as fast as it was; 2 is twice as fast.
-        title: in the head.
-        width: of the pictures [px], 240 to 1920.
+        title: Title in the head.
+        width: Width of the pictures [px], 240 to 1920.
 
     Returns:
         The path.
@@ -128,8 +129,8 @@ def picture_period(step_s: float, duration_s: float) -> float:
     """Return the duration of each picture of a GIF [s]: one step, several steps, or a part of a step.
 
     Args:
-        step_s: how long a step is shown [s].
-        duration_s: how long the trial is shown [s].
+        step_s: Duration of a step in the movie [s].
+        duration_s: Duration of the trial in the movie [s].
     """
     least = max(LEAST_S, duration_s / MOST_PICTURES)
     if step_s < least:

@@ -22,7 +22,7 @@ from realitygap.world import (
 )
 
 Outline = tuple[tuple[float, float], ...]
-"""(b, 2) corners, forward and left of the robot's origin [m]."""
+"""Corners, forward and left of the robot's origin, (b, 2) [m]."""
 
 
 class Driven(Protocol):
@@ -34,15 +34,15 @@ class Driven(Protocol):
 
     @property
     def poses(self) -> NDArray[np.float64]:
-        """(t + 1, 3) x [m], y [m], heading [rad]."""
+        """Poses x [m], y [m], heading [rad], (t + 1, 3)."""
 
     @property
     def readings(self) -> NDArray[np.float64]:
-        """(t + 1, s) what each range sensor measures: distances [m]."""
+        """Distances that the range sensors measure, (t + 1, s) [m]."""
 
     @property
     def stalled(self) -> NDArray[np.bool_]:
-        """(t + 1,) whether the step was blocked."""
+        """True if the step was blocked, (t + 1,)."""
 
 
 class Ranging(Protocol):
@@ -54,7 +54,7 @@ class Ranging(Protocol):
 
     @property
     def sensors(self) -> RangeSensors:
-        """Its rays."""
+        """Rays of the sensor."""
 
 
 @dataclass(frozen=True)
@@ -63,8 +63,8 @@ class RobotShape:
 
     Attributes:
         outlines: its parts, each a polygon.
-        mounts: (s, 3) of each range sensor: forward [m], left [m] and direction [rad, positive to the left].
-        reach: (s,) how far each of them sees [m].
+        mounts: (s, 3) mount of each range sensor: forward [m], left [m] and direction [rad, positive to the left].
+        reach: (s,) reach of each of them [m].
     """
 
     outlines: tuple[Outline, ...]
@@ -94,14 +94,14 @@ class MovingTrial:
     """A robot's positions and readings, step by step; row 0 is the start.
 
     Attributes:
-        title: which trial it is.
+        title: Title of the trial.
         label: SIM, TWIN, EMULATED or REAL.
-        arena: where.
-        shape: of the robot.
-        step_s: how long a step lasts [s].
+        arena: Arena of the trial.
+        shape: Shape of the robot.
+        step_s: Duration of a step [s].
         poses: (t + 1, 3) x [m], y [m], heading [rad].
-        rays: (t + 1, s) how far each ray is drawn [m]: what the sensor reads, as a distance. NaN: not known.
-        stalled: (t + 1,) whether the step was blocked.
+        rays: (t + 1, s) length of each ray [m], which is the reading as a distance. NaN: unknown.
+        stalled: (t + 1,) True if the step was blocked.
         cells: (n,) cells visited in order of first visit, columns * row + column.
         visited_at: (n,) the row by which each has been visited.
         parts: rows a step; t = parts * the number of steps.
@@ -160,7 +160,7 @@ class MovingTrial:
         return self.n_steps * self.step_s
 
     def named(self, title: str) -> MovingTrial:
-        """The same under another title."""
+        """Return the same trial with another title."""
         return replace(self, title=title)
 
     def at(self, time: float) -> Moment:
@@ -190,7 +190,7 @@ class Moment:
         step: steps that are over.
         pose: x [m], y [m], heading [rad].
         rays: (s,) lengths [m].
-        stalled: whether the last step was blocked.
+        stalled: True if the last step was blocked.
         n_cells: cells visited so far.
     """
 
@@ -214,9 +214,9 @@ def in_motion(
 
     Args:
         trajectory: the trial step by step.
-        arena: where.
+        arena: Arena of the trial.
         robot: whose outline and rays are drawn.
-        title: what to call it.
+        title: Title of the trial.
         label: SIM, TWIN, EMULATED or REAL.
 
     Raises:
@@ -270,7 +270,7 @@ def all_trials(trials: MovingTrial | Iterable[MovingTrial]) -> list[MovingTrial]
 def first_visits(
     poses: NDArray[np.float64], grid: Grid
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-    """When a trial comes to its cells, counted as the trial itself counts them.
+    """Return the step of the first visit of each cell, with the cells that the trial itself counts.
 
     Args:
         poses: (t + 1, 3) x [m], y [m], heading [rad]; row 0 is the start. Of r robots (r, t + 1, 3), which move one
@@ -316,7 +316,7 @@ def extent(arena: Arena) -> tuple[float, float, float, float]:
 
 
 def placed(points: Sequence[tuple[float, float]], pose: tuple[float, float, float]) -> NDArray[np.float64]:
-    """(n, 2) points of the robot, forward and left [m], as x and y in the arena [m]."""
+    """Return points of the robot, forward and left [m], as x and y in the arena, (n, 2) [m]."""
     x, y, heading = pose
     sine, cosine = math.sin(heading), math.cos(heading)
     turned: NDArray[np.float64] = np.asarray(points, np.float64) @ np.array([[cosine, sine], [-sine, cosine]])
@@ -325,7 +325,7 @@ def placed(points: Sequence[tuple[float, float]], pose: tuple[float, float, floa
 
 
 def ray_ends(shape: RobotShape, moment: Moment) -> NDArray[np.float64]:
-    """(s, 2, 2) where each ray begins and ends [m]."""
+    """Return the start and the end of each ray, (s, 2, 2) [m]."""
     x, y, heading = moment.pose
     ends: list[Any] = []
     starts = placed([(forward, left) for forward, left, _ in shape.mounts], (x, y, heading))
@@ -336,6 +336,6 @@ def ray_ends(shape: RobotShape, moment: Moment) -> NDArray[np.float64]:
 
 
 def nearness(shape: RobotShape, lengths: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(s,) how near what each sensor sees is: 0 nothing within its reach, 1 touching."""
+    """Return the nearness of the objects that the sensors see, (s,): 0 nothing within reach, 1 touching."""
     reach = np.array(shape.reach, np.float64)
     return np.clip(1.0 - np.nan_to_num(lengths, nan=np.inf) / reach, 0.0, 1.0)

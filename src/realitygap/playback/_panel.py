@@ -93,7 +93,7 @@ class DrivePanel(_Panel):
         drive: Called with speed ahead and rate of turn to the left, -1 to 1 each, while the handle is held.
         stop: Called when it is released, and when the page is silent.
         title: The robot's name.
-        picture: Returns an SVG of the robot after each command; None if nobody sees it.
+        picture: Function that returns an SVG of the robot after each command; None if the robot is not visible.
 
     Raises:
         RealityGapError: anywidget is not installed.

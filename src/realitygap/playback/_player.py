@@ -36,7 +36,7 @@ def play(trials: MovingTrial | Iterable[MovingTrial], *, title: str = "", speed:
 
     Args:
         trials: one, or up to eight in one arena.
-        title: in the head.
+        title: Title in the head.
         speed: one of 0.25, 0.5, 1, 2, 4 and 8 to begin with.
 
     Raises:
@@ -131,7 +131,7 @@ def _pack_shape(shape: Shape) -> dict[str, Any]:
 
 
 def pack_trials(trials: Sequence[MovingTrial], *, placed: bool = True) -> list[dict[str, Any]]:
-    """Trials ready for JSON; `placed` is false where nobody knows where the robot is."""
+    """Return trials in a form for JSON; `placed` is false if the robot's poses are unknown."""
     return [
         {
             "title": trial.title,

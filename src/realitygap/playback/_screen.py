@@ -21,16 +21,16 @@ if TYPE_CHECKING:
 
 LABEL_COLORS = {"SIM": Ink.OURS, "TWIN": Ink.PEN3, "EMULATED": Ink.PEN5, "REAL": Ink.REACH}
 LETTERS = "ABCDEFGH"
-"""Of the pens, as on the page of a report."""
+"""Letters of the pens, as on the page of a report."""
 
 MOST_TRIALS = len(LETTERS)
 """Shown together: one a pen."""
 
 FAR, MIDDLE, NEAR = "#a9b4c2", "#e39a1b", "#c2182b"
-"""Of a ray, by how near what it meets is."""
+"""Colors of a ray, by the nearness of the object that it meets."""
 
 TILE, TILE_VISITED, TILE_OFTEN = "#f3f5f8", "#cfe0f1", "#7fb0dd"
-"""A cell that nobody visited, one visited by the only robot or by one of several, and by all of several."""
+"""Colors of a cell that no robot visited, that one visited, and that all of several visited."""
 
 _EDGE, _HEAD, _FOOT, _ROW = 0.12, 0.36, 0.26, 0.21
 _NAME = 1.9
@@ -78,7 +78,7 @@ def ray_color(near: float) -> tuple[float, float, float]:
 
 @contextmanager
 def plain_style() -> Iterator[None]:
-    """Draw with matplotlib's own settings, whatever the user's are, in the font that comes with it."""
+    """Draw with matplotlib's own settings and font instead of the user's."""
     import matplotlib as mpl
 
     with mpl.rc_context():
@@ -94,8 +94,8 @@ class Screen:
 
     Args:
         trials: at most eight, in one arena.
-        width: of the pictures [px].
-        title: in the head; the first trial's own where there is one trial.
+        width: Width of the pictures [px].
+        title: Title in the head. Default: that of the trial, if there is one trial.
     """
 
     def __init__(self, trials: Sequence[MovingTrial], width: int, title: str = "") -> None:

@@ -24,7 +24,7 @@ View = Literal["mujoco", "above"]
 VIEWS: tuple[View, ...] = ("mujoco", "above")
 ENDINGS = {"mujoco": (".png", ".gif", ".mp4"), "above": (".gif", ".mp4")}
 SEES = 3.0
-"""How far rays are drawn where nothing is seen, in distances from which half the pulses come back."""
+"""Length of rays that meet nothing, as a multiple of the distance from which half of the pulses return."""
 
 NEAR = 0.3
 """Reading at which a twin that wanders turns away: some 15 cm before a wall."""
@@ -42,10 +42,10 @@ class TwinDrive(NamedTuple):
 
     Attributes:
         model: The twin.
-        arena: Where.
+        arena: Arena of the trial.
         n_steps: Commands.
-        number: Of the trial: it chooses the noise.
-        answer: What answers an observation and the step's number.
+        number: Number of the trial, which selects the noise.
+        answer: Function that answers an observation and the step's number with a command.
     """
 
     model: TwinModel
@@ -68,15 +68,15 @@ def save_twin_trial(
     speed: float = 4.0,
     width: int = WIDTH,
 ) -> Path:
-    """Let a twin drive, and write a picture of where it ends, or a movie of how it came there.
+    """Let a twin drive, and write a picture of its end, or a movie of its motion.
 
     Args:
-        trial: Which twin drives how.
+        trial: Trial of the twin.
         path: Ends in .gif, .mp4 or, as MuJoCo draws it, .png.
-        view: mujoco, in three dimensions; or above, with rays and visited cells, as other trials are drawn. When not
-            given, mujoco where this machine can, or else above, with a warning that says so.
+        view: mujoco, in three dimensions, or above, with rays and visited cells like other trials. Default: mujoco if
+            this machine can draw it, otherwise above, with a warning.
         speed: 1 is as fast as it was.
-        width: Of pictures [px].
+        width: Width of pictures [px].
 
     Raises:
         MissingExtraError: MuJoCo is not installed.

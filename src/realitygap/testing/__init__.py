@@ -1,4 +1,4 @@
-"""Helpers for people who add a robot, and films and photographs drawn by code; nothing else here imports them."""
+"""Helpers for people who add a robot, and films and photographs drawn by code. No other package here imports them."""
 
 from ._filmed import Film, FilmedCamera, path_through, save_film
 from ._platform import PlatformContractError, check_platform

@@ -84,27 +84,27 @@ class FilmedCamera:
 
 
 Path = Callable[[float], tuple[float, float, float]]
-"""Where the robot is at a time [s]: x [m], y [m], heading [rad]."""
+"""A function of a time [s] that returns the robot's x [m], y [m], heading [rad]."""
 
 
 @dataclass
 class Film:
-    """Pictures of a robot that goes its way in an arena; each time it is gone through, the same ones.
+    """Pictures of a robot that follows a path in an arena. Each iteration gives the same pictures.
 
     Attributes:
-        path: The robot's way.
-        duration_s: How long.
+        path: Path of the robot.
+        duration_s: Duration [s].
         rate: Pictures a second.
-        tag: On the robot; its family 36h11 where none is named.
-        arena: Where.
+        tag: Tag on the robot. Default family: 36h11.
+        arena: Arena of the film.
         filmed: The camera.
-        corner_size: Of the corner tags, as in `corner_tags`.
-        corner_inset: Likewise.
+        corner_size: Size of the corner tags, as in `corner_tags`.
+        corner_inset: Inset of the corner tags, as in `corner_tags`.
         missed: Times [s] from and to which a hand hides the robot's tag.
         lost: Share of pictures that never arrive.
-        seed: Of noise, and of which are lost.
+        seed: Seed of the noise and of lost pictures.
         n_exposures: Places of the robot of which a picture is the mean, as it moves while that is exposed.
-        name: For people.
+        name: Name for people.
     """
 
     path: Path
@@ -180,14 +180,14 @@ class Film:
         return image
 
     def times(self) -> Floats:
-        """(t,) of the pictures that arrive [s]."""
+        """Times of the pictures that arrive, (t,) [s]."""
         all_of_them = np.arange(int(self.duration_s * self.rate)) / self.rate
         arrives = np.random.default_rng([self.seed, 1]).random(len(all_of_them)) >= self.lost
         arrives[:5] = True
         return all_of_them[arrives]
 
     def truth(self, times: Floats) -> Floats:
-        """(n, 3) where the robot is in truth."""
+        """Return the true poses of the robot, (n, 3)."""
         return np.array([self.path(float(time)) for time in times], np.float64)
 
     def __iter__(self) -> Iterator[tuple[float, Image]]:
@@ -196,7 +196,7 @@ class Film:
             yield float(time), self.picture(float(time), k)
 
     def picture(self, time: float, number: int = 0) -> Image:
-        """(height, width, 3) blue, green, red at a time [s], with the noise of a number."""
+        """Return the picture in blue, green, red at a time [s], with the noise of a number, (height, width, 3)."""
         shifts = np.linspace(-0.5, 0.5, self.n_exposures) * self.filmed.exposure_s
         poses = self.truth(np.clip(time + shifts, 0.0, self.duration_s))
         fine, rows, columns = self._with_robot(poses)
@@ -298,7 +298,7 @@ def _paint(
 
 
 def path_through(times: Floats, poses: Floats) -> Path:
-    """A way along (n, 3) poses at (n,) times [s], straight in between; it rests before and after."""
+    """Return a path through poses (n, 3) at times (n,) [s], linear in between; it rests before and after."""
     headings = np.unwrap(poses[:, 2])
 
     def path(time: float) -> tuple[float, float, float]:

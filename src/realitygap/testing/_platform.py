@@ -30,8 +30,8 @@ def check_platform(platform: Platform, arena: Arena | None = None) -> None:
     platform only the settings are checked: `check_robot` tries out its robot.
 
     Args:
-        platform: With settings for short trials.
-        arena: Where; the paper's when not given.
+        platform: Platform with settings for short trials.
+        arena: Arena. Default: the paper's.
 
     Raises:
         PlatformContractError: It does not keep the contract. The text lists every problem, and what to do.

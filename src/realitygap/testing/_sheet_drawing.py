@@ -75,7 +75,7 @@ def ink_layer(
     rng: np.random.Generator,
     difficulty: float,
 ) -> Floats:
-    """(h, w) how much ink a pen left, 1 for a full stroke; more where its line crosses itself."""
+    """Return the amount of ink that a pen left, (h, w): 1 for a full stroke, more if its line crosses itself."""
     import cv2
 
     points = resampled(path)
@@ -109,7 +109,7 @@ def ink_layer(
 
 
 def scribble(box: tuple[float, float, float, float], rng: np.random.Generator) -> NDArray[np.float64]:
-    """(n, 2) a hasty stroke by hand through a box [m]."""
+    """Return a hasty stroke by hand through a box, (n, 2) [m]."""
     left, lower, right, upper = box
     x = np.linspace(left + 0.08 * (right - left), right - 0.08 * (right - left), 40)
     middle = (lower + upper) / 2 + rng.normal() * 0.08 * (upper - lower)

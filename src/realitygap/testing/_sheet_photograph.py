@@ -15,7 +15,7 @@ from ._sheet_drawing import Difficulty, Floats, ink_colors, ink_layer, scribble
 
 TEXTURE_PX_PER_M = 4000.0
 SIZES = ((4000, 3000), (4000, 3000), (3264, 2448))
-"""Of photographs [px], drawn in turn: phones of the last ten years."""
+"""Sizes of photographs [px]: those of phones of the last ten years."""
 
 
 @dataclass(frozen=True)
@@ -24,8 +24,8 @@ class SheetPhotograph:
 
     Attributes:
         jpeg: The file.
-        layout: Of the sheet.
-        paths: Of each pen, (n, 2) x and y [m].
+        layout: Layout of the sheet.
+        paths: Path of each pen, (n, 2) x and y [m].
     """
 
     jpeg: bytes
@@ -44,11 +44,11 @@ def photograph_sheet(
     """A photograph of a sheet on which pens drew these paths.
 
     Args:
-        layout: Of the sheet; its pens draw the paths, in their order.
-        paths: Of each pen, (n, 2) x and y [m].
-        seed: Of everything that goes wrong.
-        difficulty: How much of it.
-        has_key: Whether each pen was tried in its box.
+        layout: Layout of the sheet. Its pens draw the paths, in their order.
+        paths: Path of each pen, (n, 2) x and y [m].
+        seed: Seed of all defects.
+        difficulty: Strength of the defects.
+        has_key: True if each pen was tried in its box.
     """
     rng = np.random.default_rng((seed, 0x5EE7))
     hard = difficulty or Difficulty()
@@ -66,7 +66,7 @@ def draw_sheet(
     *,
     has_key: bool,
 ) -> Floats:
-    """(h, w, 3) reflectance of the sheet, 4 pixels a millimeter."""
+    """Return the reflectance of the sheet, 4 pixels per millimeter, (h, w, 3)."""
     import cv2
 
     from realitygap.vision import raster, to_pixels

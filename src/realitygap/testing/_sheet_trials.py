@@ -27,13 +27,13 @@ def driven_paths(
     """The paths of each generation of one evolution on `sim`, selected by coverage, from starts as hands put a robot.
 
     Args:
-        seed: Of the evolution and of the robot's noise.
-        arena: Where.
-        generations: How many; each is a sheet of eight.
+        seed: Seed of the evolution and of the robot's noise.
+        arena: Arena of the trials.
+        generations: Number of generations. Each is a sheet of eight trials.
         steps: Commands in a trial.
 
     Returns:
-        For each generation eight paths, each (12 steps + 1, 2) x and y [m].
+        Eight paths for each generation, each (12 steps + 1, 2) x and y [m].
     """
     population = Population(3, 2, NeatSettings.named("rosenzweig-remy"), seed=seed)
     rng = np.random.default_rng((seed, 0x4A4D))
@@ -53,7 +53,7 @@ def driven_paths(
 
 
 def along_arcs(poses: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(12 t + 1, 2) points on the arcs through (t + 1, 3) poses: a command drives with constant speeds."""
+    """Return points on arcs through poses (t + 1, 3), (12 t + 1, 2): a command drives with constant speeds."""
     points = [poses[:1, :2]]
     share = np.arange(1, PARTS + 1) / PARTS
     for (x, y, heading), (to_x, to_y, to_heading) in pairwise(poses):

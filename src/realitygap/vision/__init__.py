@@ -1,4 +1,4 @@
-"""Eyes: what cameras see; pictures in, values out. OpenCV comes with the extra `vision`.
+"""Cameras: pictures in, values out. OpenCV comes with the extra `vision`.
 
 Pen traces on a photograph of a sheet: a `SheetLayout` is what is printed for an arena, its grid, four tags, the start,
 and a box to try each pen in; `score_sheet` finds that sheet and says which cells each pen's trace crosses, and how sure

@@ -1,4 +1,4 @@
-"""Which cells a trace crosses, and how sure that is."""
+"""The cells that a trace crosses, and their confidence."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ FEATURES = (
     "one", "own", "own_shallow", "own_depth", "own_length", "link", "link_depth", "link_length", "link_doubt",
     "near", "left_out", "faint", "hidden",
 )  # fmt: skip
-"""What tells of a cell whether a trace crosses it; each about 0 to 3."""
+"""Features of a cell that show whether a trace crosses it; each about 0 to 3."""
 
 
 def visited_cells(trace: Trace, grid: Grid) -> Floats:
-    """(c,) probability of each cell that the trace crosses it.
+    """Return the probability that the trace crosses each cell, (c,).
 
     Args:
-        trace: From `follow_trace`.
+        trace: Trace of `follow_trace`.
         grid: Cells are numbered columns * row + column.
 
     Source: a logistic function of the features; `benchmarks/vision.py fit` finds coefficients on synthetic sheets.
@@ -38,13 +38,13 @@ def visited_cells(trace: Trace, grid: Grid) -> Floats:
 
 
 def probabilities(features: Floats) -> Floats:
-    """(c,) probability that cells with these features (c, f) are crossed."""
+    """Return the probability that cells with these features (c, f) are crossed, (c,)."""
     score = features @ COEFFICIENTS
     return np.asarray(1 / (1 + np.exp(-np.clip(score, -30, 30))))
 
 
 def cell_features(trace: Trace, grid: Grid) -> Floats:
-    """(c, f) what tells of each cell, as `FEATURES` names it."""
+    """Return the features of each cell, in the order of `FEATURES`, (c, f)."""
     from scipy import ndimage
 
     cells, depth = _places(trace, grid)

@@ -1,4 +1,4 @@
-"""A sheet on a photograph: its tags, the lens, the grid, and where the paper does not lie flat."""
+"""A sheet on a photograph: its tags, the lens, the grid, and uneven paper."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from ._tags import dictionary
 Floats = NDArray[np.float64]
 
 ROUNDS = 3
-"""How often the view is fitted to the grid's lines, each time looking nearer."""
+"""Number of fits of the view to the grid's lines, each with a smaller search range."""
 
 TAG_WEIGHT = 2.0
 """A tag's corner against a stretch of a grid line, by how precisely each is found."""
@@ -30,12 +30,13 @@ class Sheet:
     """A sheet as it was found on a photograph.
 
     Attributes:
-        layout: What is printed on it.
-        view: From the sheet to the photograph.
-        offsets: What the view leaves: how far the grid's lines lie from where it says, over the sheet; None where the
-            grid was not seen.
+        layout: Layout that is printed on it.
+        view: View from the sheet to the photograph.
+        offsets: Remaining errors of the view: offsets of the grid's lines from their computed places, over the sheet;
+            None if the grid was not found.
         tag_error: Root mean square of what is left at the tags' corners [m].
-        grid_error: The same at the grid's lines, before `offsets` are taken out [m]; nan where none was seen.
+        grid_error: RMS distance of the lines of the grid from the view, before `offsets` are subtracted [m]; nan if
+            none was found.
     """
 
     layout: SheetLayout
@@ -45,7 +46,7 @@ class Sheet:
     grid_error: float
 
     def to_photograph(self, points: Floats) -> Floats:
-        """(..., 2) column and row [px] of points (..., 2) of the sheet [m]."""
+        """Return column and row [px] of points (..., 2) of the sheet [m], (..., 2)."""
         moved = points if self.offsets is None else points + self.offsets.at(points)
         return self.view(moved)
 
@@ -55,7 +56,7 @@ def find_sheet(image: NDArray[np.uint8], layout: SheetLayout) -> Sheet:
 
     Args:
         image: (h, w, 3) RGB, or (h, w) gray.
-        layout: What was printed.
+        layout: Printed layout.
 
     Raises:
         SheetError: Not all four tags are seen, or they do not lie as on this sheet.
@@ -94,11 +95,11 @@ TAG_LIMIT = 0.004
 
 
 def rectify(image: NDArray[np.uint8], sheet: Sheet, px_per_m: float) -> NDArray[np.uint8]:
-    """(h, w, 3) the sheet seen from straight above; row 0 is its upper edge.
+    """Return the sheet from straight above, (h, w, 3); row 0 is its upper edge.
 
     Args:
         image: The photograph on which it was found.
-        sheet: Where.
+        sheet: Sheet on the photograph.
         px_per_m: Pixels a meter.
     """
     cv2 = from_extra("cv2", "vision")

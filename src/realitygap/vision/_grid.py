@@ -1,4 +1,4 @@
-"""The printed lines of the grid on a photograph: where each stretch of them lies, next to where a view says."""
+"""The printed lines of the grid on a photograph: the position of each stretch, next to that of a view."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ._lens import View
 Floats = NDArray[np.float64]
 
 REACHES = (0.012, 0.006, 0.004, 0.003)
-"""How far from its place a line is looked for, round by round [m]."""
+"""Search range for a line around its place, round by round [m]."""
 
 STRETCHES = 2  # of each side of a cell
 ALONG = 25  # samples along a stretch
@@ -31,8 +31,9 @@ class GridOffsets:
 
     Attributes:
         points: (n, 2) middles of the stretches, as printed [m].
-        seen: (n, 2) where they are on the photograph [px].
-        normals: (n, 2) of the lines there, on the photograph, over pixels a meter: a distance's meters.
+        seen: (n, 2) positions on the photograph [px].
+        normals: (n, 2) normals of the lines there, on the photograph, divided by pixels per meter, so that a product is
+            in meters.
         upright: (rows, lines) offsets of upright lines along x [m], lowest stretch first.
         level: (lines, columns) offsets of level lines along y [m].
         grid_x, grid_y, cell: Lower left corner and cell size of the grid [m].
@@ -48,7 +49,7 @@ class GridOffsets:
     cell: float
 
     def residuals(self, view: View) -> Floats:
-        """(n,) how far another view puts these stretches from where they were seen [m]."""
+        """Return the distances of these stretches from their places in another view, (n,) [m]."""
         return np.asarray(np.sum((view(self.points) - self.seen) * self.normals, axis=1))
 
     @property
@@ -58,7 +59,7 @@ class GridOffsets:
         return float(np.sqrt(np.mean(values**2)))
 
     def at(self, points: Floats) -> Floats:
-        """(..., 2) offsets at points (..., 2) of the sheet [m]; beyond the grid those of its edge."""
+        """Return offsets at points (..., 2) of the sheet, (..., 2) [m]; outside the grid, those of its edge."""
         u = (points[..., 0] - self.grid_x) / self.cell
         v = (points[..., 1] - self.grid_y) / self.cell
         x = _between(self.upright, u, v * STRETCHES - 0.5)
@@ -69,12 +70,12 @@ class GridOffsets:
 def grid_offsets(
     image: NDArray[np.uint8], view: View, layout: SheetLayout, nearness: int
 ) -> GridOffsets | None:
-    """Look for the lines of the grid around where a view says they are; None where too few are seen.
+    """Find the lines of the grid around their places in a view; None if too few are found.
 
     Args:
         image: (h, w) the photograph's brightness.
-        view: From the sheet to the photograph.
-        layout: With the grid.
+        view: View from the sheet to the photograph.
+        layout: Layout with the grid.
         nearness: 0 looks far, higher numbers nearer.
     """
     grid = layout.grid

@@ -20,19 +20,19 @@ DARKEST = 4.0  # optical density beyond which a camera sees black
 
 
 def to_linear(picture: NDArray[np.uint8]) -> Floats:
-    """(..., 3) light, 0 to 1, of sRGB values."""
+    """Return the light, 0 to 1, of sRGB values, (..., 3)."""
     value = np.arange(256) / 255
     table = np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4)
     return table.astype(np.float32)[picture]
 
 
 def ink_density(picture: NDArray[np.uint8], layout: SheetLayout, px_per_m: float) -> Floats:
-    """(h, w, 3) natural optical density of ink on a rectified sheet, per color channel; 0 is bare paper.
+    """Return the natural optical density of ink on a rectified sheet, per color channel, (h, w, 3); 0 is bare paper.
 
     Args:
         picture: (h, w, 3) RGB, from `rectify`.
-        layout: What is printed; its thin lines are taken out.
-        px_per_m: Of the picture.
+        layout: Printed layout, whose thin lines are removed.
+        px_per_m: Resolution of the picture.
     """
     light = to_linear(picture)
     paper = _paper(light, px_per_m)

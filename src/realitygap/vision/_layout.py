@@ -15,10 +15,10 @@ from realitygap.world import Arena, Grid, Pose
 from ._tags import tag_bits
 
 PEN_NAMES = ("black", "red", "blue", "green", "orange", "purple", "brown", "pink")
-"""Those that a study has when its file names none."""
+"""Default names of the pens of a study."""
 
 TAG_IDS = (0, 1, 2, 3)
-"""Of the family 36h11: lower left, lower right, upper right, upper left."""
+"""Numbers in the family 36h11: lower left, lower right, upper right, upper left."""
 
 TAG_SIZE = 0.06  # side of a tag's black square [m]
 TAG_INSET = 0.01  # from the walls to it [m]
@@ -39,7 +39,7 @@ class Mark:
     Attributes:
         x1, y1, x2, y2: Ends of a line, or opposite corners [m].
         gray: 0 is black, 1 is the paper's white.
-        width: Of a line [m]; 0 fills the rectangle.
+        width: Width of a line [m]; 0 fills the rectangle.
     """
 
     x1: float
@@ -74,8 +74,8 @@ class SheetLayout:
     Attributes:
         walls: Left, lower, right and upper end of what the walls enclose [m].
         grid: The reachable cells.
-        start: Where trials begin.
-        pens: What the boxes are named after.
+        start: Start of trials.
+        pens: Names of the pens' boxes.
     """
 
     walls: Box
@@ -102,7 +102,7 @@ class SheetLayout:
 
     @property
     def is_ring_free(self) -> bool:
-        """Whether tags and boxes lie between the walls and the reachable cells."""
+        """True if tags and boxes are between the walls and the reachable cells."""
         grid, (left, lower, right, upper) = self.grid, self.walls
         nearest = min(
             grid.x - left,
@@ -120,7 +120,7 @@ class SheetLayout:
         return left - out, lower - out, right + out, upper + out
 
     def tag_corners(self) -> NDArray[np.float64]:
-        """(4, 4, 2) of each tag its upper left, upper right, lower right and lower left corner [m]."""
+        """Return the upper left, upper right, lower right and lower left corner of each tag, (4, 4, 2) [m]."""
         inset = TAG_INSET if self.is_ring_free else -TAG_INSET - TAG_SIZE
         left, lower, right, upper = self.walls
         xs = (left + inset, right - inset - TAG_SIZE)
@@ -161,7 +161,7 @@ class SheetLayout:
         return marks + self._start_marks()
 
     def outer_marks(self) -> list[Mark]:
-        """Return the marks printed where no pen comes: the walls, the tags, and the boxes."""
+        """Return the marks printed outside the reach of the pens: the walls, the tags, and the boxes."""
         left, lower, right, upper = self.walls
         marks = [*_outline((left, lower, right, upper), 0.3, 0.0008)]
         for box in self.key_boxes():
@@ -171,7 +171,7 @@ class SheetLayout:
         return marks
 
     def labels(self) -> list[Label]:
-        """Which box is which pen's."""
+        """Return the labels of the pens' boxes."""
         return [
             Label(box[0], box[3] + 0.003, f"{k + 1} {self.pens[k]}", 0.004)
             for k, box in enumerate(self.key_boxes())

@@ -18,11 +18,11 @@ class View:
     multiplied by 1 + k1 r² + k2 r⁴.
 
     Attributes:
-        homography: (3, 3) from the plane [m] to the picture without its lens [px].
-        k1: Of the lens.
-        k2: Of the lens, farther out.
-        width: Of the picture [px].
-        height: Of the picture [px].
+        homography: (3, 3) homography from the plane [m] to the picture without its lens [px].
+        k1: Distortion of the lens.
+        k2: Distortion of the lens, farther out.
+        width: Width of the picture [px].
+        height: Height of the picture [px].
 
     Source: Brown (1971), radial distortion. Differs: about the picture's middle, and without tangential terms.
     """
@@ -34,7 +34,7 @@ class View:
     height: int
 
     def __call__(self, points: Floats) -> Floats:
-        """(..., 2) column and row [px] of points (..., 2) of the plane [m]."""
+        """Return column and row [px] of points (..., 2) of the plane [m], (..., 2)."""
         h = self.homography
         x, y = points[..., 0], points[..., 1]
         w = h[2, 0] * x + h[2, 1] * y + h[2, 2]
@@ -47,13 +47,13 @@ class View:
 
     @classmethod
     def from_numbers(cls, numbers: Floats, width: int, height: int) -> View:
-        """The view that `numbers` told of."""
+        """Return the view of `numbers`."""
         scale = np.hypot(width, height)
         homography = np.append(numbers[:8], 1.0).reshape(3, 3) * np.array([[scale], [scale], [1.0]])
         return cls(homography, float(numbers[8]), float(numbers[9]), width, height)
 
     def numbers(self) -> Floats:
-        """(10,) what a fit varies, each of a size about 1."""
+        """Numbers that a fit varies, each of a size about 1, (10,)."""
         scale = np.hypot(self.width, self.height)
         h = self.homography / self.homography[2, 2] / np.array([[scale], [scale], [1.0]])
         return np.append(h.ravel()[:8], [self.k1, self.k2])

@@ -1,4 +1,4 @@
-"""Stretches of a pen's color joined to one trace: by the shortest tree, then where two ends lead to each other."""
+"""The links that join stretches of a pen's color to one trace: by the shortest tree, then between pairs of ends."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ STEP = 0.001  # between the points at which a trace is followed [m]
 LONG = 0.12  # a stretch so long is the pen's, whatever lies between it and the others [m]
 LINK_WORTH = 0.7  # a link may cost so much for each millimeter of what it joins
 CLOSING = ((60.0, 0.8), (300.0, 0.5))
-"""What a link between two ends of a trace may cost, and a point of it in the mean: a long one must lie hidden."""
+"""Maximum cost of a link between two ends of a trace, and of a point of it in the mean: a long one must be hidden."""
 
 END_RADIUS = 7  # points around an end, all on one side of it
 END_OFFSET = 0.38  # of that radius: how far off their middle lies; half of it at the end of a line, 0 within
@@ -29,14 +29,14 @@ START_RADIUS = 10  # points around the start, where a line ends by right
 
 @dataclass(frozen=True)
 class Search:
-    """The cheapest way from every point to a stretch.
+    """The cheapest path from every point to a stretch.
 
     Attributes:
         nodes: (n,) places of the points through which a trace can go, in a flat picture.
-        before: (n,) the next point on the way back; negative on a stretch.
+        before: (n,) next point on the path back; negative on a stretch.
         region: (n,) the stretch it leads to.
         rows, columns: (e,) pairs of neighboring points whose ways lead to different places on stretches.
-        total: (e,) what the ways of both cost, together.
+        total: (e,) total cost of both paths.
     """
 
     nodes: NDArray[np.int64]
@@ -60,17 +60,17 @@ def joined(
     root: int,
     start: tuple[int, int] | None = None,
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.int64]]:
-    """Which stretches belong to the trace, the points of the links between them, and (k, 2) ends that lead nowhere.
+    """Return the stretches of the trace, the points of the links between them, and (k, 2) ends without a link.
 
     The links are the shortest tree over the stretches; stretches that are not worth their link are cut off. A line has
     two ends: where there are more, those between which other ink may hide it are joined.
 
     Args:
-        stretches: (h, w) number of each point's stretch, 0 where none is.
-        lengths: (1 + k,) of each stretch [m].
-        costs: (h, w) of going through each point, a millimeter; inf where that cannot be.
-        root: The stretch at the start; 0 where there is none.
-        start: Its row and column; an end there is one.
+        stretches: (h, w) number of each point's stretch, 0 for none.
+        lengths: (1 + k,) length of each stretch [m].
+        costs: (h, w) cost of a path through each point, per millimeter; inf if impossible.
+        root: Stretch at the start; 0 if there is none.
+        start: Row and column of the start, at which an end is allowed.
 
     Source: Mehlhorn (1988), a shortest tree between sets of points from one search.
     """

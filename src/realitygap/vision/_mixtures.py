@@ -21,13 +21,13 @@ AMOUNTS = {
     2: (0.25, 0.5, 0.85, 1.3, 2.0),
     3: (0.4, 1.2),
 }
-"""Of each ink where one, two or three are; 1 in a full stroke, more where a line crosses itself."""
+"""Amounts of each ink in sets of one, two, or three: 1 in a full stroke, more if a line crosses itself."""
 
 COVERED = (1.0, 0.65, 0.35)
 """Shares of a pixel that one ink covers: less at the edge of a line."""
 
 SEVERAL = (1.0, 0.3, 0.1)
-"""How likely a set of one, two and three inks is, where nothing is known of where their lines go."""
+"""Prior probability of a set of one, two and three inks, if the lines are unknown."""
 
 TOGETHER = 20_000  # places that are weighed at a time
 
@@ -43,8 +43,8 @@ class Mixtures:
     """The mixtures that may explain the color of each inked place.
 
     Attributes:
-        likely: (k, s) how likely each color is under each set of inks.
-        color: (n,) which of these colors each place has.
+        likely: (k, s) likelihood of each color under each set of inks.
+        color: (n,) index of the color of each place.
         n_pens: Number of pens.
     """
 
@@ -67,7 +67,7 @@ class Mixtures:
         return cls(_likelihoods(((seen + 0.5) * CELL).astype(np.float32), inks), color, len(inks))
 
     def presence(self, drawing: Floats) -> Floats:
-        """(n, p) probability of each ink, where some pens are known to draw more around a place than others.
+        """Return the probability of each ink, (n, p), if some pens are known to draw more around a place than others.
 
         Args:
             drawing: (n, p) or (1, p) how much of the ink around each place is each pen's.
@@ -77,13 +77,13 @@ class Mixtures:
         return self._shares(np.log(drawing), lambda part: np.exp(part @ holds) * several)
 
     def presence_along(self, passing: Floats, of_itself: Floats) -> Floats:
-        """(n, p) probability of each ink, where it is known how probably the other pens' traces pass each place.
+        """Return the probability of each ink, (n, p), given the probabilities that other pens' traces pass.
 
         What is known of a pen's own trace counts little for it: what others explain is not evidence of it.
 
         Args:
             passing: (n, p) between 0 and 1.
-            of_itself: (n, p) what counts of a pen's own at most.
+            of_itself: (n, p) maximum weight of a pen's own trace.
         """
         odds = passing / (1 - passing)
         holds = self._holds()
@@ -98,7 +98,7 @@ class Mixtures:
         return found
 
     def possible(self) -> Floats:
-        """(n, p) how likely each place's color is at best with a pen's ink in it, next to the best of all, 0..1."""
+        """Return the best likelihood of each place's color with a pen's ink, relative to the best, 0..1, (n, p)."""
         holds = self._holds() > 0
         several = np.array([SEVERAL[len(pens) - 1] for pens in ink_sets(self.n_pens)], np.float32)
         weight = self.likely * several

@@ -24,8 +24,8 @@ def overlay_png(score: SheetScore, titles: dict[int, str] | None = None) -> byte
     probability.
 
     Args:
-        score: Of the sheet.
-        titles: What to call the trace of each pen, by its number; its name where not given.
+        score: Score of the sheet.
+        titles: Title of the trace of each pen, by its number. Default: its name.
     """
     from matplotlib.figure import Figure
 

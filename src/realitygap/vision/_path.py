@@ -16,7 +16,7 @@ REACH = 0.0065  # from a point to the next, at most [m]
 
 
 def trace_path(trace: Trace, start: tuple[float, float]) -> Floats:
-    """(k, 2) a line through all of a trace, from the start on [m]; at a crossing it goes straight on.
+    """Return a line through all of a trace, from the start, (k, 2) [m]; at a crossing it goes straight.
 
     Paper does not tell in which order a line was drawn, nor how often.
     """

@@ -1,4 +1,4 @@
-"""Which pens left the ink of a pixel: one, two or three inks on paper, as a camera sees them."""
+"""The pens whose ink is in a pixel: one, two or three inks on paper, in a camera's picture."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ COMMON_INKS = {
     "brown": (125, 72, 40), "pink": (240, 105, 165), "magenta": (200, 30, 120), "turquoise": (0, 150, 160),
     "cyan": (0, 160, 215), "yellow": (250, 220, 40),
 }  # fmt: skip
-"""sRGB of a full stroke of a felt-tip pen of this name, where nobody tried it on the sheet."""
+"""sRGB of a full stroke of a felt-tip pen of this name, if it was not tried on the sheet."""
 
 AROUND = 0.006  # of the sheet around the cells in which traces are looked for [m]
 FAINTEST = 0.35  # density below which a pixel is bare paper
@@ -40,17 +40,17 @@ STRAY = 0.02  # probability of a pen where its trace does not pass
 
 @dataclass(frozen=True)
 class PenMaps:
-    """Maps of where each pen's ink may be on a rectified sheet.
+    """Maps of the possible ink of each pen on a rectified sheet.
 
     Attributes:
         box: Left, lower, right and upper end of what they show: the cells and a little around them [m].
         px_per_m: Resolution of the maps [px/m].
         pens: Their names.
         inks: (p, 3) optical density of a full stroke of each.
-        is_tried: (p,) whether that was seen in the pen's box, and is not a guess from its name.
+        is_tried: (p,) True if the color was seen in the pen's box, and False if it is a guess from its name.
         strength: (h, w) optical density of all ink.
         presence: (p, h, w) probability that a pixel has this pen's ink, 0 on bare paper.
-        hidden: (p, h, w) how likely the pixel's color is at best if it has, relative to the best explanation, 0 to 1.
+        hidden: (p, h, w) best likelihood of the pixel's color with this ink, relative to the best explanation, 0 to 1.
         mixtures: Mixtures that may explain the inked pixels.
         place: Rows and columns of the inked pixels.
     """
@@ -68,7 +68,7 @@ class PenMaps:
 
     @cached_property
     def highest(self) -> Floats:
-        """(h, w) presence of the likeliest pen."""
+        """Return the presence of the most likely pen, (h, w)."""
         return np.asarray(self.presence.max(axis=0))
 
     @cached_property
@@ -81,22 +81,22 @@ class PenMaps:
 
     @cached_property
     def weight_around(self) -> Floats:
-        """(h, w) the weight, smoothed over half a millimeter."""
+        """Return the weight, smoothed over half a millimeter, (h, w)."""
         cv2 = from_extra("cv2", "vision")
         return np.asarray(cv2.GaussianBlur(self.weight, (0, 0), 0.0005 * self.px_per_m))
 
     @cached_property
     def smooth_strength(self) -> Floats:
-        """(h, w) the strength without the noise of single pixels."""
+        """Return the strength without the noise of single pixels, (h, w)."""
         cv2 = from_extra("cv2", "vision")
         return np.asarray(cv2.GaussianBlur(self.strength, (0, 0), 0.7))
 
     def along(self, traces: Floats, of_itself: Floats) -> PenMaps:
-        """The same maps, where it is known where the other pens' traces may pass: these explain ink better than others.
+        """Return the maps, given the possible places of the other pens' traces, which explain ink better than others.
 
         Args:
-            traces: (p, h, w) 0 where a trace does not pass to 1 where it surely does.
-            of_itself: (p, h, w) how much of that counts at most for a pen's own ink.
+            traces: (p, h, w) probability that a trace passes, 0 to 1.
+            of_itself: (p, h, w) maximum weight of this for a pen's own ink.
         """
         passing, most = (
             np.stack([layer[self.place] for layer in part], axis=1) for part in (traces, of_itself)
@@ -112,10 +112,10 @@ def separate_pens(
     """Tell the inks of a sheet apart.
 
     Args:
-        density: (h, w, 3) from `ink_density`.
-        layout: Whose boxes show how each pen looks.
-        px_per_m: Of the picture.
-        drawn: Which of the layout's pens drew; all when None.
+        density: (h, w, 3) density from `ink_density`.
+        layout: Layout whose boxes show the color of each pen.
+        px_per_m: Resolution of the picture.
+        drawn: Pens of the layout that drew. Default: all.
 
     Raises:
         SheetError: A pen was not tried in its box, and its name is no color.

@@ -25,10 +25,10 @@ DEEP_MODES = ("I", "I;16", "I;16B", "I;16L", "I;16N")
 
 
 def read_photo(photo: str | Path | bytes) -> NDArray[np.uint8]:
-    """(h, w, 3) RGB of a photograph or a scan, turned as the camera was held; a very large one at half its size.
+    """Return a photograph or a scan in RGB, turned upright, (h, w, 3); a very large one at half its size.
 
     Args:
-        photo: Its file, or what is in it: JPEG, PNG, TIFF or WebP.
+        photo: File, or its bytes: JPEG, PNG, TIFF or WebP.
 
     Raises:
         SheetError: It cannot be read, or is no such picture, or is too large or too small.

@@ -32,7 +32,7 @@ CAPITAL = 0.72  # height of a capital in sizes of type
 
 @dataclass(frozen=True)
 class Tile:
-    """A page of a tiled sheet: its part of the sheet, and where it stands among the others, from the lower left."""
+    """A page of a tiled sheet: its part of the sheet, and its place among the others, from the lower left."""
 
     box: Box
     row: int
@@ -75,7 +75,7 @@ def sheet_pdf(layout: SheetLayout, paper: str = "a4") -> bytes:
     """The PDF of a sheet, to be printed at 100 %.
 
     Args:
-        layout: What is on it.
+        layout: Layout to print.
         paper: `a4`, `letter`, `a3`, or `arena` for one page as large as the sheet.
 
     Raises:

@@ -20,21 +20,21 @@ def shape_of(box: Box, px_per_m: float) -> tuple[int, int]:
 
 
 def to_pixels(points: NDArray[np.float64], box: Box, px_per_m: float) -> NDArray[np.float64]:
-    """(n, 2) column and row of points [m] in a picture of this box, whose pixel 0 has its middle at 0."""
+    """Return column and row of points [m] in a picture of this box, (n, 2). The middle of pixel 0 is at 0."""
     column = (points[..., 0] - box[0]) * px_per_m - 0.5
     row = (box[3] - points[..., 1]) * px_per_m - 0.5
     return np.stack([column, row], axis=-1)
 
 
 def to_meters(pixels: NDArray[np.float64], box: Box, px_per_m: float) -> NDArray[np.float64]:
-    """(n, 2) points [m] of columns and rows in a picture of this box."""
+    """Return points [m] of columns and rows in a picture of this box, (n, 2)."""
     x = (pixels[..., 0] + 0.5) / px_per_m + box[0]
     y = box[3] - (pixels[..., 1] + 0.5) / px_per_m
     return np.stack([x, y], axis=-1)
 
 
 def raster(marks: Iterable[Mark], box: Box, px_per_m: float) -> NDArray[np.float32]:
-    """(h, w) how dark marks are, 0 for white paper to 1 for black; row 0 is the upper edge of the box."""
+    """Return the darkness of marks, 0 for white paper to 1 for black, (h, w); row 0 is the upper edge of the box."""
     cv2 = from_extra("cv2", "vision")
     picture = np.zeros(shape_of(box, px_per_m), np.float32)
     fine = np.zeros(picture.shape, np.uint8)

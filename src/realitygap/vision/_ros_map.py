@@ -53,8 +53,8 @@ class OccupancyMap:
     """A map of ROS.
 
     Attributes:
-        name: Its file without the ending.
-        free: (h, w) bool, whether a pixel is known to be free; row 0 is at the top, as in its image.
+        name: Name of the file without the ending.
+        free: (h, w) bool, True for a pixel that is known to be free; row 0 is at the top, as in its image.
         resolution: Side of a pixel [m].
         origin: Pose of the lower left corner of the image in the frame of the map.
     """

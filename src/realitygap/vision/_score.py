@@ -19,10 +19,10 @@ from ._photo import is_gray
 from ._trace import follow_traces
 
 PX_PER_M = 2000.0
-"""Of the rectified sheet: a pen's line is three pixels wide."""
+"""Resolution of the rectified sheet: a pen's line is three pixels wide."""
 
 SURE = 0.9
-"""Cells less sure than this are for somebody to look at."""
+"""Confidence below which a person should check a cell."""
 
 
 @dataclass(frozen=True)
@@ -30,11 +30,11 @@ class TraceScore:
     """The score of a pen's trace.
 
     Attributes:
-        pen: Its number among the layout's pens.
+        pen: Number of the pen in the layout.
         name: The pen's.
-        is_tried: Whether its color was seen in its box, and is not a guess from its name.
-        probability: (c,) of each cell of the grid, that the trace crosses it.
-        features: (c, f) what told so, as `realitygap.vision._cells.FEATURES` names it.
+        is_tried: True if its color was seen in its box, and False if it is a guess from its name.
+        probability: (c,) probability that the trace crosses each cell of the grid.
+        features: (c, f) features of the cells, in the order of `realitygap.vision._cells.FEATURES`.
         path: (k, 2) a line through the trace from the start on, in an order in which it may have been drawn [m].
     """
 
@@ -52,7 +52,7 @@ class TraceScore:
 
     @property
     def confidence(self) -> NDArray[np.float64]:
-        """(c,) how sure it is of each cell that it was told right, 0.5 to 1."""
+        """Confidence of the decision on each cell, 0.5 to 1, (c,)."""
         return np.maximum(self.probability, 1 - self.probability)
 
     @property
@@ -66,9 +66,9 @@ class SheetScore:
     """A photograph of a sheet, scored.
 
     Attributes:
-        sheet: Where it is on the photograph.
+        sheet: Sheet on the photograph.
         picture: (h, w, 3) uint8 the sheet from straight above, `PX_PER_M` pixels a meter.
-        traces: Of each pen.
+        traces: Score of each pen's trace.
     """
 
     sheet: Sheet
@@ -83,8 +83,8 @@ def score_sheet(
 
     Args:
         image: (h, w, 3) RGB.
-        layout: What was printed.
-        drawn: Which of the layout's pens drew; all when None.
+        layout: Printed layout.
+        drawn: Pens of the layout that drew. Default: all.
 
     Raises:
         SheetError: The sheet is not found, the picture is gray and of several pens, or a pen's color is not known.

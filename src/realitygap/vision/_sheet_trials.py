@@ -1,4 +1,4 @@
-"""Which trials of a ledger drew on a sheet of paper."""
+"""The trials of a ledger that drew on a sheet of paper."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ class SheetTrials:
     """The trials whose lines are on one sheet of paper.
 
     Attributes:
-        sheet: Its number.
-        waiting: Those whose cells are to be entered, in the order of their turns.
+        sheet: Number of the sheet.
+        waiting: Trials whose cells are not entered yet, in their order.
         pens: Numbers of all pens that drew on it, ascending.
-        spoiled: Of trials that are void, by the number of the pen: its line may still be on the sheet.
+        spoiled: Void trials by the number of the pen, because their lines may still be on the sheet.
     """
 
     sheet: int
@@ -38,8 +38,8 @@ def trials_on_sheet(
     """The trials on a sheet that wait for their cells.
 
     Args:
-        ledger: Of the study.
-        generation, condition, replicate, sheet: Which trials; all of them must lie on one sheet.
+        ledger: Ledger of the study.
+        generation, condition, replicate, sheet: Selection of trials, all of which must be on one sheet.
         role: `score` takes what is driven; `second` and `correction` also what is scored.
 
     Raises:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from realitygap.errors import from_extra
 
 CORNER_FAMILY = "36h11"
-"""Of the tags at the arena's corners."""
+"""Family of the tags at the arena's corners."""
 
 FAMILIES = {
     "36h11": "DICT_APRILTAG_36h11",
@@ -43,7 +43,7 @@ def n_tags(family: str) -> int:
 
 
 def tag_bits(family: str, number: int) -> NDArray[np.bool_]:
-    """(b, b) a tag with its black border, True where it is white; row 0 is its upper edge.
+    """Return a tag with its black border, True for white, (b, b); row 0 is its upper edge.
 
     Raises:
         ValueError: The family has no such tag.

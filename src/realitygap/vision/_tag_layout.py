@@ -19,7 +19,7 @@ CORNER_IDS = (0, 1, 2, 3)
 
 CORNER_SIZE_M = 0.06
 CORNER_INSET_M = 0.01
-"""From the walls; outside of them by as much where the cells leave no room inside."""
+"""Distance from the walls. It is outside of them if the cells leave no room inside."""
 
 
 @dataclass(frozen=True)
@@ -27,13 +27,13 @@ class RobotTag:
     """A tag on top of a robot, its upper edge towards the robot's front.
 
     Attributes:
-        number: In its family.
+        number: Number in its family.
         size: Side of its black square [m].
         height: Above the floor [m].
-        family: A key of `FAMILIES`; empty where it is found by looking.
-        ahead: Its middle, seen from the point of the robot that poses tell of [m].
-        left: Likewise.
-        turned: How much it is turned counter-clockwise against the robot [rad].
+        family: Key of `FAMILIES`; empty to detect the family.
+        ahead: Position ahead of the robot's reference point [m].
+        left: Position to the left of the robot's reference point [m].
+        turned: Counter-clockwise rotation relative to the robot [rad].
     """
 
     number: int = 10
@@ -58,7 +58,7 @@ class RobotTag:
             raise ValueError(f"family is {self.family!r}, expected one of {', '.join(FAMILIES)}.")
 
     def corners(self) -> Floats:
-        """(4, 2) upper left, upper right, lower right and lower left of its square, about its middle [m].
+        """Upper left, upper right, lower right and lower left corner of its square, about its middle, (4, 2) [m].
 
         Its upper edge is towards +x.
         """
@@ -82,12 +82,12 @@ def corner_tags(
     that is wide enough, else just outside the walls.
 
     Args:
-        arena: Whose walls span a rectangle.
+        arena: Arena whose walls span a rectangle.
         size: Side of a tag's black square [m].
-        inset: From the walls to the nearest edges of the square [m]; below 0 where they lie outside the walls.
+        inset: Distance from the walls to the nearest edges of the square [m]; negative for tags outside the walls.
 
     Returns:
-        By number: (4, 3) upper left, upper right, lower right and lower left, on the floor [m].
+        (4, 3) upper left, upper right, lower right and lower left corner on the floor [m], by number.
 
     Raises:
         ValueError: They do not fit.

@@ -27,12 +27,12 @@ def print_tags(
 
     Args:
         path: The file; one that is there is replaced.
-        tag: The robot's; of family 36h11 where none is named.
+        tag: Tag of the robot. Default family: 36h11.
         corner_size: Side of the black square of a corner tag [m].
         paper: a4, letter or a3.
 
     Returns:
-        How many pages.
+        The number of pages.
 
     Raises:
         ValueError: No such paper, no such tag, or tags that are too large for the paper.

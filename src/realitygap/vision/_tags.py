@@ -23,7 +23,7 @@ def dictionary() -> Any:
 
 
 def tag_bits(number: int) -> NDArray[np.bool_]:
-    """(8, 8) a tag with its black border, True where it is white; row 0 is its upper edge."""
+    """Return a tag with its black border, True for white, (8, 8); row 0 is its upper edge."""
     known = dictionary()
     size = known.markerSize + 2
     image: NDArray[np.uint8] = from_extra("cv2", "vision").aruco.generateImageMarker(known, number, size)

@@ -1,4 +1,4 @@
-"""A pen's trace: stretches of its color, joined where other ink may hide it."""
+"""The trace of a pen: stretches of its color, joined where other ink may hide it."""
 
 from __future__ import annotations
 
@@ -41,16 +41,16 @@ class Trace:
     """The trace of a pen, at points a millimeter apart, row 0 uppermost.
 
     Attributes:
-        pen: Its name.
+        pen: Name of the pen.
         box: Area of the arrays [m].
-        own: (h, w) bool, where its color is seen and belongs to the trace.
-        links: (h, w) bool, where it must have gone, under other ink or across a gap.
-        doubt: (h, w) what a link costs there, a millimeter; 0 elsewhere.
+        own: (h, w) bool, True for its color in the trace.
+        links: (h, w) bool, True for its inferred path, under other ink or across a gap.
+        doubt: (h, w) cost of a link per millimeter; 0 elsewhere.
         left_out: (h, w) bool, its color, in stretches too short and too far from the rest.
-        presence: (h, w) how surely the ink there is the pen's.
-        hidden: (h, w) how well the pen's ink may lie there under other ink.
-        trust: (h, w) how probably it passes there, before the other traces are known: more on longer stretches.
-        own_trust: (h, w) how much of that may count for its own color there; less near an end that leads nowhere.
+        presence: (h, w) probability that the ink is the pen's.
+        hidden: (h, w) likelihood of the pen's ink under other ink.
+        trust: (h, w) probability that it passes, before the other traces are known: higher on longer stretches.
+        own_trust: (h, w) part of that for its own color; lower near an end without a link.
     """
 
     pen: str
@@ -66,14 +66,14 @@ class Trace:
 
 
 def follow_traces(maps: PenMaps, start: tuple[float, float]) -> list[Trace]:
-    """The traces of all pens, each followed alone, and then several times knowing where the others pass.
+    """Follow the traces of all pens, first separately, and then several times given the others.
 
     Where lines lie on each other their mixture may look like another pen's ink; it is not where two lines that
     explain it go on at either end. What is found of one trace so tells of the next, and again.
 
     Args:
-        maps: From `separate_pens`.
-        start: x and y where trials begin [m].
+        maps: Maps of `separate_pens`.
+        start: Start of the trials, x and y [m].
     """
     traces = [follow_trace(maps, pen, start) for pen in range(len(maps.pens))]
     shape = maps.strength.shape
@@ -95,12 +95,12 @@ def _widened(trust: Floats, shape: tuple[int, ...]) -> Floats:
 
 
 def follow_trace(maps: PenMaps, pen: int, start: tuple[float, float]) -> Trace:
-    """Join what is seen of a pen to one trace that begins where trials begin.
+    """Join the visible ink of a pen to one trace that begins at the start.
 
     Args:
-        maps: From `separate_pens`.
-        pen: Which of them.
-        start: x and y where trials begin [m].
+        maps: Maps of `separate_pens`.
+        pen: Number of the pen.
+        start: Start of the trials, x and y [m].
     """
     presence, leads, hidden, strength = _pooled(maps, pen)
     full = float(np.linalg.norm(maps.inks[pen]))
@@ -189,7 +189,7 @@ def _stretches(
 
 
 POINTS_ACROSS = 2.2
-"""How many points a millimeter apart a line has across, after blur and pooling."""
+"""Number of points, a millimeter apart, across a line after blur and pooling."""
 
 
 def _costs(presence: Floats, hidden: Floats, strength: Floats) -> Floats:

@@ -43,7 +43,7 @@ LACKS = (
 INNER_PORT = 33333
 START_S = 10.0
 STAND_S = 0.06
-"""Time after which the pose of a robot that stands is the same [s of its time]."""
+"""Time after which the pose of a robot at rest is constant [s of its time]."""
 STAND_TRIES = 50
 SAMPLE_S = 0.05
 """Time between two points of the path [s of the robot's time]."""
@@ -101,13 +101,13 @@ class Playground:
 
     Args:
         arena: The walls and obstacles, and the start of the robot; the paper's if not given.
-        speed: Its seconds in one of real time, 0.1 to 8.
+        speed: Seconds of the playground per second of real time, 0.1 to 8.
         port: Port on loopback to listen on; 0 for a free one.
-        window: Whether to show it in its window.
+        window: True to show its window.
 
     Attributes:
         port: Name of the robot's port, such as socket://127.0.0.1:43210.
-        folder: Of its files.
+        folder: Folder of its files.
 
     Raises:
         RobotError: It cannot be started; the message names what is missing.
@@ -279,7 +279,7 @@ class Playground:
         return float(ahead - turn), float(ahead + turn)
 
     def path(self) -> NDArray[np.float64]:
-        """(t, 4) time [s], x [m], y [m] and heading [rad] since the robot was placed."""
+        """Return time [s], x [m], y [m] and heading [rad] since the robot was placed, (t, 4)."""
         with self._lock:
             return np.array(self._points, np.float64).reshape(-1, 4)
 

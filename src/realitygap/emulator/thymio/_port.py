@@ -28,7 +28,7 @@ class PlaygroundPort(SocketPort):  # type: ignore[misc]  # pyserial has no types
 
     Attributes:
         witness: The playground; None before the port is opened.
-        arena: Where its robot drives if the port's name does not say; the paper's if None.
+        arena: Arena of its robot if the port's name gives none. Default: the paper's.
     """
 
     witness: Playground | None = None
@@ -52,7 +52,7 @@ class PlaygroundPort(SocketPort):  # type: ignore[misc]  # pyserial has no types
             self.portstr = url
 
     def fileno(self) -> int:
-        """Raise an error: nobody needs the descriptor, as the robot ends with this program."""
+        """Raise an error, because no descriptor is needed: the robot ends with this program."""
         raise OSError("The playground ends with this program.")
 
     def close(self) -> None:
@@ -68,8 +68,8 @@ def open_playground(url: str, arena: Arena | None = None) -> PlaygroundPort:
     """Start a playground and connect to its robot.
 
     Args:
-        url: Its name, with or without `thymio:` before it.
-        arena: Where its robot drives if the name does not say; the paper's if None.
+        url: Name of the port, with or without `thymio:` before it.
+        arena: Arena of its robot if the name gives none. Default: the paper's.
 
     Raises:
         RobotError: It cannot be started.

@@ -11,7 +11,7 @@ from realitygap.world import Arena, Obstacle, bounds_of, walls_within
 
 CM = 100.0
 HEIGHT_CM = 10.0
-"""Height of what stands in the arena; a Thymio's sensors look 3.4 cm above the floor."""
+"""Height of walls and obstacles. A Thymio's sensors are 3.4 cm above the floor."""
 WALL_CM = 0.2
 """Thickness of a wall inside the room."""
 

@@ -1,4 +1,4 @@
-"""When a trial begins in a video: where its commands and what the robot did go together."""
+"""The start of a trial in a video, found by comparing its commands with the robot's motion."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ MOST_TRIED = 200_000
 
 @dataclass(frozen=True)
 class Beginning:
-    """When a trial begins.
+    """The start of a trial.
 
     Attributes:
-        time: In the track's time [s].
-        agreement: Correlation of commands with what the robot did, mean of ahead and turn; 1 is perfect, nan where a
-            person said when.
+        time: Start in the track's time [s].
+        agreement: Correlation of commands with the robot's motion, mean of ahead and turn; 1 is perfect, nan if a
+            person gave the start.
     """
 
     time: float
@@ -34,12 +34,12 @@ class Beginning:
 
 
 def find_beginning(track: Track, times: Floats, commands: Floats, stalled: NDArray[np.bool_]) -> Beginning:
-    """When a trial begins in a track.
+    """Find the start of a trial in a track.
 
     Each command should have moved the robot ahead and turned it as it said; steps that began stalled are left out.
 
     Args:
-        track: Of a robot, with the whole trial in it.
+        track: Track of a robot with the whole trial.
         times: (t + 1,) when each command began, and when the last ended, since the trial's beginning [s].
         commands: (t, 2) move and turn.
         stalled: (t,).

@@ -31,10 +31,10 @@ class Camera:
     """A camera that looks at an arena.
 
     Attributes:
-        lens: Its lens.
-        rotation: (3, 3) from the arena's axes to the camera's: across, down and into the picture.
-        translation: (3,) the arena's origin, seen from the camera [m].
-        rms: How far the corners of the corner tags are off [px].
+        lens: Lens of the camera.
+        rotation: (3, 3) rotation from the arena's axes to the camera's: right, down and into the picture.
+        translation: (3,) arena's origin in the camera's frame [m].
+        rms: RMS error of the corners of the corner tags [px].
     """
 
     lens: Lens
@@ -44,17 +44,17 @@ class Camera:
 
     @property
     def place(self) -> Floats:
-        """(3,) where it is: x, y and above the floor [m]."""
+        """Position: x, y and height above the floor, (3,) [m]."""
         where: Floats = -self.rotation.T @ self.translation
         return where
 
     def to_pixels(self, points: Floats) -> Floats:
-        """(n, 2) pixels of (n, 3) points of the arena [m]."""
+        """Return pixels of points (n, 3) of the arena [m], (n, 2)."""
         seen = points @ self.rotation.T + self.translation
         return self.lens.to_pixels(seen[:, :2] / seen[:, 2:])
 
     def on_plane(self, pixels: Floats, z: float) -> Floats:
-        """(n, 2) the points at height z [m] that (n, 2) pixels show."""
+        """Return the points at height z [m] that pixels (n, 2) show, (n, 2)."""
         directions = self.lens.to_directions(pixels)
         rays = np.column_stack([directions, np.ones(len(directions))]) @ self.rotation
         x, y, height = self.place
@@ -79,8 +79,8 @@ def fit_camera(
     Args:
         size: Width and height of pictures [px].
         seen: (4, 2) pixels of each corner tag's corners, by number.
-        layout: (4, 3) where they are [m], by number.
-        lens: The camera's lens, where it is known.
+        layout: (4, 3) corners of each tag [m], by number.
+        lens: Lens of the camera, if known.
         robot: (m, 4, 2) pixels of the corners of the robot's tag in some pictures.
         tag: The robot's tag.
 
@@ -209,7 +209,7 @@ def square_poses(corners: Floats, tag: RobotTag) -> tuple[Floats, Floats, Floats
 
     Args:
         corners: (n, 4, 2) [m].
-        tag: What the square should be.
+        tag: Tag of the square.
 
     Returns:
         (n, 2) middles [m], (n,) headings [rad] and (n,) rms distance of the corners from such a square there [m].
@@ -225,7 +225,7 @@ def square_poses(corners: Floats, tag: RobotTag) -> tuple[Floats, Floats, Floats
 
 
 def placed_squares(places: Floats, tag: RobotTag) -> Floats:
-    """(4 n, 3) corners of the tag at (n, 3) places x [m], y [m], heading [rad] of its middle."""
+    """Return corners of the tag with its middle at places x [m], y [m], heading [rad], (n, 3), as (4 n, 3)."""
     model = tag.corners() @ np.array([1.0, 1j])
     around = model[None] * np.exp(1j * places[:, 2])[:, None]
     flat = np.stack([around.real + places[:, :1], around.imag + places[:, 1:2]], axis=-1).reshape(-1, 2)

@@ -27,12 +27,12 @@ class Lens:
     """A pinhole and its distortion, for pictures of one size.
 
     Attributes:
-        width: Of pictures [px].
-        height: Likewise.
+        width: Width of pictures [px].
+        height: Height of pictures [px].
         focal: Focal length across and down [px].
-        center: Where the optical axis meets the picture [px].
+        center: Intersection of the optical axis with the picture [px].
         distortion: k1, k2, p1, p2, k3 of the Brown-Conrady model, as OpenCV has it.
-        rms: How far points were off when it was fitted [px]; nan where it was not.
+        rms: Error of the points of the fit [px]; nan if it was not fitted.
 
     Source: Brown (1966), in the form of OpenCV's calib3d.
     """
@@ -46,7 +46,7 @@ class Lens:
 
     @property
     def matrix(self) -> Floats:
-        """(3, 3) camera matrix."""
+        """Camera matrix, (3, 3)."""
         (fx, fy), (cx, cy) = self.focal, self.center
         return np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
 
@@ -61,7 +61,7 @@ class Lens:
         return np.column_stack([across, down]) * self.focal + self.center
 
     def to_directions(self, pixels: Floats) -> Floats:
-        """(n, 2) directions of pixels: the inverse of `to_pixels`, by iteration."""
+        """Return the directions of pixels, (n, 2): the inverse of `to_pixels`, by iteration."""
         distorted = (np.asarray(pixels, np.float64) - self.center) / self.focal
         k1, k2, p1, p2, k3 = self.distortion
         x, y = distorted.T
@@ -74,7 +74,7 @@ class Lens:
         return np.column_stack([x, y])
 
     def scaled_to(self, width: int, height: int) -> Lens:
-        """The same lens for pictures of another size.
+        """Return the same lens for pictures of another size.
 
         Raises:
             VisionError: They have another shape, so another part of what the sensor sees.
@@ -92,7 +92,7 @@ class Lens:
         )  # fmt: skip
 
     def to_toml(self) -> str:
-        """As the text of a file."""
+        """Return the text of a file."""
         return (
             f"format = {LENS_FORMAT!r}\nwidth = {self.width}  # px\nheight = {self.height}\n"
             f"focal = {list(self.focal)}  # px, across and down\ncenter = {list(self.center)}\n"
@@ -134,8 +134,8 @@ def fit_lens(images: Iterable[NDArray[np.uint8]], columns: int, rows: int, squar
     """The lens of a camera that was shown a chessboard from several sides.
 
     Args:
-        images: Gray pictures; those without the whole board are left out, as those that show it where the one before
-            did.
+        images: Gray pictures. Pictures without the whole board are left out, and so are those with the board at the
+            same place as in the previous one.
         columns, rows: Inner corners of the board, at least 3 each.
         square: Side of a square [m].
 

@@ -14,11 +14,11 @@ from ._tracker import Tracker
 from ._video import Marks, Tracked
 
 PATIENCE_S = 3.0
-"""How long a picture may take before the camera counts as gone."""
+"""Maximum time for a picture before the camera counts as disconnected."""
 
 
 class LiveTrack(ClosedOnExit):
-    """Looks at every picture that comes; tells where the robot was since `begin`.
+    """A track from a live camera: it processes every picture, and returns the robot's poses since `begin`.
 
     Args:
         source: The camera, whose times are those of `clock`.
@@ -55,7 +55,7 @@ class LiveTrack(ClosedOnExit):
             self._has_come.notify_all()
 
     def begin(self) -> None:
-        """Forget where the robot was; the corner tags are remembered."""
+        """Forget the robot's poses. The corner tags are kept."""
         with self._has_come:
             self._tracker.forget()
 

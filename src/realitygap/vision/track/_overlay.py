@@ -23,13 +23,13 @@ STEPS_A_SIDE = 24  # of a wall's line, which a lens bends
 def save_overlay(
     path: Path, frames: Iterable[tuple[float, Image]], tracked: Tracked, arena: Arena, rate: float
 ) -> None:
-    """Write the pictures with walls, the robot's line up to then, and its heading; orange where it was filled in.
+    """Write the pictures with walls, the robot's line up to then, and its heading; orange for interpolated parts.
 
     Args:
         path: A new video, .mp4.
-        frames: Those that were tracked.
-        tracked: What was found.
-        arena: Whose walls are drawn.
+        frames: Pictures that were tracked.
+        tracked: Result of the tracking.
+        arena: Arena with the walls to draw.
         rate: Pictures a second.
 
     Raises:
@@ -47,7 +47,7 @@ def save_overlay(
 
 
 def draw_overlay(image: Image, time: float, tracked: Tracked, arena: Arena) -> Image:
-    """(height, width, 3) a picture with what was found until its time [s] drawn into it."""
+    """Return a picture with the track until its time [s] drawn into it, (height, width, 3)."""
     cv2 = from_extra("cv2", "vision")
     drawn: Image = image.copy() if image.ndim == 3 else cv2.cvtColor(image, cv2.COLOR_GRAY2BGR)
     track, camera = tracked.track, tracked.camera

@@ -119,7 +119,7 @@ class CameraDevice(ClosedOnExit):
     """A camera that is plugged in; times are of the clock that is given.
 
     Args:
-        number: As the system counts them, from 0.
+        number: Number of the camera in the system, from 0.
         clock: Tells the time [s].
 
     Raises:
@@ -143,7 +143,7 @@ class CameraDevice(ClosedOnExit):
         self.rate = float(rate) if 1 <= rate <= 1000 else USUAL_RATE
 
     def __iter__(self) -> Iterator[tuple[float, Image]]:
-        """Pictures as they come, until it is closed or unplugged."""
+        """Yield pictures until the camera is closed or unplugged."""
         while True:
             is_read, image = self._capture.read()
             if not is_read:

@@ -32,9 +32,9 @@ class Track:
     Attributes:
         times: (t,) ascending [s].
         poses: (t, 3) x [m], y [m], heading [rad, with all full turns from the first on].
-        seen: (t,) bool; False where the pose was filled in from those around it.
-        size_error: By how much the tag looks larger than its size and height say, as a share of its side; nan where
-            that was not measured.
+        seen: (t,) bool; False if the pose was interpolated.
+        size_error: Error of the tag's apparent size, given its size and height, as a share of its side; nan if not
+            measured.
     """
 
     times: Floats
@@ -49,7 +49,7 @@ class Track:
         return float(np.max(np.diff(there), initial=0.0))
 
     def at(self, times: Floats) -> Floats:
-        """(n, 3) poses at other times [s], on straight lines between pictures.
+        """Return poses at other times [s], by linear interpolation, (n, 3).
 
         Raises:
             ValueError: A time before the first picture or after the last.
@@ -72,7 +72,7 @@ class Track:
         return Track(times, poses, seen, self.size_error)
 
     def held(self, first_s: float, last_s: float) -> Track:
-        """The same, at rest from a time before its first picture, and to one after its last [s]."""
+        """Return the same track, at rest from a time before its first picture, and to one after its last [s]."""
         times = np.concatenate([[first_s], self.times, [last_s]])
         poses = np.concatenate([self.poses[:1], self.poses, self.poses[-1:]])
         seen = np.concatenate([[False], self.seen, [False]])
@@ -86,7 +86,7 @@ class Track:
         return cells_along(self.poses[:, :2], grid)
 
     def to_csv(self) -> str:
-        """As a table: time_s, x_m, y_m, heading_rad, seen (1, or 0 where it was filled in)."""
+        """Return a table: time_s, x_m, y_m, heading_rad, seen (1, or 0 if interpolated)."""
         rows = [
             f"{time:.4f},{x:.5f},{y:.5f},{heading:.5f},{seen:d}"
             for time, (x, y, heading), seen in zip(self.times, self.poses, self.seen, strict=True)
@@ -95,7 +95,7 @@ class Track:
 
 
 def track_of(found: Sightings, camera: Camera, tag: RobotTag) -> Track:
-    """The poses of a robot whose tag was seen.
+    """Return the poses of a robot from its tag.
 
     The tag's corners are put down on the plane of its height, so its parallax is taken out; the heading is that of the
     square in this plane. Sightings of a wrong size or shape, and leaps, count as not seen. Gaps are filled with cubic

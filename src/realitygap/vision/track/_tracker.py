@@ -1,4 +1,4 @@
-"""Finds tags in picture after picture, and remembers where they were."""
+"""A tracker that finds tags in consecutive pictures and stores their positions."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def make_detector(family: str) -> Any:
 
 
 def find_tags(image: Image, detector: Any) -> dict[int, Floats]:
-    """(4, 2) pixels of the corners of each tag in a gray picture, by number; those seen twice are left out."""
+    """Return the corners of each tag in a gray picture, (4, 2) pixels, by number; tags seen twice are left out."""
     corners, numbers, _ = detector.detectMarkers(image)
     found: dict[int, Floats] = {}
     if numbers is None:
@@ -49,7 +49,7 @@ def find_tags(image: Image, detector: Any) -> dict[int, Floats]:
 
 
 def gray_of(image: Image) -> Image:
-    """(height, width) of a picture in color or gray."""
+    """Return a picture in gray, (height, width)."""
     if image.ndim == 2:
         return image
     cv2 = from_extra("cv2", "vision")
@@ -63,10 +63,10 @@ class Sightings:
 
     Attributes:
         times: (t,) [s].
-        robot: (t, 4, 2) pixels of the corners of the robot's tag; not a number where it was not found.
+        robot: (t, 4, 2) pixels of the corners of the robot's tag; nan if not found.
         corners: (4, 2) pixels of the corners of each corner tag, by number: the median over pictures.
-        moved: How far a corner tag was from that median in the worst picture [px]: above a pixel or two, the
-            camera or the tag moved.
+        moved: Largest distance of a corner tag from that median [px]: above a pixel or two, the camera or the tag
+            moved.
         family: Family of the robot's tag; empty if it was never found.
         size: Width and height of the pictures [px].
     """
@@ -84,7 +84,7 @@ class Tracker:
     """Takes pictures one by one.
 
     Args:
-        tag: The robot's; its family is found by looking where it is not named.
+        tag: Tag of the robot. Without a family, the family is detected.
 
     Raises:
         ValueError: The robot's tag cannot be told from a corner's.
@@ -126,7 +126,7 @@ class Tracker:
         return best if self._seen_of[best] or self.tag.family else ""
 
     def take(self, time: float, image: Image) -> Floats | None:
-        """(4, 2) pixels of the corners of the robot's tag in the next picture; None where it is not found."""
+        """Return the corners of the robot's tag in the next picture, (4, 2) pixels; None if it is not found."""
         gray = gray_of(image)
         self._size = (gray.shape[1], gray.shape[0])
         number = self._n_taken
@@ -188,7 +188,7 @@ class Tracker:
         self._times, self._robot = [], []
 
     def sightings(self) -> Sightings:
-        """All that was seen so far."""
+        """Return all sightings so far."""
         missing = np.full((4, 2), np.nan)
         robot = [missing if found is None else found for found in self._robot]
         middle = {number: np.median(each, axis=0) for number, each in sorted(self._corners.items())}
@@ -214,5 +214,5 @@ def refuse_unseen(found: Sightings, tag: RobotTag) -> None:
 
 
 def with_family(tag: RobotTag, found: Sightings) -> RobotTag:
-    """The tag, with the family that was seen."""
+    """Return the tag with the detected family."""
     return replace(tag, family=found.family or tag.family)

@@ -1,4 +1,4 @@
-"""From a video to a track."""
+"""The conversion of a video to a track."""
 
 from __future__ import annotations
 
@@ -48,8 +48,8 @@ class Marks:
         arena: Arena with tags at its corners.
         tag: The robot's tag.
         lens: The camera's lens; None to fit it to the tags.
-        corner_size: As in `corner_tags`.
-        corner_inset: As in `corner_tags`.
+        corner_size: Size of the corner tags, as in `corner_tags`.
+        corner_inset: Inset of the corner tags, as in `corner_tags`.
     """
 
     arena: Arena
@@ -77,7 +77,7 @@ class Marks:
 
 
 def track_video(frames: Iterable[tuple[float, Image]], marks: Marks) -> Tracked:
-    """The way of a robot through a video.
+    """Track a robot in a video.
 
     Args:
         frames: Times [s] and pictures; a `VideoFile` or another source is one.

@@ -128,13 +128,13 @@ def mixed(one: Posterior, other: Posterior, prior: Sequence[Parameter], *, share
 
 
 def _groups(prior: Sequence[Parameter]) -> list[NDArray[np.int64]]:
-    """Sensors apart from all else: what they answer somewhere has nothing to do with how the robot gets there."""
+    """Separate the sensors from other parameters: readings at a pose do not depend on the motion to it."""
     of_sensors = np.array([parameter.name.startswith("range.") for parameter in prior])
     return [at for at in (np.flatnonzero(~of_sensors), np.flatnonzero(of_sensors)) if len(at)]
 
 
 def _draw(rng: np.random.Generator, low: Floats, high: Floats, n: int) -> Floats:
-    """(n, p) from the prior within a box; evenly spread along each parameter (Latin hypercube)."""
+    """Draw from the prior within a box, stratified along each parameter (Latin hypercube), (n, p)."""
     ranks = np.argsort(rng.uniform(size=(len(low), n)), axis=1).T
     u = (ranks + rng.uniform(size=ranks.shape)) / n
     return np.asarray(
@@ -213,7 +213,7 @@ def _ridge(design: Floats, wanted: Floats) -> tuple[Floats, Floats]:
 
 
 def _local(told: Floats, places: Floats, weight: Floats, here: Floats) -> Floats:
-    """Places moved to `here` along a weighted linear regression on what was told."""
+    """Return places moved to `here` along a weighted linear regression on the summaries."""
     design = np.column_stack([np.ones(len(told)), told - here])
     weighed = design * weight[:, None]
     gram = design.T @ weighed + 1e-6 * weight.sum() * np.diag([0.0, *told.var(axis=0) + 1e-12])

@@ -85,7 +85,7 @@ def fit_from_poses(
 
 
 def _own_places(prior: Sequence[Parameter], robot: RobotModel) -> Floats:
-    """(p,) where the robot's own numbers are, of parameters of its motion."""
+    """Return the places of the robot's own numbers, for parameters of its motion, (p,)."""
     numbers = {
         name: value.center if isinstance(value, Distribution) else value
         for name, value in robot.numbers().items()
@@ -102,7 +102,7 @@ def _own_places(prior: Sequence[Parameter], robot: RobotModel) -> Floats:
 def _sensors(
     shots: Shots, parameters: Sequence[Parameter], robot: RobotModel, arena: Arena, rng: np.random.Generator
 ) -> dict[str, Floats]:
-    """(N_DRAWS,) of each parameter that range sensors share."""
+    """Return draws of each parameter that range sensors share, (N_DRAWS,)."""
     first = next(sensor for sensor in robot.range if sensor.response in ("ir", "pulses"))
     placements: list[Placement] = []
     poses = shots.poses[:, :-1][shots.known]
@@ -171,7 +171,7 @@ def _spread_slip(
 
 
 def _slips(parameter: Parameter, shots: Shots, rng: np.random.Generator) -> Floats:
-    """(N_DRAWS,) of slip."""
+    """Return draws of slip, (N_DRAWS,)."""
     turned = np.abs(np.diff(shots.wheels, axis=1)).mean(axis=2)
     some = shots.known & ~shots.touching & np.isfinite(turned) & (turned > LEAST_WAY)
     forward = some & (np.prod(np.sign(np.nan_to_num(np.diff(shots.wheels, axis=1))), axis=2) > 0)

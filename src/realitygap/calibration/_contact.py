@@ -87,7 +87,7 @@ def fit_contact(
 
 
 def _off(problem: Problem, places: Floats) -> Floats:
-    """(m, w, 3) by which poses are off."""
+    """Return the errors of poses, (m, w, 3)."""
     return np.nan_to_num(problem.off(places)[..., :3])
 
 
@@ -101,7 +101,7 @@ def _first_place(problem: Problem) -> Floats:
 
 
 def _mean_off(noisy: Problem, places: Floats) -> Floats:
-    """(m, w, 3) by which poses are off in the mean: a wall that is met by chance turns a robot one way only."""
+    """Return the mean errors of poses, (m, w, 3): a wall that is met by chance turns a robot to one side only."""
     all_off = (np.nan_to_num(noisy.with_noise(places, key)[..., :3]) for key in range(1, N_MEAN + 1))
     mean = next(all_off)
     for n, off in enumerate(all_off, 2):
@@ -121,7 +121,7 @@ def _scale(noisy: Problem, place: Floats) -> Floats:
 
 
 def _log_likelihoods(noisy: Problem, scale: Floats, places: Floats) -> Floats:
-    """(m, k) of the trials' windows, whose differences have a t distribution: some go another way altogether."""
+    """Return the log likelihoods of trials, (m, k), with a t distribution, because some windows differ completely."""
     squares = ((_mean_off(noisy, places) / scale) ** 2).sum(axis=-1)
     logs = -0.5 * (FREEDOM + 3.0) * np.log1p(squares / FREEDOM)
     trials = np.unique(noisy.windows.trial)

@@ -82,12 +82,12 @@ class _Columns:
     groups: list[tuple[str, NDArray[np.floating] | NDArray[np.bool_], int]] = field(default_factory=list)
 
     def add(self, kind: str, values: NDArray[np.floating] | NDArray[np.bool_], per_step: int = 1) -> None:
-        """Values (m, k, t, ...), or (m, k, c) of the whole trial where `per_step` is 0."""
+        """Add values (m, k, t, ...), or (m, k, c) for the whole trial if `per_step` is 0."""
         self.groups.append((kind, values, per_step))
 
     @property
     def vectors(self) -> Vectors:
-        """(m, d) all entries."""
+        """Return all entries, (m, d)."""
         return np.concatenate(
             [values.reshape(len(values), -1).astype(np.float32, copy=False) for _, values, _ in self.groups],
             axis=1,
@@ -95,19 +95,19 @@ class _Columns:
 
     @property
     def kinds(self) -> NDArray[np.str_]:
-        """(d,) the kind of each entry."""
+        """Return the kind of each entry, (d,)."""
         return np.concatenate([np.full(values[0].size, kind) for kind, values, _ in self.groups])
 
     @property
     def trial(self) -> NDArray[np.int64]:
-        """(d,) the trial of each entry."""
+        """Return the trial of each entry, (d,)."""
         return np.concatenate(
             [np.repeat(np.arange(values.shape[1]), values[0, 0].size) for _, values, _ in self.groups]
         )
 
     @property
     def step(self) -> NDArray[np.int64]:
-        """(d,) the step of each entry; -1 for the whole trial."""
+        """Return the step of each entry, (d,); -1 for the whole trial."""
         return np.concatenate([_steps_of(values.shape[1:], per_step) for _, values, per_step in self.groups])
 
 
@@ -227,7 +227,7 @@ def _shooting(anchors: NDArray[np.float64], rehearsal: Rehearsal) -> _Columns:
 
 
 def _step_by_step(t: int, rehearsal: Rehearsal) -> _Columns:
-    """All that is seen of trials with t given commands, from afar."""
+    """Add all observations of trials with t given commands that are not put back."""
     columns = _Columns()
     columns.add("readings", rehearsal.readings[:, :, :t])
     columns.add("stall", rehearsal.stalled[:, :, :t])

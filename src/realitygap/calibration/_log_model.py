@@ -106,7 +106,7 @@ def wheel_steps(log: MotionLog, numbers: Mapping[str, Floats]) -> Floats:
 
 
 def _delayed(target: Floats, time: Floats, delay: Floats) -> Floats:
-    """Return (m, n - 1) mean targets between two times of commands that come late."""
+    """Return mean targets between two times of late commands, (m, n - 1)."""
     lasts = np.diff(time)
     if not np.any(delay):
         return np.broadcast_to(target[:, :-1], (len(target), len(lasts)))
@@ -180,7 +180,7 @@ def track(
 
 
 def _first_heading(log: MotionLog, length: Floats, turn: Floats, first: int) -> Floats:
-    """Return (m,) the heading that lays the first part of the simulated path on the seen one [rad]."""
+    """Return the heading that aligns the first part of the simulated path with the observed one, (m,) [rad]."""
     heading = np.concatenate([np.zeros((len(turn), 1)), np.cumsum(turn[:, first:], axis=1)], axis=1)
     middle = heading[:, :-1] + turn[:, first:] / 2
     path = np.cumsum(length[:, first:] * np.exp(1j * middle), axis=1)

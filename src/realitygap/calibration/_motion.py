@@ -257,7 +257,7 @@ def _report(
 def _widened(
     scatters: Floats, noises: Sequence[Parameter], scatter: Scatter, off: Floats, trial: Ints
 ) -> Floats:
-    """(d, q) the simulator's own noise, around its median."""
+    """Return the simulator's own noise, spread around its median, (d, q)."""
     prior, middle = NoisePrior.of(noises), np.median(scatters, axis=0)
     wide = np.ones(len(noises))
     wide[: len(MOTION_NOISE)] = widening_of_noise(scatter, off, trial, middle, noises)

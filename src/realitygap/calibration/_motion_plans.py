@@ -153,7 +153,7 @@ def _free_line(at: Floats, heading: float, lines: Floats, room: float) -> float:
 
 
 def _away(points: Floats, lines: Sequence[Sequence[float]] | Floats) -> Floats:
-    """(n,) distance from each point to the nearest wall [m]."""
+    """Return the distance from each point to the nearest wall, (n,) [m]."""
     nearest = np.full(len(points), np.inf)
     for x1, y1, x2, y2 in lines:
         way = np.array([x2 - x1, y2 - y1])

@@ -57,7 +57,7 @@ def next_trials(
 
 
 def _slopes(places: Floats, goal: Floats) -> Floats:
-    """(p, q) how what is to be predicted follows from the parameters; what noise may explain, little."""
+    """Return the slopes of the goal by the parameters, (p, q), shrunk by noise."""
     off = places - places.mean(axis=0)
     p = off.shape[1]
     return np.linalg.solve(off.T @ off + len(off) * 0.05 * np.eye(p), off.T @ (goal - goal.mean(axis=0)))

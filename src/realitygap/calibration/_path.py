@@ -197,7 +197,7 @@ class _Measured:
 
     @property
     def by_encoders(self) -> bool:
-        """Whether nobody but encoders saw it."""
+        """True if only encoders observed it."""
         return any(trial.end_pose is None and not len(trial.poses) for trial in self.trials)
 
     @property
@@ -210,7 +210,7 @@ class _Measured:
 
 
 def _driven(trial: TrialRecord) -> Array:
-    """(t, 2) commands of a trial up to those in which it comes to rest."""
+    """Return the commands of a trial up to those in which it comes to rest, (t, 2)."""
     moving = np.flatnonzero(np.any(trial.commands != 0, axis=1))
     return trial.commands[: moving[-1] + 1] if len(moving) else trial.commands[:0]
 
@@ -229,7 +229,7 @@ def _by_encoders(trial: TrialRecord, robot: RobotModel) -> Moved | None:
 def _mean(
     values: Sequence[float], step: float, unknown: float, n_draws: int, rng: np.random.Generator
 ) -> Array:
-    """(1 + n,) the mean, and draws of where it may be.
+    """Return the mean, and draws of it, (1 + n,).
 
     Repeats that all read the same are as uncertain as what they were read to; one alone is as uncertain as `unknown`,
     the standard deviation of what was thought possible.
@@ -245,7 +245,7 @@ def _mean(
 
 
 def _of_a_robot(*numbers: Array) -> NDArray[np.intp]:
-    """(1 + n,) rows of numbers (1 + n,): the first, and the draws that are above 0, as those of a robot are.
+    """Return rows of numbers (1 + n,): the first, and the draws above 0, as the numbers of a robot are positive.
 
     The others, of which few repeats have some, are left to these.
     """

@@ -149,7 +149,7 @@ def sample_clusters(
 
 
 def _shares(rng: np.random.Generator, n: int, k: int) -> Floats:
-    """(n, k) weights of clusters."""
+    """Return weights of clusters, (n, k)."""
     return np.asarray(k * rng.dirichlet(np.ones(k), n))
 
 
@@ -159,7 +159,7 @@ def _few(k: int) -> float:
 
 
 def _weighed_anew(rng: np.random.Generator, logs: Floats, proposed: Floats, n: int) -> Ints:
-    """(n,) which of the places, each with other weights (Dirichlet) of the clusters."""
+    """Return indices of places, (n,), each with other weights (Dirichlet) of the clusters."""
     scores = _shares(rng, n, logs.shape[1]) @ logs.T - proposed
     picks = scores + rng.gumbel(size=scores.shape)  # draws in proportion to the exponentials
     return np.asarray(np.argmax(picks, axis=1), np.int64)

@@ -260,7 +260,7 @@ class _Problem:
         return np.asarray(self.distance_sd * point[len(self.free) :])
 
     def middle(self, number: Number, sensors: Sequence[int]) -> float:
-        """Return where the prior is centered."""
+        """Return the center of the prior."""
         own = float(np.mean([plain_number(self.robot, k, number.name) for k in sensors]))
         return max(own, LEAST[number.name]) if number.kind == "ratio" else own
 
@@ -445,7 +445,7 @@ def _compare(problem: _Problem, best: Floats) -> HeldOut:
 
 
 def _floor(table: _Table) -> float | None:
-    """Return the error of predicting each unseen reading by the mean of its seen neighbors in the table."""
+    """Return the error of predicting each held-out reading by the mean of its fitted neighbors in the table."""
     rows, columns = table.place
     grid = np.full((table.sensor.max() + 1, rows.max() + 3, columns.max() + 3), np.nan)
     grid[table.sensor[table.seen], rows[table.seen] + 1, columns[table.seen] + 1] = table.readings[table.seen]

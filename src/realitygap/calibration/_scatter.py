@@ -82,7 +82,7 @@ class Scatter:
         return np.asarray(np.moveaxis(_solved(self._root(noise), seen), -1, 0))
 
     def _root(self, noise: Floats) -> Floats:
-        """(5, 5, w) lower triangles whose squares are the covariances; 1 for what was not observed."""
+        """Return lower triangles whose squares are the covariances, (5, 5, w); 1 for unobserved channels."""
         seen = self.seen.T
         covariance = noise[JITTER] ** 2 * np.moveaxis(self.late, 0, -1) * (seen[:, None] & seen)
         at = np.arange(5)
@@ -101,7 +101,7 @@ def _cholesky(matrices: Floats) -> Floats:
 
 
 def _solved(root: Floats, rows: Floats) -> Floats:
-    """(n, ..., w) x where root (n, n, w) times x is `rows`."""
+    """Return the solution x of root (n, n, w) times x = `rows`, (n, ..., w)."""
     found = np.empty_like(rows)
     for k in range(len(root)):
         found[k] = rows[k]

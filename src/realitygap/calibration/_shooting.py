@@ -128,7 +128,7 @@ def scatter_of(problem: Problem, place: Floats) -> Scatter:
 
 
 def _lateness(problem: Problem, place: Floats, jitter: float) -> Floats:
-    """(w, 5, 5) covariance of windows by the square of a second of jitter, of the mean of a few robots as well.
+    """Return the covariance of windows per squared second of jitter, with that of a mean of few robots, (w, 5, 5).
 
     As simulated: no command comes before it is given, and one that comes late enough stays for the next step.
     """
@@ -257,7 +257,7 @@ def widening_of_noise(
 
 
 def _sandwich(known: Floats, pulls: Floats) -> Floats:
-    """(p,) from the curvature (p, p) and what each of n trials (n, p) pulls at places."""
+    """Return the factor of each interval, (p,), from the curvature (p, p) and the score of each of n trials, (n, p)."""
     n, p = pulls.shape
     if n < FEWEST_TRIALS:
         return np.ones(p)

@@ -102,7 +102,7 @@ class MotionOfCommands:
         return places
 
     def _off(self, places: Floats, noise: Floats | None = None, key: int = 1) -> Floats:
-        """(m, k, t, 3) differences of robots at (m, p) places with (m, q) noise, without any if not given."""
+        """Return differences of robots at places (m, p) with noise (m, q), or without noise, (m, k, t, 3)."""
         m = len(places)
         self.n_simulated += m
         none = np.zeros((m, len(self.noise))) if noise is None else noise
@@ -120,7 +120,7 @@ class MotionOfCommands:
         self.shift = self._off(places[None])[0] - with_noise
 
     def _slopes(self, places: Floats) -> Floats:
-        """(p, k, t, 3) how differences fall with each place."""
+        """Return the derivatives of the differences by each place, (p, k, t, 3)."""
         p = len(places)
         ends = np.clip([places - STEP, places + STEP], 0.0, 1.0)
         tried = np.repeat(places[None], 2 * p, axis=0)
@@ -132,7 +132,7 @@ class MotionOfCommands:
         return np.asarray(fall / (ends[1] - ends[0])[:, None, None, None])
 
     def _scales(self, off: Floats) -> Floats:
-        """(k, t, 3) typical differences: of robots that touch something, and of others."""
+        """Return typical differences, (k, t, 3): of robots that touch something, and of others."""
         shots = self.shooter.shots
         scales = np.ones_like(off)
         for which, least in ((shots.touching, COARSE), (~shots.touching, FINEST)):
@@ -144,7 +144,7 @@ class MotionOfCommands:
         return scales
 
     def _best(self, start: Floats) -> tuple[Floats, Floats]:
-        """Places where differences are least, and the differences there."""
+        """Return the places with the smallest differences, and these differences."""
         places, off = start, self._off(start[None])[0]
         scales, damping = self._scales(off), 1e-2
         for turn in range(MOST_ROUNDS):
@@ -172,7 +172,7 @@ class MotionOfCommands:
         return places, off
 
     def _draws(self, places: Floats, off: Floats, n: int) -> Floats:
-        """(n, p) places, each with other weights of blocks of commands and another draw from the prior."""
+        """Return places, (n, p), each with other weights of blocks of commands and another draw from the prior."""
         p, scales = len(places), self._scales(off)
         weight = np.sqrt(_weights(off / scales))[..., None]
         slopes, left = self._slopes(places) / scales * weight, off / scales * weight
@@ -191,7 +191,7 @@ class MotionOfCommands:
         return draws
 
     def _noise(self, places: Floats, off: Floats) -> Floats:
-        """(N_NOISE, q) draws of the noise of robots that touch nothing.
+        """Return draws of the noise of robots that touch nothing, (N_NOISE, q).
 
         Variances of different kinds of noise add up; what each makes of every command is simulated by itself.
         """
@@ -241,7 +241,7 @@ def place_of(parameter: Parameter, value: float) -> float:
 
 
 def _weights(off: Floats) -> Floats:
-    """(k, t) how much differences (k, t, 3) in their scales count."""
+    """Return weights of differences (k, t, 3), in units of their scales, (k, t)."""
     return np.asarray((FREEDOM + 3.0) / (FREEDOM + (off**2).sum(axis=-1)))
 
 

@@ -63,7 +63,7 @@ def wheel_ways(
 
 
 def _rolled(target: Floats, delay: float, lag: float, step_s: float) -> Floats:
-    """(k, t, 2) ways from targets [m/s]."""
+    """Return distances from targets [m/s], (k, t, 2)."""
     whole = int(delay / step_s)
     first = delay - whole * step_s
     last = step_s - first

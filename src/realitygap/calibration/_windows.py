@@ -174,7 +174,7 @@ def differences(
 
 
 def _moved(before: Floats, after: Floats, axle: Floats) -> Floats:
-    """(m, w, 3) how the middle of the axle moved in the body's frame before, and the turn."""
+    """Return the motion of the axle's middle in the body's earlier frame, and the turn, (m, w, 3)."""
     turn = wrapped(after[..., 2] - before[:, 2])
     offset = axle[:, None]
     dx, dy = after[..., 0] - before[:, 0], after[..., 1] - before[:, 1]

@@ -21,7 +21,7 @@ _STUDY_SETTINGS = (
     *("--noise", "--selection", "--arena", "--start", "--task", "--fitness"),
     *("--population", "--generations", "--steps"),
 )
-"""What newcomers try as options of `run`."""
+"""Settings that newcomers try as options of `run`."""
 
 
 class _RootGroup(TyperGroup):
@@ -47,7 +47,7 @@ class _RootGroup(TyperGroup):
 
 
 def _refer_to_the_study_file(error: Any) -> None:
-    """Say where a setting belongs that was given as an option of `run`; Typer exports no class for unknown options."""
+    """Explain where a setting given as an option of `run` belongs. Typer exports no class for unknown options."""
     if getattr(error, "option_name", None) in _STUDY_SETTINGS and error.ctx.command.name == "run":
         error.possibilities = None
         error.message = (

@@ -205,7 +205,7 @@ def _checked(
     *,
     choose: bool,
 ) -> Path:
-    """Refuse what cannot be, before a trial is lost on it; where the calibration goes."""
+    """Refuse wrong options before a trial is lost, and return the file for the calibration."""
     from realitygap.records import refuse_links
 
     if (robot is None) == (data is None):
@@ -237,7 +237,7 @@ def _checked(
 
 
 def _refuse_other_files(out: Path) -> None:
-    """Return where a file may be written over: it is a calibration.
+    """Raise an error if a file is not a calibration, which may be overwritten.
 
     Raises:
         StudyError: It is something else, or a calibration that somebody changed and that cannot be read.
@@ -254,7 +254,7 @@ def _refuse_other_files(out: Path) -> None:
 
 
 def _is_foreign(data: Path | None) -> bool:
-    """Whether the data was written by another program, or is a recording: it is not a file of observed trials."""
+    """Return whether the data is of another program, or a recording, and not a file of observed trials."""
     from realitygap.records import is_observations
 
     return data is not None and data.exists() and not is_observations(data)
@@ -361,7 +361,7 @@ def _measured(
 
 
 def _is_led(robot: str, witness: str | None) -> bool:
-    """Whether a person at the terminal has to put the robot where it is to stand."""
+    """Return whether a person at the terminal has to place the robot."""
     from realitygap.platforms import platform_of
 
     return witness is None and platform_of(robot).needs_person

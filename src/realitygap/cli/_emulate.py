@@ -167,7 +167,7 @@ def emulate(
 def _emulate_thymio(
     arena: str, speed: float, tcp: int | None, witness: int | None, *, window: bool, quiet: bool
 ) -> None:
-    """Serve a playground until it ends, or a signal comes."""
+    """Serve a playground until it ends, or until a signal."""
     from realitygap.emulator import LACKS, Playground, PlaygroundServer, open_scene
 
     where = open_scene(arena).arena
@@ -243,7 +243,7 @@ def _exit_on_sigterm() -> Iterator[None]:
 
 @contextmanager
 def _ended_by_signals(server: Server | PlaygroundServer) -> Iterator[None]:
-    """Let Ctrl-C and SIGTERM end a server as if it had come to its end."""
+    """Let Ctrl-C and SIGTERM end a server like a normal end."""
 
     def stop(number: int, frame: FrameType | None) -> None:
         server.stop()

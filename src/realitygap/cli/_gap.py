@@ -282,7 +282,7 @@ def _print_why(why: Why) -> None:
 
 
 class _TrialsBar:
-    """Trials done on each platform, on standard error where that is a terminal."""
+    """A display of the finished trials on each platform, on standard error if that is a terminal."""
 
     def __init__(self, *, quiet: bool) -> None:
         from rich.console import Console

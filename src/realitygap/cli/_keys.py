@@ -16,7 +16,7 @@ _NAMES = {
 }  # fmt: skip
 
 _REST_S = 0.05
-"""How long the rest of an arrow key's letters may take."""
+"""Maximum time for the remaining letters of an arrow key."""
 
 
 def read_line() -> str:

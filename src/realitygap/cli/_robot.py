@@ -282,7 +282,7 @@ def export_recording(
 
 
 def _row(line: Any) -> tuple[str, str, str, str]:
-    """One line of a recording for people."""
+    """Return a line of a recording for people."""
     values = line.get("values", {})
     what = ", ".join(f"{name} {_value(value)}" for name, value in values.items())
     if line["kind"] == "wire":

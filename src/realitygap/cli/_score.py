@@ -265,7 +265,7 @@ def _say_what_is_spoiled(on_sheet: SheetTrials) -> None:
 def _all_confirmed(
     on_sheet: SheetTrials, traces: dict[int, TraceScore], photo: Path, data: bytes, who: str
 ) -> Iterator[dict[int, Score]]:
-    """All trials together, as they were read; but those whose pen drew twice, and those of which nothing was seen."""
+    """Confirm all trials as they were read, except those whose pen drew twice and those without visible ink."""
     scores = {
         trial.trial: _score_of(traces[trial.pen], traces[trial.pen].cells, photo, data, who)
         for trial in on_sheet.waiting

@@ -29,7 +29,7 @@ def sheet_observer(*, asks_for_start: bool) -> SheetObserver:
 
 
 def _settle(problem: str, can_count: bool) -> Verdict:
-    """Ask what becomes of a trial that was under way when the program ended."""
+    """Ask about a trial that was running when the program ended."""
     if not can_count:
         typer.prompt(f"{problem} Enter", default="", show_default=False, err=True)
         return "void"

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from realitygap.records import Score, Trial, TrialRecord
 
 _SILENCE_S = 10.0
-"""After so long a silence the next trial is told of, too."""
+"""Time without a message after which the next trial is reported, too."""
 
 
 class TellingOperator(Operator):

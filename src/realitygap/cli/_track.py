@@ -264,7 +264,7 @@ def lens(
 def _wanted(
     study: Path | None, trials: Path | None, trial: int | None, into: Path | None
 ) -> TrialToTrack | None:
-    """The trial that the video shows; None where none was named."""
+    """Return the trial in the video; None if none was named."""
     if study is not None and trials is not None:
         raise StudyError("--study and --trials exclude each other: the trial is in a ledger or in a file.")
     if (trial is None) != (study is None and trials is None):

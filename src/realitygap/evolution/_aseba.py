@@ -70,7 +70,7 @@ class _Code:
 
         Args:
             line: The line.
-            n_words: Its words of bytecode.
+            n_words: Number of its words of bytecode.
             n_temporary: Variables that the compiler makes for it, and forgets.
         """
         self.lines.append("  " * self.depth + line)
@@ -242,7 +242,7 @@ def _tried(sensed: Sequence[str]) -> list[list[int]]:
 
 
 def _runs(sensed: Sequence[str], kind: str) -> list[tuple[int, int, int]]:
-    """Return where the inputs of a kind follow each other as the robot's sensors do: input, sensor, number."""
+    """Return the parts in which the inputs of a kind have the order of the robot's sensors: input, sensor, number."""
     found: list[tuple[int, int, int]] = []
     for place, name in enumerate(sensed):
         if match := re.fullmatch(rf"{kind}\.(\d+)", name):

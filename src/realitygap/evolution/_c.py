@@ -166,7 +166,7 @@ def _in_comment(names: Sequence[str]) -> str:
 
 
 def _constants(guard: str, kind: str, names: Sequence[str]) -> list[str]:
-    """A constant for each input or output, numbered where two would be equal."""
+    """Return a constant for each input or output, with numbers if two would be equal."""
     found: list[str] = []
     for k, name in enumerate(names):
         word = f"{guard}_{kind}_" + re.sub(r"[^A-Z0-9]", "_", name.upper())

@@ -389,7 +389,7 @@ _OF_NO_ROW = {"full", "reached", "cursor", "ends"}
 
 
 def _row_of(table: T, row: int) -> T:
-    """One row of each array of a table; what belongs to no row is kept whole."""
+    """Return one row of each array of a table. Values that belong to no row stay whole."""
     arrays: dict[str, Any] = table._asdict()
     return type(table)(
         **{

@@ -117,13 +117,13 @@ class _Parts:
         return result
 
     def layer(self, seen: str, columns: dict[int, int], nodes: list[dict[str, Any]], name: str) -> str:
-        """Activations of some nodes: activation(slope * (seen @ weights + biases)).
+        """Add activations of some nodes: activation(slope * (seen @ weights + biases)).
 
         Args:
             seen: The result whose columns the nodes see.
-            columns: Which column is which node's.
-            nodes: In the order of the result's columns.
-            name: Of the result; other names begin with it.
+            columns: Column of each node.
+            nodes: Nodes in the order of the result's columns.
+            name: Name of the result. Other names begin with it.
         """
         weights = np.zeros((len(columns), len(nodes)))
         biases = np.array([node["bias"] for node in nodes])
@@ -167,7 +167,7 @@ def _feed_forward(parts: _Parts) -> Ends:
 
 
 def _recurrent(parts: _Parts) -> Ends:
-    """One step: all nodes see the inputs of now and the activations of the step before."""
+    """Add one step, in which all nodes get the present inputs and the activations of the step before."""
     values = parts.values
     nodes = sorted(values["nodes"], key=lambda node: int(node["node"]))
     columns = {node: node for node in range(parts.n_given)}

@@ -164,7 +164,7 @@ def _distance(point: Point, a: Point, b: Point) -> float:
 
 
 def _curve(a: Point, b: Point) -> list[Point]:
-    """From the rim of one node to the rim of another: straight forward, bent where it leads back, a loop to itself."""
+    """Return a curve from the rim of one node to another: straight forward, bent backward, or a loop to itself."""
     if a == b:
         turns = [math.tau * (k / 16) - math.pi / 2 for k in range(17)]
         return [(a[0] + 0.3 * math.cos(turn), a[1] + 0.45 + 0.3 * math.sin(turn)) for turn in turns[1:-1]]
@@ -203,7 +203,7 @@ def _end(curve: list[Point], color: str, *, positive: bool) -> Line:
 
 
 def _label_place(curve: list[Point], taken: Sequence[Point]) -> Point:
-    """Return the place of a link's weight: near its start, where links are still apart, and clear of other labels."""
+    """Return the place of a link's weight: near its start, where links are separate, and clear of other labels."""
     best, most = curve[0], -math.inf
     for k in range(14):
         part = 0.2 + 0.03 * k

@@ -64,7 +64,7 @@ def resampled(
 
 
 def _smoothed(means: Values, latent: Values, rng: np.random.Generator) -> Values:
-    """(b, c, 2) means moved by normal numbers, and drawn towards the center so that their covariance stays."""
+    """Return means moved by normal numbers, and drawn towards the center so that their covariance stays, (b, c, 2)."""
     width = len(latent) ** (-1 / 6)  # of the normal reference for two dimensions
     root = _power(np.cov(latent.T), 0.5)
     center = latent.mean(axis=0)
@@ -84,7 +84,7 @@ def shrunk_means(source: GapSide, target: GapSide) -> Values:
 
 
 def _map_between(seen: Values, wanted: Values) -> Values:
-    """(2, 2) the symmetric map that turns one covariance into the other, its part below 0 left out."""
+    """Return the symmetric map that turns one covariance into the other, without its negative part, (2, 2)."""
     root = _power(seen, 0.5)
     inverse = _power(seen, -0.5)
     return inverse @ _power(root @ _power(wanted, 1.0) @ root, 0.5) @ inverse
@@ -99,7 +99,7 @@ def _power(matrix: Values, exponent: float) -> Values:
 
 
 def _residuals(side: GapSide) -> Values:
-    """(c, r) what trials differ from their controller's mean, with the variance of trials; 0 where there is one."""
+    """Return the deviations of trials from their controller's mean, with the trials' variance, (c, r); 0 for one."""
     if side.trials < 2:
         return np.zeros_like(side.values)
     return (side.values - side.means[:, None]) * math.sqrt(side.trials / (side.trials - 1))

@@ -66,7 +66,7 @@ def smallest_energy_p(n: int, r: int, q: int) -> float:
 
 
 def _matrices(source: Values, target: Values) -> Iterator[Values]:
-    """(r + q, r + q) distances between the trials of a controller, of one after the other."""
+    """Yield the distances between the trials of each controller, (r + q, r + q)."""
     from scipy.spatial.distance import cdist  # which takes a while to import, and nothing else needs
 
     if min(source.shape[1], target.shape[1]) < 2:
@@ -76,7 +76,7 @@ def _matrices(source: Values, target: Values) -> Iterator[Values]:
 
 
 def _shared_out(matrix: Values, is_in_source: NDArray[np.bool_]) -> Values:
-    """(p,) energy distance of a controller for p ways to share out its trials, (p, r + q)."""
+    """Return energy distances of a controller for p splits of its trials (p, r + q), (p,)."""
     in_source = is_in_source.astype(float)
     r = float(in_source[0].sum())
     q = in_source.shape[1] - r

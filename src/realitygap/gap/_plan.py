@@ -233,7 +233,7 @@ def _simulated(mean: float, sd: float, n: int, seed: int) -> tuple[Values, Value
 def _simulated_correlations(
     correlation: float, reliability: float, floor: float, n: int, seed: int
 ) -> NDArray[np.bool_]:
-    """Whether each of many studies shows a correlation above the floor: n normal controllers, noise on both sides."""
+    """Return whether each of many studies of n normal controllers with noise shows a correlation above the floor."""
     rng = np.random.default_rng(seed)
     pearson = 2 * math.sin(math.pi * correlation / 6)
     studies = max(100, min(SIMULATED, _MOST_PAIRS // n))

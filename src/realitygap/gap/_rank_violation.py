@@ -41,7 +41,7 @@ def _of_block(source: Values, target: Values) -> Values:
 
 
 def _violations(source: Values, target: Values) -> Values:
-    """(b, c, c) difference on the target of each two controllers that the simulator orders otherwise, else 0."""
+    """Return the difference on the target of two controllers that the simulator orders otherwise, or 0, (b, c, c)."""
     violated = (source[:, :, None] < source[:, None, :]) != (target[:, :, None] < target[:, None, :])
     apart = np.abs(target[:, :, None] - target[:, None, :])
     return np.where(violated, apart, 0.0)
@@ -76,7 +76,7 @@ def rank_violation_interval(
 
 
 def _left_out(violations: Values) -> Values:
-    """(c,) mean maximum rank violation without each controller."""
+    """Return the mean maximum rank violation without each controller, (c,)."""
     c = len(violations)
     worst = violations.argmax(axis=1)
     second, first = np.partition(violations, c - 2, axis=1)[:, c - 2 :].T

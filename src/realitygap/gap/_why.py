@@ -140,7 +140,7 @@ def explain_gap(
 
 
 def _falls(worth: Values) -> Values:
-    """(b, g) by how much each part lets the gap fall; exactly 0 where only rounding is left."""
+    """Return the amount by which each part lowers the gap, (b, g); exactly 0 if only rounding is left."""
     return np.asarray(np.round(-shapley_values(worth), 12) + 0.0)
 
 

@@ -107,7 +107,7 @@ def _plugins() -> Mapping[str, list[EntryPoint]]:
 
 @functools.lru_cache(maxsize=4)
 def _plugins_on(path: tuple[str, ...]) -> Mapping[str, list[EntryPoint]]:
-    """Those on a path of modules, looked up once: each look reads the names of all packages."""
+    """Return the plugins on a path of modules, cached, because each search reads the names of all packages."""
     plugins: dict[str, list[EntryPoint]] = {}
     for point in entry_points(group=GROUP):
         points = plugins.setdefault(point.name, [])

@@ -203,7 +203,7 @@ def trace_genome(
 def _trajectory(
     trials: PlatformTrials, tried: Tried, robot: int, others: tuple[Trajectory, ...] = ()
 ) -> Trajectory:
-    """One robot of the first trial."""
+    """Return the trajectory of one robot of the first trial."""
     batch, trace = tried.batch, tried.trace
     names = batch.drawn_names if robot == 0 else ()
     return Trajectory(

@@ -36,8 +36,8 @@ class _Read:
 
     Attributes:
         identity: Size and time of each file that it was read from.
-        bests: The best of each generation of each run by condition; None if nobody scored one.
-        digest: Of the results; empty if they are too large.
+        bests: Best of each generation of each run by condition; None without scores.
+        digest: Digest of the results; empty if they are too large.
     """
 
     identity: tuple[tuple[str, int, int], ...]

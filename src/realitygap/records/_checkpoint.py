@@ -27,7 +27,7 @@ _ABOUT = "about"
 """The member of the file that says what it is, as JSON; the others are the arrays."""
 
 _FIRST_BYTES = b"PK"
-"""Of every zip file, and so of NumPy's .npz; each member in it has a check sum."""
+"""First bytes of every zip file, and so of NumPy's .npz; each member in it has a check sum."""
 
 
 def write_checkpoint(

@@ -137,7 +137,7 @@ def _taken(lists: pl.Series, at: npt.NDArray[np.int64]) -> pl.Series:
 
 
 def _equal_genomes(genomes: pl.Series, other: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:
-    """Whether each genome has exactly the genes of that in the row `other`."""
+    """Return whether each genome has exactly the genes of that in the row `other`."""
     others = genomes.gather(np.maximum(other, 0))
     equal = np.ones(len(genomes), np.bool_)
     for name in _GENES:
@@ -148,7 +148,7 @@ def _equal_genomes(genomes: pl.Series, other: npt.NDArray[np.int64]) -> npt.NDAr
 def _lead_to_champion(
     rows: pl.DataFrame, first: npt.NDArray[np.int64], second: npt.NDArray[np.int64]
 ) -> npt.NDArray[np.bool_]:
-    """Whether each row is its run's champion, or an ancestor of it."""
+    """Return whether each row is its run's champion, or an ancestor of it."""
     leads = np.zeros(rows.height, np.bool_)
     champions = (
         rows.with_row_index("row")

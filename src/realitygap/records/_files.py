@@ -15,7 +15,7 @@ from realitygap.errors import RecordError
 _FULL = {errno.ENOSPC, errno.EFBIG, getattr(errno, "EDQUOT", errno.ENOSPC)}
 _FORBIDDEN = {errno.EACCES, errno.EPERM, errno.EROFS}
 _NO_FOLDER_SYNC = {errno.EINVAL, errno.ENOSYS, errno.ENOTSUP, errno.EBADF}
-"""What file systems answer that cannot sync a folder; a rename is then as safe as they make it."""
+"""Errors of file systems that cannot sync a folder. Then a rename is as safe as they make it."""
 
 
 def write_durably(path: Path, data: bytes, *, replace: bool) -> None:

@@ -254,12 +254,12 @@ class ResultsFolder(PublishedResults):
         self._names_published().add(name)
 
     def _settle(self) -> None:
-        """On taking the lock: another process may have written since this object was made."""
+        """Refresh after locking, because another process may have written since this object was made."""
         self._description = Description.read(self._path / DESCRIPTION_NAME)
         self._sweep()
 
     def _sweep(self) -> None:
-        """Remove what killed writers left; the lock says that nobody is writing."""
+        """Remove files of killed writers. The lock ensures that no process writes."""
         self._published = None
         own = (DESCRIPTION_NAME, LOG_NAME, TRIALS_NAME, LEDGER_NAME)
         refuse_links(self._path, *(self._path / name for name in own))

@@ -14,7 +14,7 @@ from pathlib import Path
 from realitygap.errors import RecordError
 
 _SAFE_FLAGS = sum(getattr(os, name, 0) for name in ("O_NOFOLLOW", "O_NONBLOCK", "O_CLOEXEC", "O_NOCTTY"))
-"""For opening a file to write: never follow a link, and never wait for the other end of a pipe."""
+"""Flags to open a file for writing: never follow a link, and never wait for the other end of a pipe."""
 
 _JUNCTION = getattr(stat, "IO_REPARSE_TAG_MOUNT_POINT", -1)
 """Windows' link to a folder, which is not a symbolic link there."""

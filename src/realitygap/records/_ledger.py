@@ -267,7 +267,7 @@ class Ledger(LedgerReader):
 
     @contextlib.contextmanager
     def _writing(self) -> Iterator[None]:
-        """One transaction, which is there as a whole or not at all."""
+        """Run one transaction, which is stored as a whole or not at all."""
         with speaking(self.path):
             self._connection.execute("BEGIN IMMEDIATE")
             try:
@@ -361,7 +361,7 @@ class Ledger(LedgerReader):
             )
 
     def _counters(self, number: int) -> set[str]:
-        """Who entered the score that counts."""
+        """Return the people who entered the score that counts."""
         rows = self._all(
             "SELECT who FROM scores WHERE trial = ? AND role = 'score' AND undone IS NULL", number
         )

@@ -19,13 +19,13 @@ LEDGER_FORMAT = 1
 """Raised whenever the tables change; a ledger of another format is refused."""
 
 _ENDINGS = ("", "-wal", "-shm", "-journal")
-"""Of the names of a ledger and of the files that SQLite writes beside it."""
+"""Endings of the names of a ledger and of the files that SQLite writes next to it."""
 
 _APPLICATION = 0x52474C31
 """Marks the file as a ledger of ours ("RGL1"), in SQLite's `application_id`."""
 
 _PATIENCE_S = 10.0
-"""How long to wait for another program that writes."""
+"""Maximum time to wait for another program that writes."""
 
 SYNCHRONOUS = "FULL"
 """Time at which SQLite waits for the disk: at every commit."""

@@ -16,11 +16,11 @@ TRIALS_NAME = "trials"
 LEDGER_NAME = "ledger.sqlite"
 
 _TEMPORARY = re.compile(r"\.(?P<target>.+)\.[0-9]+\.tmp")
-"""What `write_durably` names a file before it is renamed to its target."""
+"""Pattern of the names that `write_durably` uses before it renames a file to its target."""
 
 _SYSTEM_FILES = (".DS_Store", "Thumbs.db", "desktop.ini")
 _SYSTEM_PREFIXES = ("._", ".nfs")
-"""What file browsers and network file systems put into any folder by themselves."""
+"""First parts of the names of files that file browsers and network file systems put into any folder."""
 
 
 def list_chunks(trials: Path) -> list[ChunkName]:

@@ -92,7 +92,7 @@ def _read_holder(descriptor: int) -> str:
 
 
 def _write_holder(descriptor: int, text: str) -> None:
-    """Who holds the lock, for the message to others; on a full disk the lock holds all the same."""
+    """Write the holder of the lock, for the message to others; on a full disk the lock works without it."""
     with contextlib.suppress(OSError):
         os.ftruncate(descriptor, 0)
         os.lseek(descriptor, 0, os.SEEK_SET)

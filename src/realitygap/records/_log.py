@@ -85,5 +85,5 @@ def _ends_a_line(descriptor: int) -> bool:
 
 
 def _plain(value: Any) -> Any:
-    """A NumPy scalar as Python's; anything else that JSON does not know, as text."""
+    """Return a NumPy scalar as Python's, and any other type that JSON does not support as text."""
     return value.item() if hasattr(value, "item") and getattr(value, "size", 1) == 1 else str(value)

@@ -14,7 +14,7 @@ from realitygap.records._lock import LOCK_NAME
 from realitygap.records._log import LOG_NAME
 
 _OWN_NAMES = (DESCRIPTION_NAME, LOCK_NAME, LOG_NAME)
-"""Of the files of a study; a ledger has files beside it whose names begin with its own."""
+"""Names of the files of a study. The files of a ledger have names that begin with its own."""
 
 
 def refuse_results(path: Path) -> None:

@@ -17,7 +17,7 @@ MOST_VALUES = MOST_CHUNK_BYTES // 8
 _MOST_DEPTH = 16
 _MOST_ITEMS = 1_000_000
 _WIDTH = 8
-"""Of the length and the mark at a file's end [bytes]."""
+"""Width of the length and the mark at a file's end [bytes]."""
 
 
 def check_size(parquet: bytes) -> None:

@@ -453,7 +453,7 @@ class PublishedResults:
             yield frame
 
     def _complete_runs(self) -> dict[str, list[int]]:
-        """The complete runs of each condition in the ledger; nothing where there is no ledger."""
+        """Return the complete runs of each condition in the ledger; nothing without a ledger."""
         if not (self._path / LEDGER_NAME).exists():
             return {}
         with self._ledger() as ledger:

@@ -123,7 +123,7 @@ class MazeTrials:
 
 
 class _EndsArchive:
-    """Lehman & Stanley's novelty of where trials end."""
+    """Lehman & Stanley's novelty of final positions."""
 
     def __init__(self, task: MazeTask) -> None:
         self._neighbors = np.zeros(task.neighbors)

@@ -17,7 +17,7 @@ _COLUMNS = (
     *("condition", "replicate", "generation", "individual", "genome", "key"),
     *("cells", "coverage_line", "coverage_ends", "stalls"),
 )
-"""What a trial is computed from, and what must come out."""
+"""Columns from which a trial is computed, and those of its result."""
 
 
 def genome_of(condition: Condition, row: Mapping[str, Any]) -> Genome:

@@ -131,7 +131,7 @@ def run_rows(condition: Condition, first_replicate: int, n_runs: int, *, staged:
 
 
 def _is_whole(condition: Condition) -> bool:
-    """Whether its platform computes whole evolutions of its task."""
+    """Return whether its platform computes whole evolutions of its task."""
     return condition.on.runs_whole and condition.coverage is not None
 
 

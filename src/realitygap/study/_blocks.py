@@ -20,7 +20,7 @@ Block = tuple[tuple[Condition, int, int], ...]
 """Generations (condition, replicate, generation) whose trials are driven together."""
 
 _LETTERS = "BCDFGHJKLMNPQRSTVWXZ"
-"""Of codes: without vowels, so that none is a word."""
+"""Letters of codes, without vowels, so that none is a word."""
 
 
 def blocks_of(conditions: Sequence[Condition], replicates: int, trials: TrialsSection) -> Iterator[Block]:
@@ -73,7 +73,7 @@ def _shuffled(n: int, generations: Block) -> list[int]:
 
 
 def _code(which: str, used: set[str]) -> str:
-    """Four letters that say nothing; the next ones where these are taken."""
+    """Return four letters without a meaning; the next ones if these are taken."""
     for attempt in itertools.count():
         number = int.from_bytes(
             hashlib.blake2b(f"{which}:{attempt}".encode(), digest_size=8).digest(), "little"

@@ -148,7 +148,7 @@ class CameraObserver:
         return None
 
     def _seen(self) -> Track:
-        """From the first look to the last."""
+        """Return the track from the first look to the last."""
         if self._track is None:
             self._track = seen_between(self._camera, self._times[0], self._times[-1])
         return self._track

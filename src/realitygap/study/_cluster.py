@@ -148,7 +148,7 @@ _GO_ON = "Published runs are saved. Run the same command to resume."
 
 
 class _Sitting:
-    """One go at the chunks of a study: what is under way, and what has come back."""
+    """One run of the chunks of a study: chunks in progress, and finished chunks."""
 
     def __init__(
         self,
@@ -232,7 +232,7 @@ class _Sitting:
         return ended
 
     def _accept(self, ended: list[_UnderWay]) -> None:
-        """Publish what is finished, even where another chunk has failed; what was lost is sent again."""
+        """Publish finished chunks, even if another one has failed, and resubmit lost ones."""
         # Once only: what is finished may be lost, and computed again, with the worker that told of it.
         status = [each.future.status for each in ended]
         finished = [each.delivery for each, what in zip(ended, status, strict=True) if what == "finished"]

@@ -192,7 +192,7 @@ def _is_drawn(condition: Condition) -> bool:
 
 
 def _plain(number: Any) -> Any:
-    """Numpy's whole numbers as Python's; anything else as it is, to be checked with the rest."""
+    """Return NumPy's whole numbers as Python's. Other values stay, to be checked with the rest."""
     is_whole = isinstance(number, Integral) and not isinstance(number, bool)
     return int(number) if is_whole else number
 

@@ -175,7 +175,7 @@ class PhysicalStudy:
         ]
 
     def _evolution(self, condition: Condition, replicate: int) -> Evolution:
-        """A run brought to where the ledger stands, by telling it the frozen scores."""
+        """Return a run in the state of the ledger, by telling it the frozen scores."""
         evolution = self._evolutions.setdefault((condition.name, replicate), Evolution(condition, replicate))
         for generation, is_closed in self._ledger.generations(condition.name, replicate):
             if is_closed and generation >= evolution.generation:
@@ -361,7 +361,7 @@ class PhysicalStudy:
         ]
 
     def _draws(self, trial: Trial) -> bool:
-        """Whether the cells of a trial's line have to be counted."""
+        """Return whether the cells of a trial's line have to be counted."""
         return self._condition(trial).task_of_trials.observe == "cells"
 
     # the robot

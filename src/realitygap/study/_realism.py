@@ -210,7 +210,7 @@ def _spread(numbers: dict[str, float]) -> dict[str, NDArray[np.float64]]:
 
 
 def _networks(neat: Any, weights: tuple[tuple[float, ...], ...]) -> Networks:
-    """One network without hidden nodes."""
+    """Return a network without hidden nodes."""
     networks: Networks = make_networks(1, neat, 8, 0)
     networks.first_edge[0] = [0, 4, 8]
     networks.source[0] = [0, 1, 2, 3, 0, 1, 2, 3]

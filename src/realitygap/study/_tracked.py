@@ -106,7 +106,7 @@ def trial_of_ledger(folder: str | Path, number: int) -> TrialToTrack:
 
 
 def _times(began: Floats) -> Floats:
-    """When each command began and the last ended, since the first [s]."""
+    """Return the time of each command's start and of the last one's end, since the first [s]."""
     usual = float(np.median(np.diff(began))) if len(began) > 1 else 0.5
     times: Floats = np.append(began, began[-1] + usual) - began[0]
     return times

@@ -111,7 +111,7 @@ def observed_trajectories(trials: Sequence[TrialRecord], arena: Arena) -> Trajec
 
 
 def _last(arrays: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
-    """(t, k, n) of n arrays (t, k)."""
+    """Return n arrays (t, k) as (t, k, n)."""
     return np.ascontiguousarray(np.stack(arrays, axis=-1), np.float64)
 
 

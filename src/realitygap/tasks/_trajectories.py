@@ -137,5 +137,5 @@ class Trajectories:
 
 
 def _trials_first(array: NDArray[Any]) -> NDArray[np.float64]:
-    """(t, k, n) as the kernels keep it to (n, t, k)."""
+    """Return an array of kernels (t, k, n) as (n, t, k)."""
     return np.ascontiguousarray(array.transpose(2, 0, 1), np.float64)

@@ -108,7 +108,7 @@ def _controller(plan: TrialPlan) -> tuple[Controller, int]:
 
 
 def _kept(plan: TrialPlan, robot: Robot, driven: TrialRecord, looks: _Looks) -> TrialRecord:
-    """Return a trial as far as the robot itself reported it: only commands whose end was seen, too."""
+    """Return the part of a trial that the robot itself reported: only commands whose end was observed."""
     t = min(len(driven.commands), max(looks.n - 1, 0))
     n = t + len(driven.times) - len(driven.commands)
     is_simulated = robot.label in ("SIM", "TWIN")

@@ -46,7 +46,7 @@ class Draws:
 
 
 def _block_of(name: str) -> np.uint32:
-    """The word of the counter that stands for a number."""
+    """Return the word of the counter for a number."""
     return np.uint32(int.from_bytes(hashlib.blake2b(name.encode(), digest_size=4).digest(), "little"))
 
 

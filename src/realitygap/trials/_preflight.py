@@ -111,7 +111,7 @@ def _insane(raws: list[tuple[float, ...]], robot: Robot) -> list[str]:
 
 
 def _battery_under_load(robot: Robot) -> float | None:
-    """Voltage while both motors run [V]; None where the robot cannot tell."""
+    """Return the voltage while both motors run [V]; None if the robot does not measure it."""
     volts = getattr(robot, "volts", None)
     if volts is None:
         return None

@@ -202,5 +202,5 @@ def _table(rows: Iterable[Iterable[float]], n_columns: int) -> NDArray[np.float6
 
 
 def _row_starts(counts: Iterable[int]) -> NDArray[np.int64]:
-    """(r + 1,) where the rows of each robot begin, from how many rows each has."""
+    """Return the first row of each robot, (r + 1,), from the numbers of rows."""
     return np.cumsum([0, *counts]).astype(np.int64)

@@ -137,7 +137,7 @@ class RobotTarget(ClosedOnExit):
         self.identity = observer.identity
 
     def _ready(self) -> PacedRobot:
-        """The robot, opened where it is not."""
+        """Return the robot, and open it if necessary."""
         if self._robot is None:
             robot = self._open_robot()
             try:
@@ -172,7 +172,7 @@ class RobotTarget(ClosedOnExit):
     def _carry_out(
         self, plan: TrialPlan, observe: Observe, tell: Callable[[TrialRecord], None] | None
     ) -> TrialRecord:
-        """One trial; one that is lost again where that is wanted."""
+        """Run one trial, and repeat a lost one if requested."""
         attempts = 2 if self._on_lost == "retry" else 1
         for _ in range(attempts):
             trial = self._try(plan, observe, tell)

@@ -89,10 +89,10 @@ class Fitted(Settings):
 
 
 def _is_bound(values: Mapping[str, Any], lower: str = "low", upper: str = "high") -> bool:
-    """Whether an interval begins at an end of its prior. At 0, and at 1 of what is at most 1, nothing is cut off.
+    """Return whether an end of an interval is at an end of its prior. Ends at 0, and at 1 of a share, cut off nothing.
 
     Args:
-        values: Those of `Fitted`.
+        values: Values of `Fitted`.
         lower, upper: The values that are compared with the ends of the prior.
     """
     names = ("low", "high", "prior_low", "prior_high", lower, upper)

@@ -192,7 +192,7 @@ def _controller_contradictions(
 def _layer_contradictions(
     here: str, layers: list[Any], width: int | None, what: str
 ) -> Iterator[tuple[str, str]]:
-    """Sizes that do not fit, from the inputs (`width` of them, where known: `what`) to the two outputs."""
+    """Return wrong sizes, from the inputs (`width` of them, if known: `what`) to the two outputs."""
     for k, layer in enumerate(layers):
         place = f"{here}.layers[{k}]"
         weights = layer.get("weights") if isinstance(layer, Mapping) else None

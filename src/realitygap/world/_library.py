@@ -173,7 +173,7 @@ def _values_of(file: Traversable, origin: str) -> dict[str, Any]:
 
 
 def _laid_over(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
-    """Tables key by key; anything else, lists too, as above."""
+    """Override tables key by key. Other values, and lists, are replaced."""
     merged = dict(below)
     for key, value in above.items():
         old = merged.get(key)
@@ -263,7 +263,7 @@ def _in_present_words(values: dict[str, Any]) -> dict[str, Any]:
 
 
 def _read_image(values: dict[str, Any], origin: str) -> None:
-    """Put the pixels of a floor image in place of its file."""
+    """Replace the file of a floor image by its pixels."""
     floor = values.get("floor")
     image = floor.get("image") if isinstance(floor, dict) else None
     if not isinstance(floor, dict) or not isinstance(image, dict) or not isinstance(image.get("file"), str):

@@ -199,7 +199,7 @@ def _walk(model: Settings, place: str = "") -> Iterator[tuple[str, tuple[float, 
 
 
 def _is_fixed(model: type[BaseModel], path: Sequence[str]) -> bool:
-    """Whether a dotted name is that of a setting, or of a table of them, which is the same in all trials."""
+    """Return whether a dotted name is that of a setting, or of a table of settings, which is the same in all trials."""
     field = model.model_fields.get(path[0]) if path else None
     if field is None:
         return False

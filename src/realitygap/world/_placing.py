@@ -98,7 +98,7 @@ def _ends(wall: Segment) -> tuple[Point, Point]:
 
 
 def _is_within(walls: Sequence[Segment], x: float, y: float) -> bool:
-    """Whether an odd number of walls lies to the right of a point."""
+    """Return whether an odd number of walls is to the right of a point."""
     crossings = 0
     for x1, y1, x2, y2 in walls:
         if (y1 > y) != (y2 > y) and x < x1 + (y - y1) / (y2 - y1) * (x2 - x1):
@@ -122,7 +122,7 @@ def _solids(arena: Arena) -> Iterator[tuple[str, tuple[Point, ...]]]:
 
 
 def _overlap(a: Sequence[Point], b: Sequence[Point]) -> bool:
-    """Whether two convex outlines overlap: no direction parts them. Two corners are a line."""
+    """Return whether two convex outlines overlap, so that no direction separates them. Two corners are a line."""
     for corners in (a, b):
         for (x1, y1), (x2, y2) in zip(corners, (*corners[1:], corners[0]), strict=True):
             length = math.hypot(x2 - x1, y2 - y1)

@@ -21,7 +21,7 @@ HalfAngle = Annotated[NotNegative, Field(le=SAME_EVERYWHERE)]
 
 
 def _without(values: dict[str, Any], unused: dict[str, float]) -> dict[str, Any]:
-    """Return values without those that are as if nobody had said anything."""
+    """Return values without those that have their defaults."""
     return {key: value for key, value in values.items() if key not in unused or value != unused[key]}
 
 
@@ -118,7 +118,7 @@ class Drive(Settings):
 
     @model_serializer(mode="wrap")
     def _without_no_soft_dead_band(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """It came later: a robot without it leaves it out, so that conditions keep their hashes."""
+        """Leave out a newer number if it is not used, so that older conditions keep their hashes."""
         return _without(handler(self), {"soft_dead_band": 0.0})
 
 
@@ -220,7 +220,7 @@ class RangeSensor(Settings):
 
     @model_serializer(mode="wrap")
     def _without_later_numbers(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Numbers that came later are left out if they are not used, so that conditions keep their hashes."""
+        """Leave out newer numbers that are not used, so that older conditions keep their hashes."""
         lorentz = {} if self.response == "lorentz" else {"half_width": 0.1, "peak": 0.0}
         return _without(handler(self), lorentz | {"compression": 0.0})
 

@@ -65,7 +65,7 @@ def _size(model: RobotModel) -> float:
 def _with_words(
     model: RobotModel, shapes: list[Shape], left: float, bottom: float, right: float, top: float
 ) -> Picture:
-    """The picture with the robot's name above and, below, what the marks mean and where the numbers come from."""
+    """Return the picture with the robot's name above and a legend with the sources of the numbers below."""
     wanted = (top - bottom) * 1.5
     if right - left < wanted:  # texts need some width
         more = (wanted - (right - left)) / 2

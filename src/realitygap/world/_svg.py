@@ -160,7 +160,7 @@ def _root(text: str) -> ElementTree.Element:
 
 
 def _to_meters(root: ElementTree.Element) -> Affine:
-    """From the drawing's unit, y downwards, to meters, y upwards."""
+    """Return the map from the drawing's unit, y downwards, to meters, y upwards."""
     box = _numbers(root.get("viewBox", ""))
     size = [_length(root.get(key, "")) for key in ("width", "height")]
     if len(box) != 4 or not (box[2] > 0 and box[3] > 0):
@@ -234,7 +234,7 @@ def _elements(parent: ElementTree.Element, ink: Ink, depth: int) -> Iterator[tup
 
 
 def _style(element: ElementTree.Element, key: str) -> str | None:
-    """An attribute, also where it is written into `style`."""
+    """Return an attribute, also from `style`."""
     for part in element.get("style", "").split(";"):
         name, _, value = part.partition(":")
         if name.strip() == key:

@@ -136,7 +136,7 @@ def _model(robot: RobotModel, number: int, placements: list[Placement], weight: 
 
 
 def _values(model: SensorModel, places: Array) -> Array:
-    """(m, d) parameters at (m, d) places in the unit cube."""
+    """Return parameters at places (m, d) in the unit cube, (m, d)."""
     return np.stack([scale.of(places[:, k]) for k, scale in enumerate(model.scales)], axis=1)
 
 
@@ -163,7 +163,7 @@ def _fitted(name: str, scale: Scale, ends: Array, values: Array, advice: str = "
 
 
 def _unknown_battery(name: str) -> Fitted:
-    """Nothing is known of what the battery does where it did not vary."""
+    """Return the battery's effect as unidentified, because the battery did not vary."""
     return Fitted(
         name=f"{name}.{BATTERY.name}",
         estimate=0.0,

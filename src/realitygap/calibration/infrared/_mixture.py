@@ -74,7 +74,7 @@ class MixtureReadings:
         self._rows = self._told_apart(placements)
 
     def _told_apart(self, placements: list[Placement]) -> tuple[Array, Array, Array]:
-        """Distinct readings: of which placement, from where to where, and how many."""
+        """Return distinct readings: their placement, their bins, and their number."""
         which: list[int] = []
         readings: list[float] = []
         counts: list[int] = []

@@ -72,7 +72,7 @@ class PulseReadings:
         return self._chances(sent_back[..., None], missed[..., None], counts, burst, stray)
 
     def _pulses(self, places: Places, values: Array) -> tuple[NDArray[np.int64], Array]:
-        """(m, p) each: pulses that come back if none is missed, and the probability that one is missed."""
+        """Return pulses that return if none is missed, and the probability that one is missed, (m, p) each."""
         amplitude, decay, most, at, width = values[:, :5].T
         per_volt = column(self.scales, values, BATTERY)
         incidence = column(self.scales, values, INCIDENCE, self._incidence)
@@ -124,7 +124,7 @@ class PulseReadings:
 
 
 def _ways(pulses: int) -> Array:
-    """(e, k) in how many ways k of e pulses can be seen; 0 for more than e."""
+    """Return the number of ways to detect k of e pulses, (e, k); 0 for more than e."""
     e, k = np.mgrid[: pulses + 1, : pulses + 1]
     left = np.maximum(e - k, 0)
     return np.asarray(

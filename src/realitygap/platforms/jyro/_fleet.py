@@ -103,7 +103,7 @@ class JyroFleet:
 
 
 def _by_robot(blocks: NDArray[Any], n: int) -> Array:
-    """(b, m, LANES) numbers of blocks as (n, m)."""
+    """Return numbers of blocks (b, m, LANES) as (n, m)."""
     return np.moveaxis(blocks, 1, 2).reshape(-1, blocks.shape[1])[:n].astype(np.float64)
 
 

@@ -32,7 +32,7 @@ SNAP = {"single": 1e-5, "double": 1e-9}
 
 
 def _normals(walls: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(w, 3) unit normals towards the side of the start, which is the origin, and offsets of walls (w, 4)."""
+    """Return unit normals towards the start, which is the origin, and offsets of walls (w, 4), (w, 3)."""
     along = walls[:, 2:] - walls[:, :2]
     normals = np.stack([-along[:, 1], along[:, 0]], axis=1) / np.hypot(along[:, 0], along[:, 1])[:, None]
     offsets = (normals * walls[:, :2]).sum(axis=1)

@@ -289,7 +289,7 @@ class SimEnsemble:
         ]
 
     def _half(self, given: Mapping[str, NDArray[np.float64]], number: int) -> NDArray[np.float64]:
-        """(m,) or (1,) half width of a part of the body [m]; where trials differ the smallest."""
+        """Return the half width of a part of the body, (m,) or (1,) [m]; the smallest if trials differ."""
         body = self._own.robot.body[number]
         names = [f"body.{number}.corner.{k}.{axis}" for k in range(len(body.corner)) for axis in "xy"]
         own = [value for corner in body.corner for value in (corner.x, corner.y)]
@@ -380,7 +380,7 @@ class _Work:
         return counters
 
     def _table(self, robots: NDArray[np.int64], counters: NDArray[np.uint32]) -> NDArray[np.float32]:
-        """(p, n) the numbers of the trials of some robots, a column for each trial."""
+        """Return the numbers of the trials of some robots, a column for each trial, (p, n)."""
         k, rows = len(self.play.starts), self.scene.rows
         table = np.repeat(self._column, len(counters), axis=1)
         drawn = dict(zip(self._draws.names, self._draws.draw(self.key, counters).T, strict=True))
@@ -414,7 +414,7 @@ class _Work:
 
     @cached_property
     def _column(self) -> NDArray[np.float32]:
-        """(p, 1) the numbers of a trial for which nothing is drawn or given."""
+        """Return the numbers of a trial without drawn or given ones, (p, 1)."""
         fixed = {name: value for name, value in self.own.fixed.items() if name in self.scene.rows}
         column = self.scene.table({**self.scene.fixed, **fixed})
         return column.astype(np.float32, copy=False)
@@ -457,7 +457,7 @@ class _Work:
 
 
 def _in_columns(values: Values, k: int) -> dict[str, NDArray[np.float64]]:
-    """(m, 1) or (m, k) of each number.
+    """Return each number as (m, 1) or (m, k).
 
     Raises:
         ValueError: They are of several lengths, or of other trials.
@@ -484,7 +484,7 @@ def _n_robots(values: Values) -> int:
 
 
 def _in_order(parts: Iterable[tuple[NDArray[np.int64], NDArray[F]]], m: int) -> NDArray[F]:
-    """(m, ...) rows of some robots after the other, put where each robot belongs."""
+    """Return consecutive rows of some robots in the order of all robots, (m, ...)."""
     rows: NDArray[F] | None = None
     for robots, part in parts:
         if rows is None:

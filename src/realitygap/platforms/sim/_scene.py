@@ -305,7 +305,7 @@ def _n_corners(obstacle: Obstacle, k: int, numbers: Numbers) -> int:
 
 
 def _floor_image(image: FloorImage | None) -> tuple[NDArray[np.float32] | None, tuple[float, float, float]]:
-    """(h, w) brightness 0..1 with square pixels, row 0 lowest; its lower left corner [m] and pixels per meter."""
+    """Return brightness 0..1 in square pixels, (h, w), row 0 lowest; its lower left corner [m]; pixels per meter."""
     if image is None:
         return None, (0.0, 0.0, 1.0)
     per_m = max(image.columns / image.width, image.rows / image.height)

@@ -326,7 +326,7 @@ class SimSettings(SimulatedPlatform):
 
 
 def _without_start(numbers: Mapping[str, T]) -> dict[str, T]:
-    """The numbers but those that say where trials begin."""
+    """Return the numbers without those of the start."""
     return {name: value for name, value in numbers.items() if not name.startswith("arena.start.")}
 
 
@@ -346,5 +346,5 @@ def hull(points: list[tuple[float, float]]) -> tuple[tuple[float, float], ...]:
 
 
 def _turn(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> float:
-    """Above 0 where a, b, c turn to the left."""
+    """Return a number above 0 if a, b, c turn to the left."""
     return math.fsum(((b[0] - a[0]) * (c[1] - a[1]), -(b[1] - a[1]) * (c[0] - a[0])))

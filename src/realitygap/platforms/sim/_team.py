@@ -172,7 +172,7 @@ def team_scenes(platform: SimSettings, arena: Arena, inputs: Sequence[str], nois
 
 
 def _in_columns(part: NDArray[Any]) -> NDArray[Any]:
-    """(t, ..., n * r) from (r, t, ..., n): the robots of a trial side by side."""
+    """Return (r, t, ..., n) as (t, ..., n * r), with the robots of a trial next to each other."""
     return np.ascontiguousarray(
         np.moveaxis(part, 0, -1).reshape(*part.shape[1:-1], len(part) * part.shape[-1])
     )

@@ -108,7 +108,7 @@ class SimTrials:
         return trace
 
     def _trace(self, n: int) -> SimTrace:
-        """Room for every step of n trials, the same as for the call before where that had as many."""
+        """Return memory for every step of n trials, the same as in the previous call with as many trials."""
         if self._kept.stalled.shape != (self.n_steps + 1, n):
             self._kept = self._make_trace(self.n_steps, n)
         return self._kept

@@ -375,7 +375,7 @@ class SimWorldRobot(ProgramRobot):
         self.command = Command(0.0, 0.0)
 
     def _meet(self, others: list[SimWorldRobot]) -> None:
-        """See the others where they are now."""
+        """Observe the others at their present poses."""
         rows = [
             (other._pose.x - self.start.x, other._pose.y - self.start.y, other._turns)
             for other in others
@@ -406,7 +406,7 @@ class SimWorldRobot(ProgramRobot):
 
 
 def _drawn(model: RobotModel, key: NoiseKey) -> RobotModel:
-    """The robot with what is drawn for a trial in place of distributions."""
+    """Return the robot with drawn numbers instead of distributions."""
     draws = Draws(model.numbers())
     if not draws.names:
         return model
@@ -417,7 +417,7 @@ def _drawn(model: RobotModel, key: NoiseKey) -> RobotModel:
 
 
 def _drawn_arena(arena: Arena, key: NoiseKey) -> Arena:
-    """The arena with what is drawn for a trial in place of distributions."""
+    """Return the arena with drawn numbers instead of distributions."""
     draws = Draws(arena.numbers())
     if not draws.names:
         return arena

@@ -180,7 +180,7 @@ def gap_between(
 
 
 def _arena(arena: str | Path | Arena | None, chosen: Sequence[Controller], named: str | Path) -> Arena:
-    """Return where the gap is measured.
+    """Return the arena of the gap.
 
     Raises:
         StudyError: None is named, and the controllers were selected in several.
@@ -199,7 +199,7 @@ def _arena(arena: str | Path | Arena | None, chosen: Sequence[Controller], named
 
 
 def _refuse_elsewhere(evolved: Sequence[Controller], named: str, platform: str) -> None:
-    """Return where all were evolved on the platform, before trials are spent on them.
+    """Raise an error if a controller was evolved on another platform, before trials are spent on it.
 
     Raises:
         StudyError: One was not.

@@ -236,7 +236,7 @@ def _carry_out(
     tell: Tell | None,
     file: ObservationsFile | None = None,
 ) -> list[TrialRecord]:
-    """Trials in the order of their plans: those in the file, and the others, kept as they come."""
+    """Return trials in the order of their plans: those in the file, and the others, stored as they end."""
     found = () if file is None else file.trials
     kept = {(trial.number, trial.genome): trial for trial in found if is_whole(trial)}
     keys = [(plan.number, plan.genome.to_json() if plan.genome else "") for plan in plans]
@@ -274,7 +274,7 @@ def side_of(platform: Target, trials: Sequence[TrialRecord], n: int, task: Task)
 
 
 def _replay(source: Target, observed: Sequence[TrialRecord], n: int, tell: Tell | None) -> ReplayError | None:
-    """The target's commands replayed in simulation from where its robot was; its trials went round n controllers."""
+    """Replay the target's commands in simulation from its robot's poses; its trials alternate between n controllers."""
     t = min((len(trial.commands) for trial in observed), default=0)
     seen = [k for k, trial in enumerate(observed) if len(trial.poses) > t][:MOST_REPLAYED]
     there = [observed[k] for k in seen]

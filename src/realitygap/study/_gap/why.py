@@ -112,7 +112,7 @@ def why_gap(
 def _rows(
     fitted: Mapping[str, float], calibration: Calibration, draws: int
 ) -> dict[str, NDArray[np.float64]]:
-    """(1 + d,) of each number: the estimate, and draws spread evenly over those that there are."""
+    """Return rows of each number, (1 + d,): the estimate, and draws spread evenly over all draws."""
     n = calibration.n_draws
     which = np.unique(np.linspace(0, n - 1, min(draws, n)).round().astype(int)) if n else np.empty(0, int)
     return {
@@ -124,7 +124,7 @@ def _rows(
 def _choices(
     default: Mapping[str, float], rows: Mapping[str, NDArray[np.float64]]
 ) -> dict[str, NDArray[np.float64]]:
-    """((1 + d) * 2^g,) of each number: with all choices of parts, for each row."""
+    """Return each number with all choices of parts, for each row, ((1 + d) * 2^g,)."""
     chosen = coalitions(len(PARTS))
     return {
         name: np.array(
@@ -147,7 +147,7 @@ def _carry_out(
     seed: int,
     trials: int,
 ) -> NDArray[np.float64]:
-    """(m, c, r) coverage, controllers of one kind together; all choices draw the same noise."""
+    """Return coverage, with controllers of one kind together, (m, c, r). All choices draw the same noise."""
     kinds: dict[tuple[object, ...], list[int]] = {}
     for k, genome in enumerate(genomes):
         kinds.setdefault((genome.rules, genome.interface, genome.bias_value), []).append(k)

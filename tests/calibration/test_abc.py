@@ -79,7 +79,7 @@ def test_each_simulation_is_predicted_as_by_a_regression_without_it():
     assert np.abs(told[:40] - without).mean() < 0.15 * np.abs(by_all - without).mean()
 
 
-def test_what_shows_is_found_and_what_does_not_stays_as_it_was():
+def test_observable_parameters_are_found_and_others_keep_their_prior():
     truth, evidence = observed(np.random.default_rng(7))
     places = fit_all([evidence], simulate, PRIOR, ROBOT, seed=1, effort="small").places
     information = (SLOPES[0] ** 2).sum() * (0.1 * 0.4) ** 2  # d track / d standard is at most 0.1 * 0.4

@@ -205,7 +205,7 @@ def test_more_than_is_seen_is_refused_before_anything_is_done(person, tmp_path):
     nobody = person()
     file = tmp_path / "fit.toml"
     said = refused("contact", "--robot", PORT.replace("s2", "s1"), "--observe", "track", "-o", file)
-    assert "no more can be seen than 'cells'" in said
+    assert "supports at most 'cells'" in said
     assert not nobody.asked
     assert not list(tmp_path.iterdir())
 
@@ -249,9 +249,9 @@ def test_numbers_are_read_as_on_a_ruler(text, value):
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        (("sensors", "-o", "x.toml"), "Name what is calibrated (--robot PLATFORM)"),
+        (("sensors", "-o", "x.toml"), "Expected either the robot to measure (--robot PLATFORM)"),
         (("sensors", "--robot", "sim", "--from", "x", "-o", "x.toml"), "and not both"),
-        (("sensors", "--robot", "sim"), "Name the file that the calibration goes to"),
+        (("sensors", "--robot", "sim"), "No file for the calibration. Name one"),
         (("sensors", "--robot", "sim", "-o", "x.txt"), "does not end in .toml"),
         (("sensors", "--robot", "sim", "-o", "no/x.toml"), "There is no folder no"),
         (("sensor", "--robot", "sim", "-o", "x.toml"), "Cannot calibrate 'sensor'. Did you mean 'sensors'?"),
@@ -312,7 +312,7 @@ def test_a_robot_that_goes_back_makes_no_robot_and_one_beyond_what_was_thought_p
     assert "thought possible" not in run("path", "--from", usual, "-o", tmp_path / "usual.toml")
 
 
-def test_what_was_flagged_stays_so_in_what_builds_on_it(sensors, tmp_path):
+def test_a_flag_of_misspecification_passes_to_later_calibrations(sensors, tmp_path):
     file = tmp_path / "path.toml"
     run("path", "--from", path_trials(tmp_path / "path.jsonl", {"drive.track": 0.16}), "-o", file)
     flagged = load_calibration(file).model_copy(
@@ -326,7 +326,7 @@ def test_what_was_flagged_stays_so_in_what_builds_on_it(sensors, tmp_path):
     assert "What was said." in made.notes
 
 
-def test_what_was_fitted_anew_is_not_said_of_the_earlier_fit(tmp_path):
+def test_refitted_parameters_are_not_listed_with_the_earlier_fit(tmp_path):
     def made(kind, names, numbers):
         rows = tuple(
             Fitted(

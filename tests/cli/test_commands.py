@@ -477,7 +477,7 @@ def test_message_shows_control_characters_of_a_file_as_escapes(tmp_path):
         (("try", ".", "--on", "jyro"), "Export one: realitygap export . -o champion.json"),
     ],
 )
-def test_what_newcomers_type_gets_a_command_that_works(words, expected):
+def test_common_mistakes_of_newcomers_suggest_a_working_command(words, expected):
     done = realitygap(*words)
     assert done.returncode != 0
     assert expected in " ".join(done.stderr.split())

@@ -94,7 +94,7 @@ def test_the_table_ends_with_the_verdict(command):
         (("plan", "--effect", "0.1", "--from", "nothing.jsonl"), ("no file nothing.jsonl",)),
     ],
 )
-def test_what_cannot_be_is_one_message(words, texts, command):
+def test_wrong_options_give_one_message(words, texts, command):
     code, _, err = command(*words)
     assert code == 1
     assert err.count("realitygap: ") == 1

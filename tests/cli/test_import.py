@@ -107,7 +107,7 @@ def test_shown_mapping_is_a_mapping(log, tmp_path):
 
 def test_wrong_inputs_have_one_message(log, tmp_path):
     out = tmp_path / "trials.jsonl"
-    assert "Name the file that the trials go to" in refused("import", log)
+    assert "No file for the trials. Name one" in refused("import", log)
     assert "does not end in .jsonl" in refused("import", log, "-o", tmp_path / "trials.csv")
     assert "There is no file" in refused("import", tmp_path / "none.csv", "-o", out)
     assert "Cannot read the mapping" in refused("import", log, "--map", tmp_path / "none.toml", "-o", out)
@@ -118,7 +118,7 @@ def test_wrong_inputs_have_one_message(log, tmp_path):
     fit = tmp_path / "fit.toml"
     calibrate = ("calibrate", "motion", "--from", log, "-o", fit)
     assert "--hold-out is '2', expected a share" in refused(*calibrate, "--hold-out", 2)
-    assert "go with --from and a log" in refused(
+    assert "are only for --from with a log" in refused(
         "calibrate", "path", "--robot", "sim", "-o", fit, "--map", log
     )
     assert "is not a file of observed trials" in refused("calibrate", "contact", "--from", log, "-o", fit)

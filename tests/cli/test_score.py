@@ -136,8 +136,8 @@ def test_without_a_study_it_only_shows(photo, lines, command, tmp_path):
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (("--generation", "0"), "--generation: of which study?"),
-        (("--yes",), "--yes: of which study?"),
+        (("--generation", "0"), "--generation: expected a study"),
+        (("--yes",), "--yes: expected a study"),
         (("--pens", "red,red"), "expected different names such as black,red,blue"),
         (("--arena", "papr"), "Did you mean 'paper'?"),
         (("--study", "none"), "There is no ledger at"),

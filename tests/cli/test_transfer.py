@@ -78,9 +78,9 @@ def test_what_cannot_be_is_refused_before_a_trial_is_spent(folder, tmp_path):
     run("gap", "sim", "sim", "--n-controllers", "2", "--trials", "2", "-o", tmp_path / "gap.jsonl")
     recorded = f"recorded:{tmp_path / 'gap.jsonl'}"
     calibrated = ("transfer", "sim-paper", "--strategy", "calibrated", *SMALL, "-o", out)
-    with pytest.raises(StudyError, match="no more can be seen than 'cells'"):
+    with pytest.raises(StudyError, match="supports at most 'cells'"):
         run("try", champion, "--on", recorded, "--observe", "track")
-    with pytest.raises(StudyError, match="no more can be seen than 'cells'"):
+    with pytest.raises(StudyError, match="supports at most 'cells'"):
         run(*calibrated, "--to", recorded, "--observe", "track")
     assert not out.exists()
     backward = tmp_path / "backward.toml"

@@ -79,7 +79,7 @@ def test_names_passwords_and_data_at_first(model):
     [((Op.SET_NAME1, Op.SET_NAME2), (Op.GET_NAME1, Op.GET_NAME2)), ((55, 56), (50, 51)), ((97,), (81,))],
 )
 @pytest.mark.parametrize("model", ["s1", "s2"])
-def test_what_was_set_is_what_is_read(model, set_ops, get_ops):
+def test_stored_values_are_read_back(model, set_ops, get_ops):
     robot = make(model)
     for number, (put, get) in enumerate(zip(set_ops, get_ops, strict=True)):
         value = bytes(range(100 + 10 * number, 108 + 10 * number))

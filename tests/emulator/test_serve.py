@@ -164,7 +164,7 @@ def test_the_witness_answers_nonsense_with_an_error_and_lives(request_):
             assert witness.pose()
 
 
-def test_nobody_at_the_witness_is_said_so():
+def test_connecting_to_a_missing_witness_is_one_error():
     with pytest.raises(RobotError, match="No witness at"):
         connect_witness("127.0.0.1:1")
     for address in ("somewhere", "127.0.0.1:", "127.0.0.1:99999", "127.0.0.1:-1"):
@@ -200,7 +200,7 @@ def test_tones_take_their_time_over_the_wire():
         assert time.monotonic() - begun >= 0.2
 
 
-def test_what_watches_is_called_again_and_again():
+def test_the_watch_function_is_called_repeatedly():
     seen = []
     server = Server(
         robot(), PtyChannel(), watch=lambda emulator: seen.append(emulator.now), watch_s=0.01

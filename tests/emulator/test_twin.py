@@ -97,8 +97,8 @@ def test_it_rolls_out_after_the_motors_are_off():
     assert robot.pose == after
 
 
-def test_it_goes_on_as_it_does_where_its_delay_grows():
-    """It stood still until as many words had come as it was late now."""
+def test_a_twin_keeps_rolling_when_its_delay_grows():
+    """Once, it stopped until as many commands had arrived as its new delay spans."""
     twin = quiet(motors={"delay": 0.15, "delay_jitter": 0.15})
     body = TwinBody(twin, paper_arena())
     body.place(Pose(0.3, 0.3, 0.0))

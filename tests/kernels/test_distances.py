@@ -73,7 +73,7 @@ def test_final_positions_are_compared_in_a_straight_line() -> None:
         ([], [3, 4], 2.0),
     ],
 )
-def test_what_an_alignment_costs(one: list[int], other: list[int], expected: float) -> None:
+def test_alignment_has_the_expected_cost(one: list[int], other: list[int], expected: float) -> None:
     measure = distances.make_measure(distances.ALIGNMENT, 12, 6, True)
     a, b = described(measure, [one], 72), described(measure, [other], 72)
     row = np.empty(73)

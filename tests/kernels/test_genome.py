@@ -95,7 +95,7 @@ def test_genes_and_hidden_nodes_go_where_their_numbers_belong() -> None:
         assert not arrays.full[0]
 
 
-def test_what_finds_no_room_is_said() -> None:
+def test_a_gene_without_room_marks_the_genome_as_full() -> None:
     neat = Neat(settings(), 2, 1)
     arrays = to_arrays(neat, [grown(neat, 1, 0)], room=2, hidden_room=1)
     genome_kernels.insert_gene(

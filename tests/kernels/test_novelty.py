@@ -254,7 +254,7 @@ def admitted(novelty: list[float], threshold: float, patience: int) -> tuple[lis
     return entered.tolist(), float(level[0])
 
 
-def test_what_equals_the_threshold_stays_outside() -> None:
+def test_a_behavior_at_the_threshold_does_not_enter() -> None:
     assert admitted([6.0, 6.0001], 6.0, 100) == ([False, True], 6.0)
 
 

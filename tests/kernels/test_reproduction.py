@@ -59,7 +59,7 @@ def test_rounded_shares_add_up_and_are_within_one_of_the_exact_ones(share: list[
 
 @given(shares, st.integers(1, 1_000))
 @FEW
-def test_whoever_is_rounded_up_has_a_larger_remainder(share: list[float], total: int) -> None:
+def test_shares_that_are_rounded_up_have_the_largest_remainders(share: list[float], total: int) -> None:
     count = rounded(share, total)
     whole = sum(map(Fraction, share))
     over = [Fraction(part) * total / whole - given_ for given_, part in zip(count, share, strict=True)]

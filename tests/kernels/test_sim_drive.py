@@ -158,7 +158,7 @@ def test_an_s2_of_speeds_that_rise_goes_as_far_as_its_firmware_has_it() -> None:
     assert np.abs(at_once).max() > 0.015
 
 
-def test_what_wheels_do_is_theirs() -> None:
+def test_gain_and_dead_band_act_on_each_wheel() -> None:
     one = drive_robots(
         {**FIELD, "drive.gain_left": 0.9, "drive.bias_right": 0.01}, np.array([[1.0, 0.0], [0.0, 0.0]])
     )

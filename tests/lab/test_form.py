@@ -55,7 +55,7 @@ def test_what_is_no_study_file_is_a_value_error(text):
 
 
 @pytest.mark.parametrize("text", ["[" * 5000, "1 2", "x", "="])
-def test_what_is_no_value_is_told_with_its_place(text):
+def test_a_wrong_value_is_reported_with_its_place(text):
     field = next(each for each in form_sections()["neat"] if each.kind == "whole")
     with pytest.raises(ValueError, match=f"{field.place}: expected a whole number"):
         entered(field, text)

@@ -85,7 +85,7 @@ async def answers(page: Any) -> None:
 
 @pytest.mark.slow
 @given(MAYBE_JSON)
-def test_whatever_comes_is_taken_or_not(value):
+def test_any_message_of_a_client_is_accepted_or_refused(value):
     assert is_of_page(json.dumps(["event", value])) is False
     assert is_of_page("42" + json.dumps([value, value])) is False
     said = (

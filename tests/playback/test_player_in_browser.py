@@ -166,7 +166,7 @@ def test_several_trials_have_a_pen_each_and_letters_that_do_not_hide_each_other(
 
 
 @pytest.mark.slow
-def test_who_wants_no_motion_sees_steps(show):
+def test_reduced_motion_shows_steps_instead_of_motion(show):
     page = show(play(turning(2)), reduced_motion="reduce")
     page.click("button[aria-label=Play]")
     page.wait_for_timeout(200)

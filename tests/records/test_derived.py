@@ -145,7 +145,7 @@ def test_the_parquet_file_holds_the_frame(folder, tmp_path, what):
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_what_cannot_be_derived_or_written_is_said(folder, tmp_path):
+def test_wrong_names_and_paths_of_derived_frames_are_refused(folder, tmp_path):
     with pytest.raises(ValueError, match="Did you mean 'lineage'"):
         folder.derive("linage")
     with pytest.raises(ValueError, match="Did you mean 'novelty'"):

@@ -333,7 +333,7 @@ def test_the_label_is_that_of_the_first_trial(ledger):
     assert ledger.conditions()["a"]["label"] == "REAL"
     for mixing in (lambda: sit(ledger), lambda: ledger.start(2, emulated)):
         with pytest.raises(
-            LedgerError, match="are REAL, and this robot's would be EMULATED; the two are never mixed"
+            LedgerError, match=r"are REAL, but this robot's would be EMULATED\. They cannot be combined"
         ):
             mixing()
     assert ledger.trial(2).state == "planned"

@@ -148,7 +148,7 @@ def test_counts_of_a_person_have_no_ends_and_no_paths(tmp_path):
     assert len(ResultsFolder.open(tmp_path / "small").digest()) == 64
 
 
-def test_no_complete_run_is_said(tmp_path):
+def test_a_summary_needs_a_complete_run(tmp_path):
     drive(small_study(), tmp_path / "small", operator=Leaves())
     with pytest.raises(RecordError, match="No run on a robot is complete"):
         summarize(tmp_path / "small")
@@ -187,7 +187,7 @@ def test_kappa_is_that_of_the_table(tmp_path):
     assert f"{found.kappa:.3f}" in found.sentence
 
 
-def test_nobody_to_agree_with_is_said(tmp_path):
+def test_agreement_needs_trials_counted_by_two_people(tmp_path):
     drive(small_study(), tmp_path / "small")
     with pytest.raises(LedgerError, match="no trial was counted by two people yet"):
         measure_agreement(tmp_path / "small")

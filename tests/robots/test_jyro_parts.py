@@ -464,7 +464,7 @@ def test_parts_of_a_picture_can_be_hidden() -> None:
     robot.add(Pioneer4Sonars())
     assert "#da70d6" not in world.picture(hide=["bodies"]).to_svg()
     assert len(world.picture().shapes) - len(world.picture(hide=["rays"]).shapes) == 4
-    with pytest.raises(ValueError, match="Nothing is called 'ray'"):
+    with pytest.raises(ValueError, match="Unknown part 'ray'"):
         world.picture(hide=["ray"])
 
 

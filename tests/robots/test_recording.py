@@ -86,9 +86,7 @@ def test_what_deviates_from_a_recording_is_said_with_the_step(tmp_path):
     record(tmp_path / "one.jsonl")
     robot = RecordedRobot(tmp_path / "one.jsonl")
     robot.reset()
-    with pytest.raises(
-        RobotError, match=r"After step 0, .*one.jsonl goes on with 'observe', not with 'drive'"
-    ):
+    with pytest.raises(RobotError, match=r"After step 0, .*one.jsonl has 'observe', got 'drive'"):
         robot.drive(Command(0.0, -0.25))
     robot.observe()
     with pytest.raises(
@@ -123,7 +121,7 @@ def test_a_fault_is_recorded_and_comes_again(tmp_path):
     again = RecordedRobot(recording)
     again.reset()
     again.observe()
-    with pytest.raises(RobotError, match="As recorded: ") as repeated:
+    with pytest.raises(RobotError, match="Recorded error: ") as repeated:
         again.drive(Command(1, 0))
     assert str(caught.value) in str(repeated.value)
 
@@ -135,7 +133,7 @@ def test_a_robot_that_nobody_reached_leaves_a_recording_of_the_attempts(tmp_path
     recording = read_recording(tmp_path / "one.jsonl")
     assert "No Scribbler answers" in recording.header["error"]
     assert len([line for line in recording.lines if line["name"] == "info"]) == 3
-    with pytest.raises(RecordError, match="names no label, step_s, n_sensors: no robot answered"):
+    with pytest.raises(RecordError, match="has no label, step_s, n_sensors, because no robot answered"):
         RecordedRobot(recording)
 
 
@@ -176,7 +174,7 @@ def test_files_that_are_no_recordings_are_said(tmp_path):
 def test_a_recording_never_overwrites_one(tmp_path):
     record(tmp_path / "one.jsonl")
     port = FakePort(FakeScribbler("s2"))
-    with pytest.raises(RecordError, match=r"one.jsonl exists already; .* Name another file"):
+    with pytest.raises(RecordError, match=r"one.jsonl exists already\. .* Name another file"):
         Scribbler(port, record=tmp_path / "one.jsonl")
     assert not port.is_open
 

@@ -173,7 +173,7 @@ def test_what_is_out_of_range_is_refused_and_nothing_is_sent(call, message):
         ("s2", lambda r: r.set_ir_power(3), "'set_ir_power' needs a Fluke"),
     ],
 )
-def test_what_a_set_up_lacks_is_said_with_who_has_it(setup, call, who):
+def test_a_missing_part_is_reported_with_a_set_up_that_has_it(setup, call, who):
     robot, port = opened(setup)
     with pytest.raises(RobotError, match=who):
         call(robot)

@@ -62,7 +62,7 @@ def test_trials_are_the_same_for_the_same_seed_and_touch_nothing_at_the_start():
 
 
 @pytest.mark.parametrize(("observe", "groups"), [("cells", 2), ("encoders", 4), ("track", 1)])
-def test_what_trials_tell_is_as_long_as_what_simulations_make(observe, groups):
+def test_observed_and_simulated_vectors_have_the_same_length(observe, groups):
     platform = SimPlatform()
     with SimTarget(platform, ARENA) as target:
         trials = target.carry_out(all_plans(ARENA, platform.robot, 2), observe)

@@ -130,7 +130,7 @@ def test_goal_of_two_twins_is_open(right):
     assert verdicts["fall of the RMS gap, track"] == "open"
 
 
-def test_what_is_done_is_not_done_again(right):
+def test_finished_parts_are_not_computed_again(right):
     summary, folder, twins = right
     before = twins.n_trials, twins.n_fits
     assert carry_out(folder, twins) == summary

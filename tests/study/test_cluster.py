@@ -308,7 +308,7 @@ def test_a_chunk_that_ends_every_worker_is_told(study, dask, tmp_path, monkeypat
     thread = threading.Thread(target=keep_one)
     thread.start()
     try:
-        with pytest.raises(ClusterError, match=r"ended every worker that began them.*--chunk"):
+        with pytest.raises(ClusterError, match=r"ended every worker that computed them.*--chunk"):
             run_study(study, tmp_path / "r", cluster=dask.address)
     finally:
         stop.set()

@@ -78,7 +78,7 @@ def test_champions_keep_their_inputs_and_meet_targets_that_lack_them(tmp_path: P
     folder = run_study(study, tmp_path / "sim", threads=1).folder
     (champion,) = sample_controllers(folder.path, 1, 1)
     assert champion.genome.interface.inputs == INPUTS
-    with pytest.raises(StudyError, match="has no champions: nothing was selected"):
+    with pytest.raises(StudyError, match="has no champions, because its conditions have no selection"):
         sample_controllers(_random(tmp_path), 1, 1)
 
 

@@ -244,7 +244,7 @@ def test_numbers_of_robot_and_arena_are_wrong_at_once():
     ]
 
 
-def test_what_follows_from_a_mistake_is_no_second_one():
+def test_consequences_of_a_mistake_are_not_reported():
     """`study = 4` was said to lack a name, too."""
     assert mistakes('study = 4\n[[condition]]\nname = "y"') == ["study: expected a table, got 4."]
     assert mistakes('condition = [3]\n[study]\nname = "x"') == ["condition[1]: expected a table, got 3."]

@@ -91,7 +91,7 @@ def test_trials_that_were_kept_are_scored_anew_by_another_task(tmp_path):
         (
             {"task": "wall", "observe": "cells"},
             StudyError,
-            "task 'wall' is scored by its poses: observe track",
+            "task 'wall' is scored by its poses. Use --observe track",
         ),
         ({"task": "python:none.py:f"}, TaskError, "none.py cannot be read"),
         ({"controllers": "avoid"}, ControllerError, r"range\.3 to range\.7 are missing"),
@@ -105,7 +105,7 @@ def test_what_cannot_be_scored_is_refused_before_a_trial(values, error, text):
 def test_a_target_that_shows_too_little_is_refused_with_who_would_see_it(tmp_path):
     kept = tmp_path / "kept.jsonl"
     gap_between("sim", "sim", n_controllers=2, trials=1, observe="cells", results=kept)
-    with pytest.raises(StudyError, match=r"no more can be seen than cells\. Use a camera .* or the witness"):
+    with pytest.raises(StudyError, match=r"supports at most 'cells'\. Use a camera .* or the witness"):
         gap_between("sim", f"recorded:{kept}", task="wall")
 
 

@@ -61,7 +61,7 @@ def test_an_error_of_the_block_is_what_is_told():
     in_a_block()
 
 
-def test_what_somebody_else_handles_and_other_threads_are_left_alone():
+def test_other_handlers_and_threads_are_left_alone():
     heard = []
     signal.signal(signal.SIGINT, lambda *_: heard.append(1))
     with held_interrupts():

@@ -53,7 +53,7 @@ def test_an_unsolved_run_counts_as_its_limit() -> None:
     assert summarize_maze_runs(runs[:1], 1000)["sd_evaluations"] is None
 
 
-def test_what_cannot_be_is_said() -> None:
+def test_wrong_arguments_are_refused_by_name() -> None:
     with pytest.raises(StudyError, match=r"Unknown maze 'maze-hrd'\. Did you mean 'maze-hard'"):
         measure_maze("maze-hrd")
     with pytest.raises(StudyError, match="crossover: expected at most"):

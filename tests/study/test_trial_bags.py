@@ -55,7 +55,7 @@ def test_trials_of_a_ledger_have_the_path_of_the_witness(tmp_path):
     assert len(list(export_trials(tmp_path / "study", tmp_path / "all"))) == 6
 
 
-def test_what_there_is_not_has_one_message(trials, tmp_path):
+def test_missing_trials_and_files_give_one_message(trials, tmp_path):
     with pytest.raises(StudyError, match="has no trial 8; it has 7, 9"):
         export(trials, "--trial", 8, "-o", tmp_path / "a.mcap")
     with pytest.raises(StudyError, match="Name the bag to write with -o"):

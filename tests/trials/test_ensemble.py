@@ -76,7 +76,7 @@ def test_a_robot_put_back_is_predicted_from_there(ensemble):
     assert moved[4] - [0.5, 0.3, np.pi / 2] == pytest.approx([*ahead, step[2]], abs=1e-5)
 
 
-def test_what_is_not_kept_has_no_steps(ensemble):
+def test_values_that_are_not_kept_have_no_steps(ensemble):
     rehearsal = ensemble.replay([START], np.ones((1, 5, 2)), {}, 1, keep=("stalled",))
     assert rehearsal.poses.shape == (1, 1, 0, 3)
     assert rehearsal.stalled.shape == (1, 1, 6)

@@ -216,9 +216,9 @@ def test_mistakes_are_named() -> None:
     world.add("jyro", Pose(0.3, 0.3, 0.0), name="ada")
     with pytest.raises(RobotError, match="There is a robot named 'ada' already"):
         world.add("jyro", Pose(0.7, 0.3, 0.0), name="ada")
-    with pytest.raises(RobotError, match="jyro-1 stands in a wall, an obstacle or another robot"):
+    with pytest.raises(RobotError, match="jyro-1 starts in a wall, an obstacle or another robot"):
         world.add("jyro", Pose(0.35, 0.3, 0.0))
-    with pytest.raises(RobotError, match="jyro-1 stands in a wall"):
+    with pytest.raises(RobotError, match="jyro-1 starts in a wall"):
         world.add("jyro", Pose(0.05, 0.3, 0.0))
     with pytest.raises(ValueError, match="scribler"):
         world.add("scribler-s2")

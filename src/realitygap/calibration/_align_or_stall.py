@@ -70,7 +70,7 @@ def _straight_rows(trial: TrialRecord) -> list[int]:
 
 
 def _touch(pose: Floats, outline: Floats, arena: Arena) -> tuple[float, tuple[float, float]] | None:
-    """Return the heading against the touched wall [rad, -pi / 2..pi / 2], and the point of the body in its frame [m]."""
+    """Return the heading against the touched wall [rad, -pi / 2..pi / 2], and the touching point in its frame [m]."""
     cos, sin = math.cos(pose[2]), math.sin(pose[2])
     points = pose[:2] + outline @ np.array([[cos, sin], [-sin, cos]])
     for x1, y1, x2, y2 in arena.segments:

@@ -169,11 +169,12 @@ def calibrate(
     foreign = _is_foreign(data)
     if not foreign and any((map_file, hold_out, radius_mm, drop_bad_rows)):
         raise StudyError(
-            "--map, --hold-out, --radius-mm and --drop-bad-rows go with --from and a log or a table of another program."
+            "--map, --hold-out, --radius-mm and --drop-bad-rows are only for --from with a log or a table of another "
+            "program. Leave them out."
         )
     if foreign and data is not None:
         if figure is not None:
-            raise StudyError("--figure draws the readings of trials, and this is a table. Leave it out.")
+            raise StudyError("--figure draws the readings of trials, but the data are a table. Leave it out.")
         made = _from_foreign(
             what, data, out, map_file, base, hold_out, seed, radius_mm, drop_bad_rows=drop_bad_rows
         )
@@ -210,11 +211,10 @@ def _checked(
 
     if (robot is None) == (data is None):
         raise StudyError(
-            "Name what is calibrated (--robot PLATFORM), or trials that were recorded before (--from DATA), and not "
-            "both."
+            "Expected either the robot to measure (--robot PLATFORM) or recorded trials (--from DATA)."
         )
     if out is None:
-        raise StudyError("Name the file that the calibration goes to: -o FILE.toml")
+        raise StudyError("No file for the calibration. Name one: -o FILE.toml")
     if out.suffix != ".toml":
         raise StudyError(
             f"{out} does not end in .toml. Expected the name of a calibration, such as fit.toml."
@@ -232,7 +232,7 @@ def _checked(
     if figure is not None and (what != "sensors" or figure.suffix not in (".svg", ".pdf", ".png")):
         raise StudyError("--figure draws the readings of `calibrate sensors` into a .svg, .pdf or .png.")
     if data is not None and (witness is not None or camera is not None or choose):
-        raise StudyError("--witness, --camera and --choose go with --robot: --from drives nothing.")
+        raise StudyError("--witness, --camera and --choose are only for --robot. Leave them out with --from.")
     return out
 
 

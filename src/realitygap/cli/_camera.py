@@ -70,7 +70,7 @@ def operated_under_camera(spec: str | None, study: Study, operator: Operator) ->
         return
     if operator.observer is not None:
         raise StudyError(
-            "--camera goes with a robot on the floor: an emulator's witness sees where it drives."
+            "--camera is only for a robot on the floor. Leave it out: an emulator's witness observes its path."
         )
     from realitygap.study import CameraObserver, physical_conditions
     from realitygap.vision import CameraDevice, LiveTrack

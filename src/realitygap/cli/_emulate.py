@@ -142,7 +142,7 @@ def emulate(
         _emulate_thymio(arena, speed, tcp, witness, window=window, quiet=quiet)
         return
     if window:
-        raise RobotError("--window goes with thymio: a Scribbler is shown in the terminal.")
+        raise RobotError("--window is only for thymio. Leave it out: the terminal shows a Scribbler.")
     if speed == 0 and witness is None:
         raise RobotError(
             "With --speed 0 a witness lets time pass. Add --witness PORT, or give another speed."

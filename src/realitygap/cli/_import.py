@@ -82,9 +82,7 @@ def import_log(
         typer.echo(log_map.to_toml(), nl=False)
         return
     if out is None:
-        raise LogError(
-            "Name the file that the trials go to: -o trials.jsonl. Or print the mapping: --show-map."
-        )
+        raise LogError("No file for the trials. Name one: -o trials.jsonl. Or print the mapping: --show-map.")
     if out.suffix != ".jsonl":
         raise LogError(
             f"{out} does not end in .jsonl. Expected the name of a file of trials, such as trials.jsonl."

@@ -130,7 +130,7 @@ def score(
             name for name, value in (("--yes", yes), ("--second", second), ("--correct", correct)) if value
         ]
         if alone:
-            raise StudyError(f"{', '.join(alone)}: of which study? Name its folder (--study DIR).")
+            raise StudyError(f"{', '.join(alone)}: expected a study. Name its folder (--study DIR).")
         _only_show(photo, arena, pens, overlay, as_json=as_json)
         return
     if pens is not None:

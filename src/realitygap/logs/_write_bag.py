@@ -113,7 +113,7 @@ def _check(trial: TrialRecord, robot: RobotModel, out: Path, wheel_diameter_mm: 
             "Name such a bag."
         )
     if out.exists() or out.is_symlink():
-        raise LogError(f"{out} exists already. Name a bag that is not.")
+        raise LogError(f"{out} exists already. Name another bag.")
     if not len(trial.commands):
         raise LogError(f"Trial {trial.number} has no command, expected one that was driven.")
     n = trial.readings.shape[1]

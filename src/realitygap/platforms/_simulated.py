@@ -56,7 +56,9 @@ class SimulatedPlatform(Platform):
         Raises:
             ValueError: The duration is always the same.
         """
-        raise ValueError(f"A step of {self.name} lasts {self.command_s:g} s, and no other time.")
+        raise ValueError(
+            f"step_s is {step_s:g}, expected {self.command_s:g}: a step of {self.name} always lasts this time."
+        )
 
     def placed(self, arena: Arena, start: Pose) -> tuple[Self, Arena]:
         """Return platform and arena with trials that begin at a pose."""

@@ -226,8 +226,8 @@ def _read_checked(chunk: Chunk, sealed: bytes) -> tuple[pl.DataFrame, list[Strea
     other_rows = frame.height != chunk.n_rows or digest.hexdigest() != chunk.rows_digest
     if other_rows or (frame["condition"] != chunk.condition).any():
         raise RecordError(
-            f"{chunk.path} reads as other values than were written, though its bytes are intact. "
-            "Does the same command give this again? Then please report it, with the version of polars."
+            f"{chunk.path} is intact, but polars reads other values than those written. "
+            "If the same command gives this error again, report it with the version of polars."
         )
     with _checking(chunk.path):
         check_rows(frame, chunk.condition, chunk.first)

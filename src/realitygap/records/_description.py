@@ -56,7 +56,7 @@ class Description:
             document = parse_json(data)
         except ValueError as error:
             raise RecordError(
-                f"{path} is torn: it is not JSON ({error}). Restore it from a copy, or move the whole folder elsewhere."
+                f"{path} is damaged: it is not JSON ({error}). Restore it from a copy, or move the folder elsewhere."
             ) from None
         if not isinstance(document, dict) or document.get("format") != _FORMAT:
             raise RecordError(

@@ -31,7 +31,7 @@ def write_durably(path: Path, data: bytes, *, replace: bool) -> None:
     """
     with writing(path), written_beside(path, [data]) as temporary:
         if not replace and path.exists():
-            raise RecordError(f"{path} is published already; what is published is never overwritten.")
+            raise RecordError(f"{path} already exists. A published chunk is never overwritten.")
         temporary.replace(path)
         sync_folder(path.parent)
 
@@ -103,6 +103,6 @@ def reading(path: Path) -> Iterator[None]:
     try:
         yield
     except FileNotFoundError as error:
-        raise RecordError(f"{path} is gone; was it removed by another process just now?") from error
+        raise RecordError(f"{path} no longer exists. Another process may have removed it.") from error
     except OSError as error:
         raise RecordError(f"Could not read {path}: {error.strerror or error}.") from error

@@ -303,7 +303,7 @@ class ResultsFolder(PublishedResults):
         if other is not None:
             raise RecordError(
                 f"Replicates {name.first} to {name.last} of {name.condition!r} overlap with "
-                f"{self._trials / str(other)}; what is published is never overwritten."
+                f"{self._trials / str(other)}. A published chunk is never overwritten."
             )
         first = published.first(name.condition)
         if first is not None and self._load(first).condition_hash != condition_hash:

@@ -167,7 +167,7 @@ class Ledger(LedgerReader):
             )
             if not changed:
                 raise LedgerError(
-                    f"Generation {generation} of {condition!r}, run {replicate}, is closed already."
+                    f"Generation {generation} of {condition!r}, run {replicate}, is already closed."
                 )
             for trial in trials:
                 self._run(
@@ -356,8 +356,8 @@ class Ledger(LedgerReader):
         known = self._one("SELECT label FROM conditions WHERE name = ?", condition)
         if known is not None and known["label"] not in (None, label):
             raise LedgerError(
-                f"The trials of condition {condition!r} in {self.path} are {known['label']}, and this robot's would "
-                f"be {label}; the two are never mixed. Name another folder (--out DIR)."
+                f"The trials of condition {condition!r} in {self.path} are {known['label']}, but this robot's would "
+                f"be {label}. They cannot be combined. Name another folder (--out DIR)."
             )
 
     def _counters(self, number: int) -> set[str]:
@@ -391,7 +391,7 @@ class Ledger(LedgerReader):
 
     def _void(self, number: int, reason: str) -> None:
         if not reason.strip():
-            raise LedgerError(f"Why is trial {number} void? Give a reason.")
+            raise LedgerError(f"Trial {number} needs a reason to be void. Give one.")
         trial = self.trial(number)
         self._run("UPDATE trials SET state = 'void', reason = ? WHERE id = ?", reason, number)
         self._note_event(number, "void", {"reason": reason, "was": trial.state})

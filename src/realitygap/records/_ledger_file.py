@@ -182,7 +182,7 @@ def create_file(path: Path) -> None:
     try:
         with speaking(path):
             if path.exists():
-                raise LedgerError(f"{path} exists already; a ledger is never replaced.")
+                raise LedgerError(f"{path} exists already. A ledger is never replaced. Name another folder.")
             connection = sqlite3.connect(temporary, isolation_level=None)
             try:
                 connection.executescript(

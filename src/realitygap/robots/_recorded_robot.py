@@ -36,7 +36,8 @@ class RecordedRobot(ProgramRobot):
         missing = [name for name in ("label", "step_s", "n_sensors") if header.get(name) is None]
         if missing:
             raise RecordError(
-                f"{recording.path} names no {', '.join(missing)}: no robot answered as it was recorded."
+                f"{recording.path} has no {', '.join(missing)}, because no robot answered while it was recorded. Name "
+                "another recording."
             )
         self.recording = recording
         self.label: Label = header["label"]
@@ -59,10 +60,10 @@ class RecordedRobot(ProgramRobot):
         is_over = self._next == len(self._lines)
         line: Mapping[str, Any] = {"name": "end"} if is_over else self._lines[self._next]
         if line["name"] != name:
-            said = "ends" if line["name"] in ("end", "close") else f"goes on with '{line['name']}'"
+            said = "ends" if line["name"] in ("end", "close") else f"has '{line['name']}'"
             raise RobotError(
-                f"After step {self._n_steps}, {self.recording.path} {said}, not with '{name}': a recorded robot can "
-                "only do again what it did."
+                f"After step {self._n_steps}, {self.recording.path} {said}, got '{name}'. A recorded robot can only "
+                "repeat its recorded calls."
             )
         self._next += 1
         if line["kind"] == "call" and self._next < len(self._lines):
@@ -71,7 +72,7 @@ class RecordedRobot(ProgramRobot):
                 line = after
                 self._next += 1
         if line["kind"] == "fault":
-            raise RobotError(f"As recorded: {line['outcome']}")
+            raise RobotError(f"Recorded error: {line['outcome']}")
         values: Mapping[str, Any] = line.get("values", {})
         self.clock.sleep(max(float(line["t"]) - self.clock.now(), 0.0))
         return values
@@ -101,8 +102,8 @@ class RecordedRobot(ProgramRobot):
         if (told["move"], told["turn"]) != command:
             self._next = at
             raise RobotError(
-                f"In step {self._n_steps + 1}, {self.recording.path} drove {told['move']}, {told['turn']}, not "
-                f"{command.move}, {command.turn}: a recorded robot can only do again what it did."
+                f"In step {self._n_steps + 1}, {self.recording.path} has the command {told['move']}, {told['turn']}, "
+                f"got {command.move}, {command.turn}. A recorded robot can only repeat its recorded calls."
             )
         self._n_steps += 1
         self.clock.sleep(self.step_s)

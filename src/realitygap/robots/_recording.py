@@ -74,7 +74,7 @@ class Recorder:
             self._file = self.path.open("xb", buffering=0)
         except FileExistsError as error:
             raise RecordError(
-                f"{path} exists already; a recording never overwrites one. Name another file."
+                f"{path} exists already. A recording never overwrites a file. Name another file."
             ) from error
         except OSError as error:
             raise RecordError(

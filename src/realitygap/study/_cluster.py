@@ -256,8 +256,8 @@ class _Sitting:
                 return
             raise ClusterError(
                 f"Replicates from {each.task.first} of {each.task.condition.name!r} ended every worker "
-                f"that began them, {each.n_given_up} times over. Is its memory too small? Try --chunk with a smaller "
-                f"number. {_GO_ON}"
+                f"that computed them, {each.n_given_up} times. The memory of the workers may be too small. Try a "
+                f"smaller --chunk. {_GO_ON}"
             )
         if isinstance(error, (ImportError, AttributeError)):
             raise ClusterError(

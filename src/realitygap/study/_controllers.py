@@ -151,7 +151,9 @@ def _of_folder(folder: ResultsFolder, name: str | Path, allow_code: bool) -> lis
     conditions = [Condition.from_settings(each["name"], dict(each["settings"])) for each in described]
     selected = [each for each in conditions if each.selection != "random"]
     if not selected:
-        raise StudyError(f"{name} has no champions: nothing was selected. Name other results, or `random`.")
+        raise StudyError(
+            f"{name} has no champions, because its conditions have no selection. Name other results, or `random`."
+        )
     found: list[_Champion] = []
     first = _coverage_first(selected)[0]
     for condition in selected:

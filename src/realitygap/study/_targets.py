@@ -32,8 +32,8 @@ def refuse_more_than_is_seen(target: Target, observe: Observe) -> None:
     """
     if not sees(target.observes, observe):
         raise StudyError(
-            f"observe is {observe!r}, and of {target.name} no more can be seen than {target.observes!r}. Choose that, "
-            "or name a witness that sees more."
+            f"observe is {observe!r}, but {target.name} supports at most {target.observes!r}. Choose that, or name a "
+            "witness that observes more."
         )
 
 
@@ -62,13 +62,13 @@ def refuse_too_little(task: Task, target: Target, observe: Observe | None = None
     """
     if observe is not None and not sees(observe, task.observe):
         raise StudyError(
-            f"--observe is {observe}, and task {task.name!r} is scored by {SEEN_AS[task.observe]}: observe "
+            f"--observe is {observe}, but task {task.name!r} is scored by {SEEN_AS[task.observe]}. Use --observe "
             f"{task.observe}."
         )
     if not sees(target.observes, task.observe):
         raise StudyError(
-            f"Task {task.name!r} is scored by {SEEN_AS[task.observe]}, and of {target.name} no more can be seen than "
-            f"{target.observes}. {WOULD_SEE[task.observe]}"
+            f"Task {task.name!r} is scored by {SEEN_AS[task.observe]}, but {target.name} supports at most "
+            f"{target.observes!r}. {WOULD_SEE[task.observe]}"
         )
     if observe is None:
         are_cells_free = sees(target.observes, "track")

@@ -147,7 +147,7 @@ def check_plans(
         raise ValueError(f"observe is {observe!r}. {did_you_mean(observe, OBSERVATIONS)}")
     if not sees(target.observes, observe):
         raise ValueError(
-            f"observe is {observe!r}, and of {target.name} no more can be seen than {target.observes!r}. Choose that, "
+            f"observe is {observe!r}, but {target.name} supports at most {target.observes!r}. Choose that, "
             "or name a witness that sees more."
         )
     for k, plan in enumerate(plans):

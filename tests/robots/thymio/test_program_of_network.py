@@ -91,7 +91,7 @@ def test_sums_beyond_16_and_32_bits_saturate():
         assert errors(network, fixed_point(network), given)[0] < 0.003, weight
 
 
-def test_what_has_no_bound_in_16_bits_is_refused():
+def test_networks_without_a_bound_in_16_bits_are_refused():
     both = [(2, 0.0, {0: 1.0}), (3, 0.0, {1: 1.0})]
     with pytest.raises(ValueError, match="'identity' have no bound"):
         fixed_point(network_of(both, activation="identity", recurrent=True))

@@ -184,7 +184,7 @@ class SimWorld:
             parts = robot._parts()
             if any(overlaps(part, other) for part in parts for other in standing):
                 raise RobotError(
-                    f"{robot.name} stands in a wall, an obstacle or another robot at ({robot.start.x:.3f}, "
+                    f"{robot.name} starts in a wall, an obstacle or another robot at ({robot.start.x:.3f}, "
                     f"{robot.start.y:.3f}). Start it elsewhere."
                 )
             standing += parts

@@ -31,7 +31,7 @@ def world_picture(world: JyroWorld, hide: Collection[str] = ()) -> Picture:
     """
     for part in hide:
         if part not in PARTS:
-            raise ValueError(f"Nothing is called {part!r}. {did_you_mean(part, PARTS)}")
+            raise ValueError(f"Unknown part {part!r}. {did_you_mean(part, PARTS)}")
     left, right, bottom, top = _borders(world)
     margin = _MARGIN * max(right - left, top - bottom)
     parts: list[tuple[str, Sequence[Shape]]] = [

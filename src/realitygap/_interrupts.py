@@ -1,4 +1,4 @@
-"""Ctrl-C where Python would drop it."""
+"""Handling of Ctrl-C at moments at which Python would drop it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from types import FrameType
 AGAIN_S = 0.05
 """Time after which an interrupt is repeated [s]; by then Python runs other code."""
 CALLBACKS = ("_raw_object_cache_notify", "_raw_object_cache_getbuffer")
-"""Functions of llvmlite that LLVM calls. A signal that comes while LLVM compiles is handled in the first of them."""
+"""Functions of llvmlite that LLVM calls. A signal during a compilation is handled in the first of them."""
 
 _repeats: list[threading.Timer] = []
 

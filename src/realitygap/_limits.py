@@ -23,28 +23,28 @@ if TYPE_CHECKING:
     from PIL.Image import Image
 
 MOST_TOML_BYTES = 4_000_000
-"""Of a TOML, SVG or Python file. A drawing of a large maze has some 100,000."""
+"""Maximum size of a TOML, SVG or Python file. A drawing of a large maze has some 100,000."""
 MOST_JSON_BYTES = 256 << 20
-"""Of a JSON file or a line of JSON. The description of a large study has some 10 MB."""
+"""Maximum size of a JSON file or a line of JSON. The description of a large study has some 10 MB."""
 MOST_LINES_BYTES = 4 << 30
-"""Of a file with a JSON value on each line."""
+"""Maximum size of a file with a JSON value on each line."""
 MOST_TABLE_BYTES = 64 << 20
-"""Of a text file with a table."""
+"""Maximum size of a text file with a table."""
 MOST_CHUNK_BYTES = 4 << 30
-"""Of a Parquet file, and of what it holds once it is decompressed."""
+"""Maximum size of a Parquet file, and of its decompressed content."""
 MOST_CHECKPOINT_BYTES = 8 << 30
-"""Of a saved population."""
+"""Maximum size of a saved population."""
 MOST_TEXT_BYTES = 1 << 28
-"""Of a value in a ledger."""
+"""Maximum size of a value in a ledger."""
 MOST_VIDEO_PIXELS = 8192 * 8192
-"""Of a picture in a video."""
+"""Maximum size of a picture in a video."""
 
 MOST_DEPTH = 64
 """Lists and tables inside each other. Those of realitygap need 10."""
 MOST_KEY_PARTS = 32
 """Parts of a dotted TOML key, such as the three of a.b.c."""
 MOST_DIGITS = 300
-"""Of any number."""
+"""Maximum number of digits of a number."""
 LEAST_INTEGER, MOST_INTEGER = -(2**63), 2**64 - 1
 """Integers beyond do not fit into 64 bits."""
 

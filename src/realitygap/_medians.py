@@ -20,13 +20,13 @@ SMALLEST_N = 6
 
 @dataclass(frozen=True)
 class IntervalRanks:
-    """Which of n ordered values bound the interval of the median.
+    """Ranks of the ordered values that bound the interval of the median.
 
     Attributes:
         lower: rank of the lower bound, counted from 1.
         upper: rank of the upper bound, n + 1 - lower.
-        coverage: how often such an interval contains the median of a continuous distribution [0..1]; of a
-            discrete one, at least that often.
+        coverage: Probability that such an interval contains the median of a continuous distribution [0..1]; a lower
+            bound for a discrete one.
     """
 
     lower: int
@@ -66,11 +66,11 @@ def interval_ranks(n: int, confidence: float = CONFIDENCE) -> IntervalRanks | No
     values of rank r and n + 1 - r misses it with probability 2 P(X <= r - 1), exactly.
 
     Args:
-        n: how many values, >= 0.
+        n: Number of values, at least 0.
         confidence: between 0 and 1.
 
     Returns:
-        The ranks, or None where n is too small: not even the range covers the median so often.
+        The ranks, or None if n is too small: then not even the range contains the median with this probability.
 
     Raises:
         ValueError: n is negative, or `confidence` not between 0 and 1.
@@ -99,10 +99,10 @@ def median_interval(values: npt.NDArray[np.float64], confidence: float = CONFIDE
 
     Args:
         values: (n,) independent observations in any order and unit, all finite.
-        confidence: what the interval shall cover at least, between 0 and 1.
+        confidence: Minimum probability that the interval contains the median, between 0 and 1.
 
     Returns:
-        The interval, or None where n is too small (below 6 for 95 %).
+        The interval, or None if n is too small (below 6 for 95 %).
 
     Raises:
         ValueError: `values` is not one row of finite numbers, or `confidence` is not between 0 and 1.
@@ -120,7 +120,7 @@ def quartiles(values: npt.NDArray[np.float64]) -> Quartiles:
     """Lower quartile, median and upper quartile, with straight lines between ordered values.
 
     Args:
-        values: (n,) in any order and unit, n >= 1, all finite.
+        values: (n,) values in any order and unit, n >= 1, all finite.
 
     Raises:
         ValueError: `values` is empty, not one row, or not finite.

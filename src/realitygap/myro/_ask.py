@@ -22,10 +22,10 @@ def ask(
     """Ask for a value, or several.
 
     Args:
-        item: What to ask for, or a list of it.
-        title: What it is for; shown above several questions.
-        useCache: Whether what was answered before is taken without asking again.
-        useDict: Whether even one answer comes in a dictionary.
+        item: Question, or a list of questions.
+        title: Title above several questions.
+        useCache: True to use earlier answers without asking again.
+        useDict: True to return even one answer in a dictionary.
 
     Returns:
         The answer as text; for several the answers by what was asked for.
@@ -52,8 +52,8 @@ def askQuestion(
 
     Args:
         question: The question.
-        answers: What may be answered.
-        title: Shown above the question where it is not Myro's own.
+        answers: Possible answers.
+        title: Title above the question. Default: Myro's own.
         default: Index of the answer that Enter alone gives.
 
     Raises:

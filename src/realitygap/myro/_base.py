@@ -17,7 +17,7 @@ PLACES = {
     "center": 1, "middle": 1, 1: 1,
     "right": 2, 2: 2,
 }  # fmt: skip
-"""Positions of sensors that come in threes."""
+"""Names of the positions of sensors in groups of three."""
 
 _GLANCE_S = 1e-3
 """What a look at the clock takes where time stands still otherwise [s], so that loops that only wait for it end."""
@@ -31,9 +31,9 @@ class Part(threading.Thread):
     """A function of a program that runs in parallel with others.
 
     Attributes:
-        result: What it returned.
-        error: What it raised.
-        is_over: Whether it may no longer speak to a robot.
+        result: Returned value.
+        error: Raised error.
+        is_over: True if it may no longer use a robot.
     """
 
     def __init__(self, function: Callable[[], Any]) -> None:
@@ -55,9 +55,9 @@ class Base:
     """A robot and its clock.
 
     Attributes:
-        simulation: What an onlooker sees of a simulated robot; None for others.
+        simulation: View of a simulated robot from outside; None for others.
         clock: The time that the robot lives in.
-        deadline: When a program has to end, by that clock [s]; None for never.
+        deadline: Time at which a program has to end, by that clock [s]; None for never.
     """
 
     _driver: Driver

@@ -29,8 +29,8 @@ class Camera(Base):
         """Take a picture.
 
         Args:
-            mode: "jpeg" (as without one), "jpeg-fast" (coarser), "color" (slow), "gray", "grayjpeg-fast", "grayraw", or
-                "blob": white where the color is that of `configureBlob`.
+            mode: "jpeg" (the default), "jpeg-fast" (coarser), "color" (slow), "gray", "grayjpeg-fast", "grayraw", or
+                "blob": white for pixels of the color of `configureBlob`.
         """
         kind = choice("takePicture: the mode", mode or "jpeg", _KINDS)
         picture = Picture.from_array(self.driver.picture(kind))
@@ -58,7 +58,7 @@ class Camera(Base):
 
         Args:
             y_low, y_high, u_low, u_high, v_low, v_high: Limits; `rgb2yuv` tells a color's values.
-            smooth_thresh: How many pixels of another color end a run.
+            smooth_thresh: Number of pixels of another color that end a run.
         """
         limits = {
             name: whole(f"configureBlob: {name}", value, 0, _BYTE)

@@ -67,7 +67,7 @@ DONE: dict[str, tuple[str, ...]] = {
         "getWindow", "draw", "undraw", "distance",
     ),
 }  # fmt: skip
-"""What is done, by subject."""
+"""Functions that exist here, by subject."""
 
 _WINDOW = "It opens a window of its own, which a notebook and a server have no screen for. {instead}"
 _VOICE = "No voice comes with realitygap: speak() prints what it would say."
@@ -130,7 +130,7 @@ LEFT_OUT: dict[str, str] = {
     "GraphicsError": _INSIDE + " Mistakes are MyroError here.",
     "Transform": _INSIDE,
 }
-"""What is left out, and why; called, each says so."""
+"""Functions that are left out, with the reason, which each of them reports when called."""
 
 
 def names() -> list[str]:

@@ -33,7 +33,7 @@ def tails() -> bool:
 
 
 def pickOne(*items: Any) -> Any:
-    """One of several things by chance: `pickOne("left", "right")`; or a whole number below one: `pickOne(6)`.
+    """Return one of several things at random, `pickOne("left", "right")`, or a whole number below one, `pickOne(6)`.
 
     Args:
         items: Two or more things; or a whole number n for one of 0 to n - 1; or one list.
@@ -64,10 +64,10 @@ def pickOneInRange(start: int, stop: int) -> int:
 
 
 def odd(n: float) -> bool:
-    """Whether a number is odd."""
+    """Return whether a number is odd."""
     return n % 2 == 1
 
 
 def even(n: float) -> bool:
-    """Whether a number is even."""
+    """Return whether a number is even."""
     return n % 2 == 0

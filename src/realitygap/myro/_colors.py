@@ -75,7 +75,7 @@ class Color:
         self.alpha = _channel(value)
 
     def makeLighter(self) -> None:
-        """Move each part 35 % of the way towards white."""
+        """Move each part by 35 % towards white."""
         self.rgb = lighter(self.rgb)
 
     def makeDarker(self) -> None:
@@ -119,7 +119,7 @@ def _channel(value: object) -> int:
 
 
 def lighter(rgb: tuple[int, int, int]) -> tuple[int, int, int]:
-    """Red, green and blue, each moved 35 % of the way towards 255."""
+    """Return red, green and blue, each moved by 35 % towards 255."""
     red, green, blue = (int((255 - part) * 0.35 + part) for part in rgb)
     return (red, green, blue)
 

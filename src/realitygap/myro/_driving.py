@@ -20,9 +20,9 @@ class Driving(Base):
         """Drive straight ahead.
 
         Args:
-            speed: From 0 to 1, full speed; negative drives back.
-            seconds: How long; the call then returns when the robot has stopped again. Without, it returns at once and
-                the robot keeps driving until the next command.
+            speed: Speed from 0 to 1, full speed; negative drives backward.
+            seconds: Duration [s]. The call then returns when the robot has stopped again. Without a duration, it
+                returns immediately, and the robot keeps driving until the next command.
         """
         self._go("forward", number("forward: the speed", speed), 0.0, seconds)
 
@@ -44,7 +44,7 @@ class Driving(Base):
         Args:
             direction: "left", "right" or "straight" (which stops); or a speed from -1 (right) to 1 (left).
             amount: The speed for a direction in words.
-            seconds: As for `forward`.
+            seconds: Duration, as for `forward`.
         """
         if isinstance(direction, numbers.Real):
             speed = number("turn: the direction", direction)
@@ -58,7 +58,7 @@ class Driving(Base):
         Args:
             translate: Speed ahead, from -1 (back) to 1.
             rotate: Speed of the turn, from -1 (right) to 1 (left).
-            seconds: As for `forward`.
+            seconds: Duration, as for `forward`.
         """
         self._go("move", number("move: translate", translate), number("move: rotate", rotate), seconds)
 

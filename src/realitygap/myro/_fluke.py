@@ -30,7 +30,7 @@ class Fluke(Base):
         self.driver.send_ir_message(msg.encode("ascii"))
 
     def getIRMessage(self) -> str:
-        """Return the text received by infrared since the last call; empty if nothing came."""
+        """Return the text received by infrared since the last call; empty if there was none."""
         return bytes(self.driver.get_ir_message()).decode("latin-1")
 
     def setCommunicateLeft(self, on: bool = True) -> None:

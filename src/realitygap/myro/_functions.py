@@ -100,9 +100,9 @@ def beep(duration: Any = 0.5, frequency1: Any = None, frequency2: Any = None) ->
     """Play a tone on the robot, or on the computer if there is no robot; return when it has ended.
 
     Args:
-        duration: How long [s]; a list of frequencies here plays each for half a second.
-        frequency1: [Hz]; one by chance where none is given; a list plays each in turn.
-        frequency2: Of a second tone at the same time [Hz].
+        duration: Duration [s]. A list of frequencies here plays each for half a second.
+        frequency1: Frequency [Hz]. Default: a random one. A list plays each in turn.
+        frequency2: Frequency of a second tone at the same time [Hz].
     """
     (_robot.robot_or_none() or computer).beep(duration, frequency1, frequency2)
 

@@ -59,7 +59,7 @@ class Gamepad:
         self._buttons: dict[int, int] = {}
 
     def update(self) -> None:
-        """Read the events that have come. The first ones, right after opening, name all axes and buttons.
+        """Read all waiting events. The first ones, right after opening, name all axes and buttons.
 
         Raises:
             MyroError: The gamepad is gone.
@@ -170,7 +170,8 @@ def getGamepad(*what: Any, wait: float = 0.05) -> Any:
     A robot that moves keeps moving meanwhile. "count" is returned immediately.
 
     Args:
-        what: As in `getGamepadNow`. With "any" among the items, a button counts as 1 if it was pressed or let up.
+        what: Items, as in `getGamepadNow`. With "any" among the items, a button counts as 1 if it was pressed or
+            released.
         wait: Time between two looks [s].
 
     Raises:

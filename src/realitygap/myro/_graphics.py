@@ -20,7 +20,7 @@ class GraphWin:
     """A window of pixels, (0, 0) at the upper left, in which shapes are drawn; shown again after each change.
 
     Args:
-        title: Of the window; a window of the same title takes its place.
+        title: Title of the window. It replaces a window of the same title.
         width, height: [pixels].
         autoflush: Taken and ignored: each change is shown at once.
     """
@@ -74,7 +74,7 @@ class GraphWin:
     plotPixel = plot
 
     def getMouse(self) -> Point:
-        """Ask in the terminal where to click. Differs: Myro waits for a click into the window."""
+        """Ask in the terminal for the place of a click. Differs: Myro waits for a click into the window."""
         while True:
             given = input(f"Click in {self.title!r}: x y = ").replace(",", " ").split()
             try:
@@ -88,11 +88,11 @@ class GraphWin:
         return None
 
     def getHeight(self) -> int:
-        """Its height [pixels]."""
+        """Return its height [pixels]."""
         return self.height
 
     def getWidth(self) -> int:
-        """Its width [pixels]."""
+        """Return its width [pixels]."""
         return self.width
 
     def close(self) -> None:
@@ -100,11 +100,11 @@ class GraphWin:
         self._closed = True
 
     def isClosed(self) -> bool:
-        """Whether it was closed."""
+        """Return whether it was closed."""
         return self._closed
 
     def setStatus(self, text: str = "") -> None:
-        """Print a line: what stands at the foot of Myro's windows."""
+        """Print a line that Myro shows at the bottom of its windows."""
         print(text)
 
     def redraw(self) -> None:
@@ -158,7 +158,7 @@ class GraphicsObject:
         self._changed()
 
     def draw(self, graphwin: GraphWin | None = None) -> None:
-        """Draw it into a window; into the newest one where none is given.
+        """Draw it into a window. Default: the newest one.
 
         Raises:
             MyroError: It is drawn already, or there is no window.
@@ -197,11 +197,11 @@ class GraphicsObject:
         return Point((first.x + last.x) / 2, (first.y + last.y) / 2)
 
     def getP1(self) -> Point:
-        """Its first point."""
+        """Return its first point."""
         return self.points[0].clone()
 
     def getP2(self) -> Point:
-        """Its last point."""
+        """Return its last point."""
         return self.points[-1].clone()
 
     def _changed(self) -> None:
@@ -229,11 +229,11 @@ class Point(GraphicsObject):
         return f"Point({self.x:g}, {self.y:g})"
 
     def getX(self) -> float:
-        """Its x."""
+        """Return its x."""
         return self.x
 
     def getY(self) -> float:
-        """Its y."""
+        """Return its y."""
         return self.y
 
     def getCenter(self) -> Point:
@@ -317,7 +317,7 @@ class Circle(Oval):
         self.points = [Point(x - self.radius, y - self.radius), Point(x + self.radius, y + self.radius)]
 
     def getRadius(self) -> float:
-        """Its radius."""
+        """Return its radius."""
         return self.radius
 
 
@@ -333,7 +333,7 @@ class Polygon(GraphicsObject):
         super().__init__(*corners)
 
     def getPoints(self) -> list[Point]:
-        """Its corners."""
+        """Return its corners."""
         return [point.clone() for point in self.points]
 
     def _svg(self, window: GraphWin) -> str:
@@ -352,7 +352,7 @@ class Text(GraphicsObject):
         self.face, self.size, self.style = "helvetica", 12.0, "normal"
 
     def setText(self, text: object) -> None:
-        """Let it say something else."""
+        """Change the text."""
         self.text = str(text)
         self._changed()
 
@@ -361,7 +361,7 @@ class Text(GraphicsObject):
         return self.text
 
     def getAnchor(self) -> Point:
-        """The point around which it stands."""
+        """Return the point in its middle."""
         return self.points[0].clone()
 
     def setFace(self, face: str) -> None:
@@ -406,7 +406,7 @@ class Image(GraphicsObject):
         self.picture = picture if isinstance(picture, Picture) else Picture(picture)
 
     def getAnchor(self) -> Point:
-        """The point around which it stands."""
+        """Return the point in its middle."""
         return self.points[0].clone()
 
     def _svg(self, window: GraphWin) -> str:
@@ -442,7 +442,7 @@ def _color(color: Any) -> str:
 
 
 def getWindow(name: str = "default") -> GraphWin:
-    """The window of a title; the newest one where none is given.
+    """Return the window of a title. Default: the newest one.
 
     Raises:
         MyroError: There is none.
@@ -453,7 +453,7 @@ def getWindow(name: str = "default") -> GraphWin:
 
 
 def draw(obj: GraphicsObject, win: GraphWin | None = None) -> None:
-    """Draw a shape into a window; into the newest one where none is given."""
+    """Draw a shape into a window. Default: the newest one."""
     obj.draw(win)
 
 

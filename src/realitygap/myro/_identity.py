@@ -1,4 +1,4 @@
-"""Who the robot is, and what it remembers."""
+"""The robot's name and its memory."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _LONGEST = 16  # characters of a name or a password
 
 
 class Identity(Base):
-    """Name, password, eight bytes of data and which end is ahead: kept by the robot when it is switched off."""
+    """Name, password, eight bytes of data, and the end that is ahead. The robot stores them when it is switched off."""
 
     def getName(self) -> str:
         """The robot's name."""
@@ -44,7 +44,7 @@ class Identity(Base):
         self.setSingleData(position, value)
 
     def setSingleData(self, position: int, value: int) -> None:
-        """As `setData`."""
+        """Set data like `setData`."""
         self.driver.set_single_data(
             whole("setData: the position", position, 0, 7), whole("setData: the value", value, 0, 255)
         )
@@ -53,7 +53,7 @@ class Identity(Base):
         """Correct a robot that does not drive straight: fast ahead, slow ahead, slow back, fast back.
 
         Args:
-            f1, f2, f3, f4: Each 0 to 2: 1 leaves both wheels, above slows the left one, below the right one.
+            f1, f2, f3, f4: Factors from 0 to 2: 1 changes neither wheel, above slows the left one, below the right one.
         """
         places = range(4) if self.driver.info.fluke == "none" else range(3, -1, -1)
         for place, fudge in zip(places, (f1, f2, f3, f4), strict=True):
@@ -66,7 +66,7 @@ class Identity(Base):
         return (f1, f2, f3, f4)
 
     def getForwardness(self) -> str:
-        """Which end is ahead: "fluke-forward" or "scribbler-forward"."""
+        """Return the end that is ahead: "fluke-forward" or "scribbler-forward"."""
         return f"{self.driver.forwardness}-forward"
 
     def setForwardness(self, value: str | int) -> None:
@@ -74,7 +74,7 @@ class Identity(Base):
         self.driver.set_forwardness(choice("setForwardness: the value", value, _FORWARDNESS))
 
     def identifyRobot(self) -> str:
-        """Which robot it is: "SCRIBBLER-1", "SCRIBBLER-2" or "UNKNOWN".
+        """Return the kind of the robot: "SCRIBBLER-1", "SCRIBBLER-2" or "UNKNOWN".
 
         Differs: told from what the robot said when it was opened; Myro's request resets the robot.
         """

@@ -29,9 +29,9 @@ def number(name: str, value: object, least: float | None = None, most: float | N
     """A number that a learner gave, checked.
 
     Args:
-        name: Of function and argument, for the message.
-        value: What came.
-        least, most: What it may be; no limit where not given.
+        name: Name of function and argument, for the message.
+        value: Value of the argument.
+        least, most: Smallest and largest allowed value. Default: no limit.
 
     Raises:
         MyroError: It is not a number, or out of range.
@@ -77,8 +77,8 @@ def choice(name: str, value: object, choices: Mapping[Any, T]) -> T:
     """Return the meaning of a word or a number; words in any case.
 
     Args:
-        name: Of function and argument, for the message.
-        value: What came.
+        name: Name of function and argument, for the message.
+        value: Value of the argument.
         choices: Meaning of each word and number.
 
     Raises:
@@ -101,7 +101,7 @@ def _either(words: Sequence[str]) -> str:
 
 
 def is_on(name: str, value: object) -> bool:
-    """Whether a learner means "on": "on", 1, True; "off", 0, False, None.
+    """Return whether a value means "on": "on", 1, True; "off", 0, False, None mean the opposite.
 
     Raises:
         MyroError: Text that is neither.
@@ -115,8 +115,8 @@ def explanation(error: BaseException, trace: TracebackType | None) -> str:
     """The line of the learner's program that went wrong, and why, as text.
 
     Args:
-        error: What was raised.
-        trace: Where; frames inside realitygap are passed over.
+        error: Raised error.
+        trace: Trace of the error, in which frames inside realitygap are skipped.
     """
     theirs = [
         frame for frame in traceback.extract_tb(trace) if not frame.filename.startswith((_OURS, "<frozen"))
@@ -131,7 +131,7 @@ def explanation(error: BaseException, trace: TracebackType | None) -> str:
 
 
 def show_mistakes_plainly(on_error: Callable[[], None], on_cell: Callable[[], None]) -> None:
-    """From now on a mistake ends a program, or a cell of a notebook, with one message and no traceback.
+    """Make a mistake end a program, or a cell of a notebook, with one message and no traceback.
 
     Other exceptions are shown as before.
 

@@ -18,11 +18,11 @@ class Paths(Base):
     """Positions in half millimeters, as Myro has them; angles counter-clockwise, 0 along x."""
 
     def getPosition(self) -> list[int]:
-        """[x, y] where the robot counts itself to be [mm]."""
+        """Return [x, y], the position by the robot's own count [mm]."""
         return [int(value) for value in self.driver.position]
 
     def hereIs(self, x: int = 0, y: int = 0) -> None:
-        """Tell the robot where it is [mm]."""
+        """Set the position in the robot's own count [mm]."""
         self.driver.set_position(_far("hereIs: x", x), _far("hereIs: y", y))
 
     setHereIs = hereIs
@@ -32,7 +32,7 @@ class Paths(Base):
         return int(self.driver.angle)
 
     def setAngle(self, angle: int) -> None:
-        """Tell the robot where it faces [degrees]."""
+        """Set the heading in the robot's own count [degrees]."""
         self.driver.set_angle(_far("setAngle: the angle", angle))
 
     def beginPath(self, speed: int = 7) -> None:
@@ -52,11 +52,11 @@ class Paths(Base):
         self._motion("move_to", _far("moveTo: x", x), _far("moveTo: y", y), "half-mm")
 
     def moveBy(self, x: int, y: int) -> None:
-        """As `moveTo`, from where the robot is [half mm]."""
+        """Move like `moveTo`, relative to the robot's position [half mm]."""
         self._motion("move_by", _far("moveBy: x", x), _far("moveBy: y", y), "half-mm")
 
     def turnTo(self, angle: float, radsOrDegrees: str = "deg") -> None:
-        """Turn to face an angle, the shorter way round.
+        """Turn to a heading in the shorter direction.
 
         Args:
             angle: Counter-clockwise from x.
@@ -67,7 +67,7 @@ class Paths(Base):
         self._motion("turn_to", _degrees("turnTo", angle, radsOrDegrees), "deg")
 
     def turnBy(self, angle: float, radsOrDegrees: str = "deg") -> None:
-        """Turn by an angle, to the left where positive; arguments as for `turnTo`."""
+        """Turn by an angle, to the left if positive; arguments as for `turnTo`."""
         self._motion("turn_by", _degrees("turnBy", angle, radsOrDegrees), "deg")
 
     def arcTo(self, x: int, y: int, radius: int) -> None:
@@ -77,7 +77,7 @@ class Paths(Base):
         )
 
     def arcBy(self, x: int, y: int, radius: int) -> None:
-        """As `arcTo`, from where the robot is [half mm]."""
+        """Drive like `arcTo`, relative to the robot's position [half mm]."""
         self._motion(
             "arc_by", _far("arcBy: x", x), _far("arcBy: y", y), _far("arcBy: the radius", radius), "half-mm"
         )

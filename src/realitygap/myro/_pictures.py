@@ -23,7 +23,7 @@ class Picture:
 
     Attributes:
         image: The pixels, as Pillow's image with red, green, blue and alpha.
-        filename: Where it comes from.
+        filename: File of the picture.
     """
 
     def __init__(self, original: Picture | PIL.Image.Image | str | None = None) -> None:
@@ -71,7 +71,7 @@ class Picture:
         self._reload()
 
     def getPixels(self) -> Iterator[Pixel]:
-        """Each pixel in turn, column by column from the left, each from the top."""
+        """Yield each pixel, column by column from the left, each from the top."""
         return (Pixel(x, y, self) for x in range(self.width) for y in range(self.height))
 
     def getPixel(self, x: int, y: int) -> Pixel:
@@ -138,10 +138,10 @@ class Picture:
 
 
 class Pixel:
-    """One pixel of a picture: to color it is to change the picture.
+    """A pixel of a picture. If you color it, you change the picture.
 
     Attributes:
-        x, y: Its column and row, from 0 at the upper left.
+        x, y: Column and row, from 0 at the upper left.
         picture: The picture it belongs to.
     """
 
@@ -166,11 +166,11 @@ class Pixel:
         return Color(self.getColor() - other)
 
     def getX(self) -> int:
-        """Its column, from 0 at the left."""
+        """Return its column, from 0 at the left."""
         return self.x
 
     def getY(self) -> int:
-        """Its row, from 0 at the top."""
+        """Return its row, from 0 at the top."""
         return self.y
 
     def getPixel(self, x: int, y: int) -> Pixel:
@@ -178,7 +178,7 @@ class Pixel:
         return self.picture.getPixel(x, y)
 
     def getColor(self) -> Color:
-        """Its color."""
+        """Return its color."""
         return Color(self.getRGBA())
 
     def setColor(self, newColor: Any) -> None:
@@ -214,7 +214,7 @@ class Pixel:
         self.setColor(Color(*self.getRGB(), alpha))
 
     def makeLighter(self) -> None:
-        """Move each part of its color 35 % of the way towards white."""
+        """Move each part of its color by 35 % towards white."""
         self.setRGB(lighter(self.getRGB()))
 
     def makeDarker(self) -> None:
@@ -308,7 +308,7 @@ def savePicture(picture: Picture | Sequence[Picture | str], filename: str) -> No
 
     Args:
         picture: The picture; or several, or names of files, for a GIF that shows them one after another.
-        filename: Where to.
+        filename: Name of the file.
 
     Raises:
         MyroError: The file cannot be written.
@@ -395,7 +395,7 @@ def getPixel(picture: Picture, x: int, y: int) -> Pixel:
 
 
 def getPixels(picture: Picture) -> Iterator[Pixel]:
-    """Each pixel of a picture in turn, for loops: `for pixel in getPixels(picture):`."""
+    """Yield each pixel of a picture, for loops: `for pixel in getPixels(picture):`."""
     return _a_picture("getPixels", picture).getPixels()
 
 
@@ -498,7 +498,7 @@ def setRGBA(pixel_or_color: Pixel | Color, rgba: Sequence[float]) -> None:
 
 
 def makeLighter(color: Pixel | Color) -> None:
-    """Move each part of a pixel or a color 35 % of the way towards white."""
+    """Move each part of a pixel or a color by 35 % towards white."""
     _colored("makeLighter", color).makeLighter()
 
 

@@ -1,4 +1,4 @@
-"""From what a program gives to `initialize` to an open robot."""
+"""The step from the argument of `initialize` to an open robot."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _forced: str | None = None
 
 
 def force_port(port: str | None) -> None:
-    """From now on every program gets this port, whatever it asks for; None for what it asks for."""
+    """Give every program this port, whatever it names; None restores the port that it names."""
     global _forced
     _forced = port
 
@@ -28,10 +28,10 @@ def open_port(port: str | int | None, **options: Any) -> tuple[Driver, Simulatio
 
     Args:
         port: A name, a number of a COM port, "sim", or None to ask in the terminal.
-        options: For "sim".
+        options: Options of "sim".
 
     Returns:
-        The driver; and the simulation, where there is one.
+        The driver, and the simulation, if there is one.
 
     Raises:
         MyroError: It cannot be opened.

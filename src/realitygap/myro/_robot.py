@@ -43,8 +43,8 @@ class Scribbler(Driving, Senses, Sound, Lights, Camera, Identity, Paths, Fluke, 
 
     Args:
         port: The robot's port ("/dev/rfcomm0", "COM3"), an emulator's ("emulator://s2?fluke=2"), or "sim" for a
-            simulated robot; asked for in the terminal where none is given.
-        options: For "sim", see `simulator`.
+            simulated robot. Default: ask in the terminal.
+        options: Options of "sim", see `simulator`.
 
     Raises:
         MyroError: The robot cannot be opened; the text says what to try.
@@ -84,7 +84,7 @@ class Scribbler(Driving, Senses, Sound, Lights, Camera, Identity, Paths, Fluke, 
         self._driver.close()
 
     def close(self) -> None:
-        """As `closeConnection`; Myro's functions then have no robot until `initialize`."""
+        """Close like `closeConnection`. Myro's functions then have no robot until `initialize`."""
         try:
             self.closeConnection()
         finally:
@@ -117,8 +117,8 @@ class Scribbler(Driving, Senses, Sound, Lights, Camera, Identity, Paths, Fluke, 
 
         Args:
             item: "led", "name", "password", "volume", "startsong", "whitebalance", "irpower", "forwardness" or "data".
-            position: What follows in the function that sets it.
-            value: What follows then, for "led" and "data".
+            position: Next argument of the function that sets it.
+            value: Further argument, for "led" and "data".
         """
         setter = choice("set: the item", item, self._setters())
         if item.lower() in ("led", "data"):
@@ -170,7 +170,7 @@ def robot_or_none() -> Scribbler | None:
 
 
 def use(robot: Scribbler | None) -> None:
-    """From now on Myro's functions speak to this robot, which programs also know as `robot`."""
+    """Make Myro's functions use this robot, which programs also know as `robot`."""
     global _in_use
     _in_use = robot
     builtins.robot = robot  # type: ignore[attr-defined]  # as in Myro: programs just say robot.forward()
@@ -197,7 +197,7 @@ def robot_for(function: str) -> Scribbler:
 
 
 def now() -> float:
-    """The time on the robot's clock [s]; on the computer's where there is no robot."""
+    """Return the time on the robot's clock [s]; on the computer's if there is no robot."""
     return _WALL.now() if _in_use is None else _in_use.now()
 
 
@@ -229,9 +229,9 @@ def initialize(id: str | int | None = None, **options: Any) -> None:
     """Open a robot, which from now on obeys Myro's functions, and greet.
 
     Args:
-        id: The robot's port ("/dev/rfcomm0", on Windows "COM3"); "sim" for a simulated robot, in a notebook with a live
-            view; an emulator's port. Asked for in the terminal where none is given.
-        options: For "sim", see `simulator`.
+        id: The robot's port ("/dev/rfcomm0", on Windows "COM3"), "sim" for a simulated robot, which a notebook shows
+            live, or an emulator's port. Default: ask in the terminal.
+        options: Options of "sim", see `simulator`.
 
     Raises:
         MyroError: The robot cannot be opened; the text says what to try.
@@ -247,7 +247,7 @@ def simulator(id: object = None, **options: Any) -> None:
 
     Args:
         id: Taken and ignored, as in Myro.
-        options: What `initialize("sim?...")` takes: seed, start, speed, model, fluke, arena, view.
+        options: Options of `initialize("sim?...")`: seed, start, speed, model, fluke, arena, view.
     """
     Scribbler("sim", **options)
 

@@ -13,7 +13,7 @@ _PAIR = {"left": 0, 0: 0, "right": 1, 1: 1}
 
 
 class Senses(Base):
-    """Readings as the robot sends them; a list from left to right, or one where a position is given."""
+    """Readings of the robot. They are a list from left to right, or one value if a position is given."""
 
     def getLight(self, *position: str | int) -> Any:
         """Return the darkness at the light sensors: 0 in bright light; the darker, the larger.
@@ -40,7 +40,7 @@ class Senses(Base):
         return self._picked("getLine", list(self._driven("line")), _PAIR, position)
 
     def getStall(self) -> int:
-        """1 if the wheels are blocked, else 0."""
+        """Return 1 if the wheels are blocked, otherwise 0."""
         return int(self._driven("stall"))
 
     def getObstacle(self, position: str | int | None = None) -> Any:
@@ -70,7 +70,7 @@ class Senses(Base):
         return float(self._driven("battery"))
 
     def getDistance(self, *position: str | int) -> Any:
-        """Return the distance of an obstacle from the infrared sensors of a Scribbler 2: 0 touching, 99 nothing seen.
+        """Return the distance of an obstacle from the infrared sensors of a Scribbler 2: 0 touching, 99 nothing.
 
         Args:
             position: "left", "right", or 0, 1; none gives both.
@@ -117,7 +117,7 @@ class Senses(Base):
             print(f"{name:>9}: {', '.join(map(str, value)) if isinstance(value, (list, tuple)) else value}")
 
     def wall(self, threshold: float = 4500) -> bool:
-        """Whether the Fluke's infrared ahead comes back stronger than a threshold."""
+        """Return whether the echo of the Fluke's infrared ahead is stronger than a threshold."""
         return bool(self.getObstacle("center") > threshold)
 
     def get(self, sensor: str = "all", *position: Any) -> Any:
@@ -126,7 +126,7 @@ class Senses(Base):
         Args:
             sensor: "light", "ir", "line", "stall", "obstacle", "bright", "blob", "battery", "distance", "all", "name",
                 "password", "data", "info", "forwardness", "volume", "startsong", "version", "config" or "picture".
-            position: As for the function that reads this sensor.
+            position: Position, as for the function that reads this sensor.
         """
         return choice("get: the sensor", sensor, self._getters())(*position)
 

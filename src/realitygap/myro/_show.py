@@ -50,8 +50,8 @@ def repaint(picture: Picture | None = None, name: str = "default") -> None:
     """Show a picture again after it was changed.
 
     Args:
-        picture: The picture; the one shown under this name where none is given.
-        name: Of where it is shown.
+        picture: Picture. Default: the one shown under this name.
+        name: Name of the place in which it is shown.
 
     Raises:
         MyroError: Nothing was shown under this name.
@@ -96,5 +96,5 @@ def _in_browser(name: str, markup: str) -> None:
 
 
 def forget_cells() -> None:
-    """From now on things are shown below the present cell of a notebook, not below the one that showed them first."""
+    """Show things below the present cell of a notebook from now on, not below the one that showed them first."""
     _handles.clear()

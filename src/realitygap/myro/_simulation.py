@@ -23,7 +23,7 @@ _TRIES = 10_000
 
 
 def is_simulation(name: str) -> bool:
-    """Whether a port means a simulated robot: "sim", "simulator", "sim?seed=3"."""
+    """Return whether a port names a simulated robot: "sim", "simulator", "sim?seed=3"."""
     return name.partition("?")[0].lower() in _WORDS
 
 
@@ -43,20 +43,20 @@ class Simulation:
     """An open simulated Scribbler, and a witness that records its true motion; printed, it is a map.
 
     Args:
-        seed: Of its sensors' noise, and of a start by chance.
+        seed: Seed of its sensors' noise, and of a random start.
         start: "corner" (of the paper's arena), "center", "left" or "random"; or (x, y, heading) [m, m, degrees], as
             text "0.5,0.3,90". The heading is that of the end that is ahead: the Fluke's.
         speed: 1 for real time, 10 for ten times as fast; "off" for as fast as can be: time passes only while the
             program waits, or speaks with the robot.
         model: "s1" or "s2".
         fluke: "none", 1 or 2.
-        arena: What the emulator knows: "paper", or a file.
-        view: "notebook" shows the robot live below the cell, "off" nothing; as it fits where none is given.
+        arena: Arena of the emulator: "paper", or a file.
+        view: "notebook" shows the robot live below the cell, "off" shows nothing. Default: the one that fits.
 
     Attributes:
         driver: The robot's driver: it speaks with the emulator through the bytes of a real robot.
-        arena: Where the robot drives.
-        seed: As given.
+        arena: Arena of the robot.
+        seed: Seed, as given.
     """
 
     def __init__(
@@ -96,7 +96,7 @@ class Simulation:
 
     @property
     def is_timed(self) -> bool:
-        """Whether time passes by itself; without, only while a program waits or speaks with the robot."""
+        """True if time passes automatically. Otherwise it passes only while a program waits or uses the robot."""
         return self.speed is not None
 
     def pose(self) -> Pose:
@@ -112,16 +112,16 @@ class Simulation:
         return len(self.cells()) / self.arena.grid.n_cells
 
     def path(self) -> np.ndarray[Any, np.dtype[np.float64]]:
-        """(t, 4) time [s], x [m], y [m], heading [rad] along the way."""
+        """Return time [s], x [m], y [m], heading [rad] along the path, (t, 4)."""
         return np.asarray(self.witness.path(), dtype=np.float64).reshape(-1, 4)
 
     def look(self) -> None:
-        """Show the robot where it is now, if it is shown at all and not too often."""
+        """Show the robot at its present pose, if it is shown at all and not too often."""
         if self._view is not None:
             self._view.look()
 
     def catch_up(self) -> None:
-        """Let a robot that moves in real time move on to where it is now."""
+        """Let a robot that moves in real time move on to the present."""
         self.driver.clock.now()
 
     def close(self) -> None:

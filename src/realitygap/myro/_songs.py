@@ -68,11 +68,11 @@ def makeSong(text: str) -> list[Note]:
     """Return a song from text: notes between semicolons or on separate lines, as "C 1/4; E G 1/4; pause .5".
 
     Args:
-        text: Each note has a name (or a frequency), perhaps a second one, and the part of a whole note that it lasts
-            ("1/4" or ".25"). What follows a # at the beginning of a note is left out.
+        text: Notes with a name (or a frequency), an optional second one, and their part of a whole note ("1/4" or
+            ".25"). Text after a # at the beginning of a note is ignored.
 
     Returns:
-        What `playSong` takes: `(frequency, part)` or `(frequency, frequency, part)` a note.
+        A song for `playSong`: `(frequency, part)` or `(frequency, frequency, part)` for each note.
 
     Raises:
         MyroError: A note cannot be read; the text says which.
@@ -141,10 +141,10 @@ def saveSong(song: Iterable[Note] | str, filename: str, append: bool = False) ->
     """Write a song, or the text of one, to a file.
 
     Args:
-        song: What `makeSong` returns or reads.
-        filename: Where to.
-        append: Whether it follows what the file holds already. Differs: Myro has 1 as the default and overwrites all
-            the same; a program that does not say gets what it got.
+        song: Song of `makeSong`.
+        filename: Name of the file.
+        append: True to append to an existing file. Differs: Myro's default is 1, but it overwrites the file. Here a
+            program without this argument gets the same result as in Myro.
 
     Raises:
         MyroError: The file cannot be written.

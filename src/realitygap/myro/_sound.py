@@ -11,7 +11,7 @@ from ._mistakes import MyroError, is_on, number, whole
 from ._songs import Note
 
 WHOLE_NOTE = 0.545
-"""How long a whole note lasts by default [s]."""
+"""Default duration of a whole note [s]."""
 
 _HIGHEST = 65535  # [Hz], a word on the wire
 _HEARD = 10_000  # the highest tone that a Scribbler 2 plays [Hz]; a higher one becomes this
@@ -28,9 +28,9 @@ class Plays:
         """Play a tone and return when it has ended.
 
         Args:
-            duration: How long [s]; a list of frequencies here plays each for half a second.
-            frequency1: [Hz]; 0 is silence; one by chance where none is given; a list plays each in turn.
-            frequency2: Of a second tone at the same time [Hz].
+            duration: Duration [s]. A list of frequencies here plays each for half a second.
+            frequency1: Frequency [Hz]; 0 is silence. Default: a random one. A list plays each in turn.
+            frequency2: Frequency of a second tone at the same time [Hz].
 
         Raises:
             MyroError: The duration or a frequency is not a number of at least 0.
@@ -92,7 +92,7 @@ class Sound(Plays, Base):
         self.driver.set_loud(bool(self._volume))
 
     def getVolume(self) -> int:
-        """1 if the speaker is on, else 0, as last set by `setVolume`."""
+        """Return 1 if the speaker is on, otherwise 0, as last set by `setVolume`."""
         return self._volume
 
     def setS2Volume(self, value: int) -> None:

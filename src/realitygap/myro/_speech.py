@@ -9,10 +9,10 @@ from ._ask import ask
 
 
 def speak(message: object, async_: bool = False) -> None:
-    """Print the text to speak: no voice comes with realitygap, and thirty voices together help nobody.
+    """Print the text to speak, because realitygap has no voice.
 
     Args:
-        message: What to say.
+        message: Text to speak.
         async_: Taken and ignored: a print takes no time.
     """
     print(message)

@@ -28,10 +28,10 @@ def currentTime() -> float:
 
 
 def timer(seconds: float = 0) -> Iterator[float]:
-    """For loops: `for t in timer(5):` runs for 5 seconds, t being the seconds since it began.
+    """Yield the seconds since the start, for loops: `for t in timer(5):` runs for 5 seconds.
 
     Args:
-        seconds: How long; 0 for ever.
+        seconds: Duration [s]; 0 for ever.
 
     Raises:
         MyroError: It is not a number of at least 0.
@@ -46,12 +46,12 @@ def timer(seconds: float = 0) -> Iterator[float]:
 
 
 def timeRemaining(seconds: float = 0) -> bool:
-    """For loops: `while timeRemaining(5):` runs for 5 seconds.
+    """Return whether time remains, for loops: `while timeRemaining(5):` runs for 5 seconds.
 
     Each line of a program has a timer of its own, which begins when the line is reached first and anew after it ended.
 
     Args:
-        seconds: How long; 0 for ever.
+        seconds: Duration [s]; 0 for ever.
 
     Raises:
         MyroError: It is not a number of at least 0.

@@ -20,7 +20,8 @@ def loop(*functions: Any) -> str:
     """Call functions one after another, several times: `loop(step, turn, 4)`; then stop the robot.
 
     Args:
-        functions: Functions, each called with the number of the round where it takes one; last, how many rounds.
+        functions: Functions, each called with the number of the round if it takes an argument. The last argument is the
+            number of rounds.
 
     Raises:
         MyroError: There are no functions, or no number at the end.
@@ -48,7 +49,7 @@ def doTogether(*functions: Callable[[], Any]) -> list[Any] | None:
     simulated robot with `speed="off"` the times of all functions add up.
 
     Returns:
-        What each returned, or None where none returned anything.
+        The value that each returned, or None if none returned anything.
 
     Raises:
         MyroError: There are fewer than two functions.

@@ -47,7 +47,7 @@ class View(Protocol):
     """Shows a simulated robot."""
 
     def look(self) -> None:
-        """Show it where it is now, unless it was shown a moment ago."""
+        """Show the present pose, unless it was shown a moment ago."""
         ...
 
     def close(self) -> None:
@@ -56,10 +56,10 @@ class View(Protocol):
 
 
 def best_view(simulation: Watched, wanted: Any = None) -> View | None:
-    """The view that fits where the program runs: live in a notebook, none elsewhere.
+    """Return the view that fits the program's environment: live in a notebook, none elsewhere.
 
     Args:
-        simulation: What to show.
+        simulation: Simulation to show.
         wanted: "notebook", "off", or None for what fits.
     """
     kind = choice(
@@ -92,7 +92,7 @@ class NotebookView:
             threading.Thread(target=self._watch, name="myro-view", daemon=True).start()
 
     def look(self) -> None:
-        """Show it where it is now, unless it was shown a moment ago."""
+        """Show the present pose, unless it was shown a moment ago."""
         if time.monotonic() - self._last >= _PERIOD_S:
             self._draw()
 
@@ -187,7 +187,7 @@ def thinned(points: list[tuple[float, float]]) -> list[tuple[float, float]]:
 
 
 def text_map(simulation: Watched) -> str:
-    """The arena as lines of letters: # walls, · where the pen went, an arrow where the robot is."""
+    """Return the arena as lines of letters: # for walls, · for the pen's path, an arrow for the robot."""
     left, bottom, right, top = _bounds(simulation)
     step = (right - left) / _COLUMNS
     rows = math.ceil((top - bottom) / (2 * step))

@@ -1,4 +1,4 @@
-"""From the results of a study to a table, figures and one page that needs no other file.
+"""Tables, figures, and one page that needs no other file, from the results of a study.
 
 Only records are read; nothing here runs a study. Trials that are drawn are recomputed one by one.
 `write_report` makes the whole page, `summarize` its main table as a frame, and each `draw_...` one figure as

@@ -25,7 +25,7 @@ class Agreement:
         n_trials: counted by two.
         n_cells: judged in all, every reachable cell of each trial.
         same: share of these that both judge alike [0..1].
-        kappa: Cohen's kappa: 1 where they always agree, 0 where as often as by chance; None where all cells are alike.
+        kappa: Cohen's kappa: 1 for perfect agreement, 0 for agreement by chance; None if all cells are alike.
         low: lower bound of its 95 % interval; None below 10 trials.
         high: upper bound.
     """
@@ -39,7 +39,7 @@ class Agreement:
 
     @property
     def sentence(self) -> str:
-        """The same in words."""
+        """Return the agreement in words."""
         trials = "1 trial" if self.n_trials == 1 else f"{self.n_trials} trials"
         counted = f"{trials} counted by two people, {self.n_cells:,} cells"
         if self.kappa is None:
@@ -58,7 +58,7 @@ def measure_agreement(folder: str | Path) -> Agreement:
     """Measure how well the second counts of trials agree with the first ones.
 
     Args:
-        folder: of results, with a ledger in it.
+        folder: Folder of results with a ledger.
 
     Raises:
         LedgerError: there is none, or no trial was counted by two.

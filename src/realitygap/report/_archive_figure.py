@@ -49,8 +49,8 @@ def draw_archive(folder: Results, condition: str | None = None, replicate: int |
 
     Args:
         folder: the results of a study, or the path to them. The trials that are shown are recomputed.
-        condition: of which; the first that selects by novelty when not given.
-        replicate: which run; when not given the typical one, as in `draw_paths`.
+        condition: Condition. Default: the first that selects by novelty.
+        replicate: Run. Default: the typical one, as in `draw_paths`.
 
     Raises:
         RecordError: there is no such folder, a file in it is damaged, or it holds no trials yet.

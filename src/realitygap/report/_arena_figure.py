@@ -20,8 +20,8 @@ def draw_arena_and_robot(tally: Tally, condition: str, *, name: str) -> Drawing:
 
     Args:
         tally: the study.
-        condition: of which.
-        name: what the ids begin with.
+        condition: Condition to draw.
+        name: First part of the ids.
 
     Raises:
         ValueError: there is no such condition.

@@ -17,10 +17,10 @@ _KINDS = ("uniform", "normal", "log_uniform", "choice")
 
 
 def sim_assumptions(conditions: Sequence[Mapping[str, Any]]) -> list[tuple[str, str]]:
-    """For each set-up of the platform `sim` the conditions that have it, and what it assumes.
+    """Return the conditions and the assumptions of each set-up of the platform `sim`.
 
     Args:
-        conditions: As the study's description has them.
+        conditions: Conditions in the study's description.
     """
     found: dict[str, list[str]] = {}
     for condition in conditions:

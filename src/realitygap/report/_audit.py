@@ -46,12 +46,12 @@ class DoubtfulValue:
     """A value that is not the rounded share that it should be.
 
     Attributes:
-        line: in the file, the header being line 1; 0 where there is no file.
+        line: Line in the file, where the header is line 1; 0 without a file.
         condition: its condition.
         run: its run, as written.
         text: the value as written.
-        problem: `impossible`: no k/N comes near; `cut`: k/N without its further digits, and not rounded;
-            `raised`: k/N rounded up where it should go down.
+        problem: `impossible`: no k/N is near; `cut`: k/N with digits cut off instead of rounded; `raised`: k/N rounded
+            up instead of down.
         nearest: the nearest k, out of N.
     """
 
@@ -65,13 +65,13 @@ class DoubtfulValue:
 
 @dataclass(frozen=True)
 class AuditedCondition:
-    """One condition of the table.
+    """A condition of the table.
 
     Attributes:
         condition: its name.
         n: runs.
-        mean: of its values.
-        median: of its values.
+        mean: Mean of its values.
+        median: Median of its values.
         deviation: standard deviation; None with one run.
         median_low, median_high: the 95 % interval of the median; None below 6 runs, which cannot give one.
     """
@@ -96,15 +96,15 @@ class AuditedPair:
         n_other: runs of `other`.
         difference: mean of `one` less mean of `other`.
         difference_interval: BCa; None below 10 runs.
-        a12: how likely a run of `one` is above a run of `other`, ties counting half.
-        a12_interval: BCa; Newcombe's below 10 runs; None where not even p < 0.05 is possible.
+        a12: Probability that a run of `one` is above a run of `other`; ties count half.
+        a12_interval: BCa interval; Newcombe's below 10 runs; None if not even p < 0.05 is possible.
         p: two-sided, of a permutation test of the difference of means.
         p_holm: corrected for all pairs of the table.
-        smallest_p: the smallest that so many runs can give, whatever they are.
-        can_claim: whether the corrected p can be below 0.05 at all.
+        smallest_p: Smallest p that this number of runs can give.
+        can_claim: True if the corrected p can be below 0.05 at all.
         runs_for_a_claim: the fewest runs a condition with which it can.
-        detectable: the smallest difference that so many runs find in 80 of 100 studies [standard deviations].
-        detectable_a12: the same as A12.
+        detectable: Smallest difference that this number of runs detects in 80 of 100 studies [standard deviations].
+        detectable_a12: This difference as A12.
     """
 
     one: str
@@ -139,8 +139,8 @@ class Audit:
     """The result of `audit_results`.
 
     Attributes:
-        conditions: in the order of the file.
-        denominator: what values were checked against; None: they were not.
+        conditions: Conditions in the order of the file.
+        denominator: Denominator against which values were checked; None if they were not.
         doubtful: values that are no k/N, or not rounded.
         pairs: each two conditions.
         runs_needed: runs a condition that find a small, medium and large effect in 80 of 100 studies.
@@ -198,8 +198,8 @@ def audit_results(table: str | Path, *, denominator: int | None = None, tell: Te
     test at the 5 % level with 80 % power, which assumes normal values with the same spread in both.
 
     Args:
-        table: a CSV file with the columns condition, run and value; others are not looked at.
-        denominator: N, where values must be k/N, such as a share of N cells.
+        table: CSV file with the columns condition, run and value. Other columns are ignored.
+        denominator: N, if values must be k/N, such as a share of N cells.
         tell: called with the progress before each two conditions are compared.
 
     Returns:

@@ -58,7 +58,7 @@ def draw_bests(folder: Results, *, links: Mapping[tuple[str, int], str] | None =
 
     Args:
         folder: The results of a study, or the path to them.
-        links: Where a click on a run leads, by condition and replicate.
+        links: Target of a click on a run, by condition and replicate.
 
     Raises:
         RecordError: There is no such folder, a file in it is damaged, or it holds no trials yet.

@@ -19,7 +19,7 @@ from realitygap.runs import Condition, genome_of, partners_of
 from realitygap.trials import NoiseKey
 
 FRESH_TRIALS = 20
-"""How often each champion is tried again: repeats 1 to 20 of its trial, of which the study ran number 0."""
+"""Number of fresh trials of each champion: repeats 1 to 20 of its trial, of which the study ran number 0."""
 
 MOST_RUNS = 100
 """Runs of a condition whose champions are tried again, and whose behaviors are compared: the first ones."""
@@ -34,7 +34,7 @@ class Champions:
         label: SIM, TWIN, EMULATED or REAL.
         reported: (n,) coverage of each champion in its run, the best of all its trials [0..1].
         fresh: (n, 20) coverage of the same networks on fresh noise.
-        problem: why there are none; empty where there are.
+        problem: Reason why there are none; empty if there are some.
     """
 
     condition: str
@@ -50,7 +50,7 @@ class Champions:
 
     @property
     def expected(self) -> npt.NDArray[np.float64]:
-        """(n,) mean coverage of each champion on fresh noise."""
+        """Return the mean coverage of each champion on fresh noise, (n,)."""
         return np.asarray(self.fresh.mean(axis=1))
 
     @property
@@ -79,7 +79,7 @@ def retry_champions(folder: Results) -> list[Champions]:
         folder: the results of a study, or the path to them.
 
     Returns:
-        One for each condition with runs. Where trials cannot be recomputed, `problem` says why.
+        One for each condition with runs. If trials cannot be recomputed, `problem` gives the reason.
 
     Raises:
         RecordError: there is no such folder, a file in it is damaged, or it holds no trials yet.

@@ -36,14 +36,14 @@ class Choice:
     Attributes:
         condition: its name.
         baseline: the name of the condition that it is compared with; its own for a baseline.
-        change: what differs from the baseline, in the study's words.
+        change: Difference from the baseline, in the study's words.
         label: SIM, TWIN, EMULATED or REAL.
         n: number of runs.
-        median: of the best coverage of each run [0..1]; NaN without runs.
-        interval: the median's interval; None where n is too small.
+        median: Median of the best coverage of each run [0..1]; NaN without runs.
+        interval: Interval of the median; None if n is too small.
         effect: median less the baseline's median [0..1].
-        other_median: the median with cells counted the other way, where selection counts them so; else None.
-        published: published best coverages, one per run of their own [0..1].
+        other_median: Median with the other way to count cells, if selection counts them so; otherwise None.
+        published: Published best coverages, one for each published run [0..1].
     """
 
     condition: str
@@ -62,8 +62,8 @@ def compare_choices(folder: Results) -> list[list[Choice]]:
     """Compare every condition that names a baseline with it: one list per baseline.
 
     Returns:
-        For each baseline the baseline itself, then its variants from the largest increase of the median to
-        the largest decrease. Empty where no condition names a baseline.
+        Each baseline, followed by its variants from the largest increase of the median to the largest decrease. Empty
+        if no condition names a baseline.
 
     Raises:
         RecordError: there is no such folder, a file in it is damaged, or it holds no trials yet.

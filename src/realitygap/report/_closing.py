@@ -1,4 +1,4 @@
-"""The page of `closing-the-gap`, and its tables: goals, families, and where goals are missed."""
+"""The page of `closing-the-gap`, and its tables: goals, families, and reasons for missed goals."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def write_closing_page(summary: Mapping[str, Any], out: str | Path) -> Path:
     """Write the page: one HTML file that needs no other file and no network.
 
     Args:
-        summary: As `summarize_closing` gives it.
+        summary: Result of `summarize_closing`.
         out: The file.
 
     Raises:

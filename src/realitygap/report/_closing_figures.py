@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 Summary = Mapping[str, Any]
 COLORS = {"none": Ink.RUN, "cells": Ink.PEN2, "encoders": Ink.PEN2, "track": Ink.OURS}
-"""By what calibrating saw."""
+"""Colors by the observation level of the calibration."""
 
 MARKERS = {"none": "o", "cells": "s", "encoders": "s", "track": "D"}
 _HEAD, _FOOT, _LEFT, _RIGHT, _GAP = 0.52, 0.5, 0.55, 0.12, 0.34
@@ -66,7 +66,7 @@ def draw_closing(summary: Summary) -> dict[str, Drawing]:
     """All figures that the summary of `closing-the-gap` has enough for, by name.
 
     Args:
-        summary: As `summarize_closing` gives it.
+        summary: Result of `summarize_closing`.
     """
     drawers = {
         "budget": draw_budget,
@@ -170,7 +170,7 @@ def _budget_lines(axes: Axes, summary: Summary, family: str, observe: str) -> No
 
 
 def draw_scatter(summary: Summary) -> Drawing | None:
-    """Each held-out controller: mean coverage in simulation against that on the twin, before and after."""
+    """Draw the mean coverage of each held-out controller in simulation against that on the twin, before and after."""
     budget = summary["budget"]
     kinds = [
         "none",

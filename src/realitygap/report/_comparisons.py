@@ -44,7 +44,7 @@ MARGIN = 0.02
 of the smallest effect of the constant input."""
 
 Reason = Literal["noise", "selection", "baseline"]
-"""Why two conditions are compared: they differ in nothing else, or one names the other as its baseline."""
+"""Reason for a comparison: two conditions differ in nothing else, or one names the other as its baseline."""
 
 
 @dataclass(frozen=True)
@@ -55,17 +55,17 @@ class Comparison:
         one: a condition, and
         other: the one it is compared with.
         reason: why these two.
-        label: SIM, TWIN, EMULATED or REAL; both where they differ.
+        label: SIM, TWIN, EMULATED or REAL; both if they differ.
         n: runs of `one`; `paired`: pairs.
         n_other: runs of `other`.
-        paired: whether the two draw the same random numbers run by run, so that runs are compared in pairs.
+        paired: True if the two draw the same random numbers run by run, so that runs are compared in pairs.
         difference: mean of `one` less mean of `other` [share of the reachable cells].
-        difference_interval: its BCa interval; None where n is too small.
-        a12: how likely a run of `one` is above a run of `other` [0..1].
-        a12_interval: BCa, or Newcombe's where n is too small for it; None where n cannot give p < 0.05 either.
+        difference_interval: BCa interval of the difference; None if n is too small.
+        a12: Probability that a run of `one` is above a run of `other` [0..1].
+        a12_interval: BCa interval, or Newcombe's if n is too small for it; None if n cannot give p < 0.05.
         p: two-sided, of a permutation test of the difference.
         p_holm: corrected for all comparisons of the study.
-        best_p: the smallest that `p_holm` can be with so many runs.
+        best_p: Smallest possible `p_holm` with this number of runs.
         runs_for_a_claim: the fewest runs with which `p_holm` can be below 0.05.
         detectable: the smallest difference that n runs find in 80 of 100 studies, at 5 % divided by the number
             of comparisons; None without spread.
@@ -96,12 +96,12 @@ class Comparison:
 
     @property
     def can_claim(self) -> bool:
-        """Whether this number of runs could show any difference."""
+        """True if this number of runs could show any difference."""
         return self.best_p < ALPHA
 
     @property
     def is_shown(self) -> bool:
-        """Whether the difference is claimed."""
+        """True if the difference is claimed."""
         return self.p_holm < ALPHA
 
     @property
@@ -113,13 +113,13 @@ class Comparison:
 
     @property
     def is_equivalent(self) -> bool | None:
-        """Whether equivalence within `MARGIN` is shown; None if there are too few runs."""
+        """True if equivalence within `MARGIN` is shown; None if there are too few runs."""
         interval = self.equivalence_interval
         return None if interval is None else interval.low > -MARGIN and interval.high < MARGIN
 
     @property
     def equivalence(self) -> str:
-        """Whether equivalence is shown, in words, with the margin; empty if there are too few runs."""
+        """Result of the test of equivalence in words, with the margin; empty if there are too few runs."""
         if self.equivalence_interval is None:
             return ""
         shown = "equivalent" if self.is_equivalent else "not shown equivalent"
@@ -162,7 +162,7 @@ def compare_conditions(folder: Results) -> list[Comparison]:
         folder: the results of a study, or the path to them.
 
     Returns:
-        The comparisons: across noise, across selections, against baselines. Empty where nothing compares.
+        The comparisons: across noise, across selections, against baselines. Empty if there is nothing to compare.
 
     Raises:
         RecordError: there is no such folder, a file in it is damaged, or it holds no trials yet.
@@ -184,7 +184,7 @@ def compare_conditions(folder: Results) -> list[Comparison]:
 
 @dataclass(frozen=True)
 class Samples:
-    """Best coverages of two conditions; in pairs, value by value, where `paired`."""
+    """Best coverages of two conditions; in pairs, value by value, if `paired`."""
 
     one: npt.NDArray[np.float64]
     other: npt.NDArray[np.float64]
@@ -229,7 +229,7 @@ class Samples:
 
 
 def paired_values(tally: Tally, one: str, other: str) -> Samples:
-    """The runs of two conditions, in pairs where they draw the same random numbers: those that both have."""
+    """Return the runs of two conditions; if they draw the same random numbers, the pairs that both have."""
     values = [tally.run_bests(name, tally.measure) for name in (one, other)]
     if not _is_paired(tally, one, other):
         return Samples(values[0], values[1], paired=False)

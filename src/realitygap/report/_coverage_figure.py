@@ -47,7 +47,7 @@ class Axis:
         low: lower end.
         high: upper end.
         ticks: values with a line and a number.
-        decimals: of these numbers.
+        decimals: Number of decimals of these numbers.
     """
 
     label: str
@@ -67,7 +67,7 @@ class Panel:
         values: (n, g) score of each run by generation, NaN after a run's last generation.
         n_drawn: number of runs, from the first, of which lines are drawn.
         run_bests: (n,) best score of each run.
-        published: published best scores, one per run of their own.
+        published: Published best scores, one for each published run.
         replicates: (n,) number of each run; a page shows them on hover.
     """
 
@@ -85,8 +85,8 @@ def draw_coverage(folder: Results, *, points: Points | None = None) -> Drawing:
 
     Args:
         folder: the results of a study, or the path to them.
-        points: what a run's line shows at each generation: the best of that generation, or the best so far;
-            the study's own choice when not given.
+        points: Value of a run's line at each generation: the best of that generation, or the best so far. Default: the
+            study's own choice.
 
     Raises:
         RecordError: there is no such folder, a file in it is damaged, or it holds no trials yet.

@@ -29,11 +29,11 @@ N_WALKS = 1000
 """Random walks to which each cell is added, or from which it is taken."""
 N_PAIRS = 4000
 MOST_STEPS = 87
-"""Of a random walk: those of the paper's simulated trial."""
+"""Number of steps of a random walk: that of the paper's simulated trial."""
 STRAIGHT = 0.6
-"""How often a random walk goes on as it went, unless told otherwise."""
+"""Default probability that a random walk keeps its direction."""
 CELL_M = 0.0762
-"""The paper's cell of 3 in, by which final positions of walks are told in meters."""
+"""The paper's cell of 3 in, as the unit of final positions of walks."""
 _RESAMPLES = 1000
 _TENTH = 1.1
 """By how much cells must weigh more than others for it to be called a bias."""
@@ -49,11 +49,11 @@ class Confound:
         label: SIM, TWIN, EMULATED or REAL; empty for random walks.
         n_pairs: pairs, no behavior in two of them.
         mean_cells: cells of a behavior, on average.
-        contained: of the cells of the shorter behavior, the share that the longer one visited too, on average [0..1].
+        contained: Share of the cells of the shorter behavior that the longer one visited too, on average [0..1].
         correlation: Spearman's, of the distance with the difference of the numbers of cells; refused if either is the
             same for all pairs. Interval: Bonett & Wright (2000).
         length_difference: (n_pairs,) [cells].
-        distance: (n_pairs,) in the unit of the distance.
+        distance: (n_pairs,) distances in the unit of the distance.
     """
 
     of: str
@@ -77,15 +77,15 @@ class DistanceAudit:
     """The result of `audit_distance`.
 
     Attributes:
-        distance: which one.
+        distance: Distance of the audit.
         columns, rows: size of the grid; `sort`: how the paper's distance sorts cells.
-        seed: of the random walks; `straight`: how often they go on as they went.
+        seed: Seed of the random walks; `straight`: probability that they keep their direction.
         n_walks: to which each cell was added, or from which it was taken.
         leverage: (rows, columns) mean distance from a walk to the walk with, or without, the cell, in the unit of the
             distance; `leverage_low`, `leverage_high`: its 95 % interval.
         front_over_back: mean leverage of the first quarter of cells, as the paper sorts them, over the last quarter's.
         order_correlation: Spearman's, of leverage with the place of the cell in that order.
-        highest_over_lowest: of all cells' leverages; infinite where the lowest is 0.
+        highest_over_lowest: Highest leverage of a cell divided by the lowest; infinite if the lowest is 0.
         confounds: with length: on random walks first, then on each condition of a study.
     """
 
@@ -106,7 +106,7 @@ class DistanceAudit:
 
     @property
     def relative_leverage(self) -> Values:
-        """(rows, columns) leverage over its mean over cells; NaN where no cell has any."""
+        """Leverage divided by its mean over cells, (rows, columns); NaN if no cell has any."""
         mean = float(self.leverage.mean())
         return self.leverage / mean if mean > 0 else np.full_like(self.leverage, math.nan)
 
@@ -151,14 +151,14 @@ def audit_distance(
     metric that is the most by which the cell can change the distance to any behavior.
 
     Args:
-        name: of the distance.
+        name: Name of the distance.
         folder: the results of a study, or the path to them, for the relation with length there; trials of different
             runs are compared.
-        seed: of walks and pairs.
-        straight: how often a random walk goes on as it went, 0 to 1.
+        seed: Seed of walks and pairs.
+        straight: Probability that a random walk keeps its direction, 0 to 1.
         n_walks: for the leverage, at least 10.
-        n_pairs: of behaviors, for the relation with length, at least 10.
-        sort: how the paper's distance sorts cells.
+        n_pairs: Number of pairs of behaviors for the relation with length, at least 10.
+        sort: Order of cells in the paper's distance.
 
     Raises:
         RecordError: there is no such folder, a file in it is damaged, or it holds no trials yet.
@@ -243,7 +243,7 @@ def _as_behavior(distance: BehaviorDistance, walk: Sequence[int], columns: int) 
 
 
 def changed_walk(walk: Sequence[int], cell: int, columns: int) -> list[int]:
-    """A walk without a cell, or, where it leaves it out, with it: after the first visit of the nearest cell."""
+    """Return a walk without a cell, or with it, after the first visit of the nearest cell, if it lacks the cell."""
     if cell in walk:
         return [each for each in walk if each != cell]
     y, x = divmod(cell, columns)
@@ -432,7 +432,7 @@ def _weight_note(audit: DistanceAudit) -> str:
 
 
 def weight_bias(audit: DistanceAudit) -> int:
-    """1 where low-numbered cells weigh more, -1 where high-numbered ones do, 0 where neither is shown by a tenth."""
+    """Return 1 if low-numbered cells have over a tenth more weight, -1 if high-numbered ones do, otherwise 0."""
     front = audit.front_over_back
     if front.low is not None and front.low > _TENTH:
         return 1

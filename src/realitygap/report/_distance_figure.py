@@ -41,9 +41,9 @@ def draw_distance(audit: DistanceAudit, *, width: float = WIDE, name: str = "dis
     """A map of what each cell weighs, and distances over the difference in length; conditions of a study below.
 
     Args:
-        audit: from `audit_distance`.
-        width: of the figure [in]; a narrow one has the parts below each other.
-        name: what ids in it begin with.
+        audit: Result of `audit_distance`.
+        width: Width of the figure [in]. A narrow one has the parts below each other.
+        name: First part of the ids.
     """
     with house_style():
         figure = _draw(audit, width)
@@ -52,7 +52,7 @@ def draw_distance(audit: DistanceAudit, *, width: float = WIDE, name: str = "dis
 
 
 def save_distance(audit: DistanceAudit, out: str | Path) -> Path:
-    """Draw an audit into a file that stands alone, with its caption below.
+    """Draw an audit into a separate file, with its caption below.
 
     Raises:
         RecordError: the file cannot be written, or belongs to a study's results.

@@ -1,4 +1,4 @@
-"""One network on two platforms or more, side by side, and the divergence of its trials."""
+"""One network on two or more platforms, side by side, and the divergence of its trials."""
 
 from __future__ import annotations
 
@@ -62,11 +62,11 @@ _MOST_TRAILS = 30
 
 @dataclass(frozen=True)
 class Side:
-    """One of the platforms.
+    """A platform of the figure.
 
     Attributes:
-        name: what to call it.
-        trials: repeats of one network on it, each on noise of its own; the first is drawn with its robot.
+        name: Name of the platform.
+        trials: Repeats of one network on it, each with its own noise. The first is drawn with its robot.
     """
 
     name: str
@@ -88,13 +88,13 @@ def save_divergence(
 
     Args:
         results: the results of a study, or the path to them.
-        path: ends in .svg, .pdf or .png; a file that is there gives way.
-        against: what the network is tried on beside its own condition: another condition of the study, or a platform
-            with its defaults (jyro, sim, sim:FILE, twin:FILE); two of them with a comma between.
+        path: Path that ends in .svg, .pdf or .png. An existing file is replaced.
+        against: Platform to compare with the network's own condition: another condition of the study, or a platform
+            with its defaults (jyro, sim, sim:FILE, twin:FILE), or two of them with a comma in between.
         condition: whose network it is; the first one when not given.
-        replicate: of which run; the typical one when not given.
-        generation: of the run; that of its best trial when not given.
-        individual: of the generation; the best one by the task when not given.
+        replicate: Run. Default: the typical one.
+        generation: Generation of the run. Default: that of its best trial.
+        individual: Individual of the generation. Default: the best one by the task.
         repeats: trials on each side, each on fresh noise, 2 to 1000.
 
     Returns:
@@ -199,10 +199,10 @@ def draw_divergence(one: Side, *others: Side, of: str = "", width: float = WIDE)
     """Draw trials of one network on two or three platforms, side by side, and their divergence step by step.
 
     Args:
-        one, others: as many repeats of each; repeat k of the one is compared with repeat k + 1 of another, so that
-            the two never drew the same noise, and the comparison is fair to that of repeats on one platform.
-        of: which network it is.
-        width: of the figure [in].
+        one, others: Equal numbers of repeats. Repeat k of one is compared with repeat k + 1 of another, so that the two
+            never have the same noise, which makes the comparison fair to that of repeats on one platform.
+        of: Name of the network.
+        width: Width of the figure [in].
 
     Raises:
         ValueError: there are more repeats of the one than of another, or fewer than two; or not one or two others.

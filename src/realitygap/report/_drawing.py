@@ -82,14 +82,14 @@ class Drawing:
 
     Attributes:
         svg: the picture as one `svg` element; nothing in it is fetched from elsewhere.
-        caption: what is drawn, of how many runs, with which interval.
-        alt: the same for those who cannot see it, in a sentence; it is in `svg` as well.
-        figure: what it was drawn as, for other formats.
-        draw: what makes the figure of a width [in]; None if it has one width only.
-        name: what the ids in `svg` begin with.
-        mark: what makes the values that a page shows on hover, of a width [in]; None if there are none.
+        caption: Content of the figure, number of runs, and interval.
+        alt: Text for readers who cannot see the figure, in a sentence; `svg` includes it.
+        figure: Source figure, for other formats.
+        draw: Function that draws the figure with a width [in]; None if it has one width only.
+        name: First part of the ids in `svg`.
+        mark: Function that returns the values that a page shows on hover, for a width [in]; None if there are none.
         marks: these values.
-        frames: where these are in `svg`, one for each panel of `marks`.
+        frames: Frames of these in `svg`, one for each panel of `marks`.
     """
 
     svg: str
@@ -106,7 +106,7 @@ class Drawing:
         return self.svg
 
     def in_width(self, width: float) -> Drawing:
-        """The same figure in another width [in], for the same page.
+        """Return the same figure in another width [in], for the same page.
 
         Raises:
             ValueError: it has one width only.
@@ -129,8 +129,8 @@ def draw_wide(
 
     Args:
         draw: makes the figure of a width [in].
-        name: what the ids in the drawing begin with.
-        caption, alt: as in `Drawing`.
+        name: First part of the ids in the drawing.
+        caption, alt: Caption and text of `Drawing`.
         marks: values that a page shows on hover, or what makes them of a width [in] if places depend on it.
         width: on a desktop's page [in].
     """
@@ -186,7 +186,7 @@ def place_axes(figure: Figure, left: float, top: float, width: float, height: fl
 
 
 def draw_line(axes: Axes, xs: npt.ArrayLike, ys: npt.ArrayLike, **style: Any) -> None:
-    """As `axes.plot`, where the limits of the axes are set: it does not measure what it draws."""
+    """Plot like `axes.plot` if the limits of the axes are set, without measuring the line."""
     from matplotlib.lines import Line2D
 
     axes.add_artist(Line2D(xs, ys, **style))
@@ -269,8 +269,8 @@ def to_svg(figure: Figure, name: str, alt: str) -> str:
 
     Args:
         figure: drawn in the colors of `Ink`.
-        name: what the ids inside begin with; it must differ from that of every other drawing on a page.
-        alt: what `aria-label` says.
+        name: First part of the ids inside, which must differ from that of every other drawing on a page.
+        alt: Text of `aria-label`.
     """
     buffer = io.StringIO()
     figure.savefig(buffer, format="svg", metadata=dict.fromkeys(("Creator", "Date", "Format", "Type")))

@@ -13,7 +13,7 @@ from realitygap.errors import RecordError
 from realitygap.records import LEDGER_NAME, Ledger, ResultsFolder, complete_runs
 
 Paths = dict[tuple[int, int], npt.NDArray[np.float64]]
-"""(4 t + 1, 3) poses of the driven line, by generation and individual."""
+"""Poses of the driven line, (4 t + 1, 3), by generation and individual."""
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,7 @@ class Driven:
         n_driven: trials that count, those of unfinished runs among them.
         n_void: trials that were driven, or begun, and do not count.
         unfinished: replicate of each run that is begun and not complete, and how many of its generations are closed.
-        n_generations: of a whole run.
+        n_generations: Number of generations of a whole run.
         n_corrected: trials whose cells were corrected after they had bred a generation.
     """
 
@@ -64,7 +64,7 @@ def _of(ledger: Ledger, name: str, about: Mapping[str, Any]) -> Driven:
 
 
 def describe_driven(name: str, driven: Driven) -> str:
-    """The same in a sentence or two."""
+    """Return the description in a sentence or two."""
     parts = [
         f"{name} ({driven.label or 'not driven yet'}): {driven.n_driven:,} trials that count, {driven.n_void} void"
     ]
@@ -82,7 +82,7 @@ def describe_driven(name: str, driven: Driven) -> str:
 
 
 def driven_paths(folder: ResultsFolder, condition: str, replicate: int) -> Paths:
-    """The lines of a run as the emulator's witness saw them; nothing where a person scored what lies on paper."""
+    """Return the lines of a run as the emulator's witness recorded them; none if a person scored them on paper."""
     with Ledger.open(folder.path / LEDGER_NAME, writable=False) as ledger:
         which = {
             trial.trial: (trial.generation, trial.individual)

@@ -18,14 +18,14 @@ from realitygap.report._permutation import ALPHA, SEED
 
 Values = npt.NDArray[np.float64]
 Statistic = Callable[[Values, Values, Values], Values]
-"""From values (u,), and how often each occurs in b samples of one (b, u) and of the other (b, u), to (b,)."""
+"""A function of values (u,) and of their counts in b samples of each side, (b, u), that returns (b,)."""
 
 BCA_SMALLEST_N = 10
 """Fewer runs give no bootstrap interval: resamples of so few values vary too little, and it would be too short."""
 
 RESAMPLES = 1_999
 POWER = 0.8
-"""How often a real difference shall be found, where it is said how many runs that takes."""
+"""Statistical power for which the required number of runs is reported."""
 
 USUAL_EFFECTS = {"small": 0.56, "medium": 0.64, "large": 0.71}
 """A12 of what is called a small, medium and large effect (Vargha & Delaney 2000, Table 1)."""
@@ -54,18 +54,18 @@ def a12(one: Values, other: Values) -> float:
 
 
 def difference_of_means(values: Values, one: Values, other: Values) -> Values:
-    """(b,) mean of one less mean of the other."""
+    """Return the mean of one minus the mean of the other, (b,)."""
     return np.asarray(one @ values / one.sum(axis=1) - other @ values / other.sum(axis=1))
 
 
 def share_above(values: Values, one: Values, other: Values) -> Values:
-    """(b,) A12 of samples given as counts over values in ascending order."""
+    """Return A12 of samples given as counts over values in ascending order, (b,)."""
     up_to = np.cumsum(other, axis=1) - other / 2
     return np.asarray((one * up_to).sum(axis=1) / (one.sum(axis=1) * other.sum(axis=1)))
 
 
 def ratio_of_spreads(values: Values, one: Values, other: Values) -> Values:
-    """(b,) standard deviation of one over that of the other; NaN where the other has none."""
+    """Return the standard deviation of one divided by that of the other, (b,); NaN if the other's is 0."""
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = _deviations(values, one) / _deviations(values, other)
     return np.where(np.isfinite(ratio), ratio, np.nan)
@@ -80,7 +80,7 @@ def robust_spread(values: Values) -> float:
 
 
 def ratio_of_robust_spreads(values: Values, one: Values, other: Values) -> Values:
-    """(b,) robust spread of one over that of the other; NaN where the other has none."""
+    """Return the robust spread of one divided by that of the other, (b,); NaN if the other's is 0."""
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = _distances(values, one) / _distances(values, other)
     return np.where(np.isfinite(ratio), ratio, np.nan)
@@ -112,13 +112,13 @@ def bca_interval(
     """The bootstrap interval of an effect, corrected for bias and skewness.
 
     Args:
-        statistic: of two samples, given as counts over their values.
+        statistic: Statistic of two samples, given as counts over their values.
         one: (n,) and
-        other: (m,) values; in pairs where `paired`, which are then resampled together.
-        paired: whether value k of the two belongs together.
+        other: (m,) values; in pairs if `paired`, which are then resampled together.
+        paired: True if value k of one belongs to value k of the other.
 
     Returns:
-        The interval; None below 10 runs, or where all resamples give the same.
+        The interval; None below 10 runs, or if all resamples are equal.
 
     Raises:
         ValueError: `paired` with samples of different size.
@@ -138,7 +138,7 @@ def bca_intervals(
     *,
     paired: bool,
 ) -> list[Interval | None]:
-    """As `bca_interval`, of several effects of the same samples, which are resampled once."""
+    """Return BCa intervals of several effects of the same samples, which are resampled once."""
     if paired and len(one) != len(other):
         raise ValueError(f"Pairs need samples of one size, these have {len(one)} and {len(other)} values.")
     if min(len(one), len(other)) < BCA_SMALLEST_N:
@@ -166,7 +166,7 @@ def _bca(statistic: Statistic, resampled: Values, samples: _Samples) -> Interval
 
 
 def mean_interval(values: Values) -> Interval | None:
-    """The BCa interval of a mean; None below 10 values or where all are equal."""
+    """Return the BCa interval of a mean; None below 10 values or if all are equal."""
     return bca_interval(_first_mean, values, values, paired=True)
 
 
@@ -254,12 +254,12 @@ def _draw_once(n: int, m: int | None, n_resamples: int, block: int) -> list[_Dra
 
 
 def newcombe_interval(share: float, n: int, m: int) -> Interval:
-    """An interval of A12 for few runs: no resampling, and it has a width also where all runs are above.
+    """Return an interval of A12 for few runs, without resampling. It has a width even if all runs are above.
 
     Args:
         share: A12 as observed [0..1].
         n: runs of one condition.
-        m: of the other.
+        m: Number of runs of the other.
 
     Source: Newcombe (2006), Statistics in Medicine 25(4), 559-573, method 5.
     """
@@ -281,7 +281,7 @@ def runs_needed(effect: float, *, paired: bool, alpha: float = ALPHA) -> int | N
 
     Args:
         effect: difference of means over the standard deviation of a run (`paired`: of a difference).
-        paired: whether runs come in pairs.
+        paired: True if runs come in pairs.
         alpha: two-sided level.
 
     Returns:

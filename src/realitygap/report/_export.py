@@ -31,7 +31,7 @@ class Exported:
     """The names of the files that were written.
 
     Attributes:
-        folder: where.
+        folder: Folder of the export.
         figures: names without ending; each is there as SVG and as PDF.
         tables: names of the CSV files that hold the page's tables as shown; numbered ones are there as .tex, too.
         data: names of those that hold numbers behind figures, in full precision.
@@ -49,10 +49,10 @@ def export_page(folder: Path, tally: Tally, content: Mapping[str, Any], page: st
     Each file is written whole or not at all.
 
     Args:
-        folder: where; made when it is not there. Files of other names in it stay.
+        folder: Folder, which is made if it does not exist. Files of other names in it stay.
         tally: the study.
-        content: what the page shows.
-        page: as HTML; its tables are written as they are shown.
+        content: Content of the page.
+        page: Page as HTML. Its tables are written as shown.
 
     Raises:
         RecordError: the folder or a file cannot be written.

@@ -26,7 +26,7 @@ _ORIGINS = {
 
 @dataclass(frozen=True)
 class Finding:
-    """One result in words.
+    """A result in words.
 
     Attributes:
         claim: The result in one sentence.
@@ -45,7 +45,7 @@ class Findings:
 
     Attributes:
         findings: Up to `MOST_FINDINGS`, the most important first.
-        limits: What the findings rest on, and what stays open, in one line.
+        limits: Basis and limits of the findings, in one line.
     """
 
     findings: tuple[Finding, ...]
@@ -62,7 +62,7 @@ def find(
 
     Args:
         tally: The study.
-        comparisons: Its conditions compared, from `compare_conditions`.
+        comparisons: Comparisons of its conditions, from `compare_conditions`.
         champions: Its best networks on fresh noise, from `retry_champions`.
         tasks: Scores of other tasks than coverage, the rows of `summarize_tasks`.
     """

@@ -15,7 +15,7 @@ from realitygap.report._drawing import Drawing, house_style, to_svg
 from realitygap.report._shapes_drawing import figure_of
 
 ENDINGS = (".gif", ".mp4", ".pdf", ".png", ".svg")
-"""What a picture's file name may end in; `.gif` and `.mp4` only for trials, which move."""
+"""Endings of the names of pictures; `.gif` and `.mp4` only for trials, which move."""
 
 _DOTS = 200
 """Of a PNG, per inch."""
@@ -49,12 +49,12 @@ def check_ending(path: Path, endings: tuple[str, ...] = ENDINGS) -> str:
 
 
 def save_drawing(drawing: Drawing, path: str | Path, *, title: str = "realitygap") -> Path:
-    """Write a figure to a file; one that is there gives way once the new one is complete.
+    """Write a figure to a file. An existing file is replaced once the new one is complete.
 
     Args:
-        drawing: from one of the `draw_...` functions.
+        drawing: Drawing of one of the `draw_...` functions.
         path: ends in .svg, .pdf or .png.
-        title: of the document.
+        title: Title of the document.
 
     Returns:
         The path.
@@ -83,7 +83,7 @@ def save_picture(picture: Picture, path: str | Path) -> Path:
 
 
 def captioned(drawing: Drawing, name: str) -> Drawing:
-    """The drawing with its caption as text below, for a file that stands alone; ids in it begin with `name`.
+    """Return the drawing with its caption as text below, for a separate file; ids in it begin with `name`.
 
     Everything in the figure must belong to axes; its figure is changed.
     """

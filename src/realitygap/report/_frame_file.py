@@ -19,10 +19,10 @@ def export_frame(
     """Write species, innovations or lineage of a study's runs to a Parquet file.
 
     Args:
-        folder: the results of a study, or the path to them; none of its files ever gives way.
+        folder: Results of a study, or the path to them. None of its files is ever replaced.
         what: species (a row is one species in one generation), innovations (one innovation number in one run) or
             lineage (one individual).
-        out: the file, ending in .parquet; one that is there gives way once the new one is complete.
+        out: File, ending in .parquet. An existing one is replaced once the new one is complete.
         condition: only this one.
         replicate: only this run of each condition.
 

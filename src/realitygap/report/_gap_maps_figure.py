@@ -21,7 +21,7 @@ _FAINTEST = 0.02
 
 
 def draw_gap_maps(gap: GapStudy) -> Drawing | None:
-    """Share of trials that cross each cell on both sides and their difference; None where cells are not known."""
+    """Draw the share of trials that cross each cell on both sides, and their difference; None if cells are unknown."""
     maps = gap.maps
     if maps is None:
         return None

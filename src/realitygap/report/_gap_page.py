@@ -1,4 +1,4 @@
-"""One page that holds a gap: the verdict, its measures, figures, and what is kept apart from it."""
+"""A page for a gap: the verdict, its measures, figures, and results that do not count towards the verdict."""
 
 from __future__ import annotations
 
@@ -54,8 +54,8 @@ def write_gap_report(gap: GapBetween, path: str | Path) -> Path:
     """Write a gap as one HTML file that needs no other file and no network.
 
     Args:
-        gap: From `realitygap.study.gap_between`.
-        path: Ends in .html; a file that is there gives way.
+        gap: Result of `realitygap.study.gap_between`.
+        path: Path that ends in .html. An existing file is replaced.
 
     Returns:
         The path.

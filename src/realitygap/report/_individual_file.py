@@ -1,4 +1,4 @@
-"""One individual of a study as a file for other programs: JSON, ONNX, GraphML, C, or Aseba."""
+"""An individual of a study as a file for other programs: JSON, ONNX, GraphML, C, or Aseba."""
 
 from __future__ import annotations
 
@@ -41,13 +41,13 @@ def export_individual(
     Each has the names of inputs and outputs, and says which individual it is.
 
     Args:
-        folder: the results of a study, or the path to them; none of its files ever gives way.
-        out: the file; one that is there gives way once the new one is complete.
-        format: what kind; by the ending of `out` when not given.
-        condition: of which; the first one when not given.
-        replicate: which run; the typical one when not given.
-        generation: of the run; the last one when not given.
-        individual: of the generation; the best one by the task when not given.
+        folder: Results of a study, or the path to them. None of its files is ever replaced.
+        out: File. An existing one is replaced once the new one is complete.
+        format: Format of the file. Default: by the ending of `out`.
+        condition: Condition. Default: the first one.
+        replicate: Run. Default: the typical one.
+        generation: Generation of the run. Default: the last one.
+        individual: Individual of the generation. Default: the best one by the task.
 
     Returns:
         The path of the file.

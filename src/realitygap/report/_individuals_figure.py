@@ -62,9 +62,9 @@ def draw_individuals(
 
     Args:
         folder: the results of a study, or the path to them. The trials that are shown are recomputed.
-        condition: of which; the first one when not given.
-        replicate: which run; when not given the typical one, as in `draw_paths`.
-        name: what the ids in the drawing begin with.
+        condition: Condition. Default: the first one.
+        replicate: Run. Default: the typical one, as in `draw_paths`.
+        name: First part of the ids in the drawing.
 
     Raises:
         RecordError: there is no such folder, a file in it is damaged, or it holds no trials yet.
@@ -111,9 +111,9 @@ def draw_better(
 
     Args:
         tally: the study. The trials that are shown are recomputed.
-        condition: of which.
-        replicate: which run; when not given the typical one, as in `draw_paths`.
-        name: what the ids begin with.
+        condition: Condition to draw.
+        replicate: Run. Default: the typical one, as in `draw_paths`.
+        name: First part of the ids.
 
     Raises:
         ValueError: there is no such condition or run.

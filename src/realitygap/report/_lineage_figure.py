@@ -1,4 +1,4 @@
-"""The lineage of an individual: all its ancestors, how each came to be, and what structure each brought."""
+"""The lineage of an individual: all its ancestors, the origin of each, and the structure that each added."""
 
 from __future__ import annotations
 
@@ -49,10 +49,10 @@ class Ancestor:
     """An individual from which the chosen one descends, or that one itself.
 
     Attributes:
-        generation, individual, species: which.
+        generation, individual, species: Identity of the ancestor.
         parents: individuals of the generation before.
         origin: first, copy, mutation or crossover.
-        coverage: of its trial [0..1].
+        coverage: Coverage of its trial [0..1].
         brought: the structure that no parent has, in words.
     """
 
@@ -78,11 +78,11 @@ def draw_lineage(
 
     Args:
         folder: the results of a study, or the path to them.
-        condition: of which; the first one when not given.
-        replicate: which run; the typical one when not given.
-        generation: of the run; that of its best trial, the champion, when not given.
-        individual: of the generation; the best one by the task when not given.
-        name: what the ids in the drawing begin with.
+        condition: Condition. Default: the first one.
+        replicate: Run. Default: the typical one.
+        generation: Generation of the run. Default: that of its best trial, the champion.
+        individual: Individual of the generation. Default: the best one by the task.
+        name: First part of the ids in the drawing.
 
     Raises:
         RecordError: there is no such folder, a file in it is damaged, or it holds no trials yet.

@@ -1,4 +1,4 @@
-"""Values of a figure that the page shows on hover, and where they are in the drawing."""
+"""Values of a figure that the page shows on hover, and their positions in the drawing."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ class Series:
     """Marks that are highlighted together.
 
     Attributes:
-        text: What the page shows of a mark; {name}, {label}, {x}, and {y} stand for its values.
+        text: Text that the page shows for a mark. {name}, {label}, {x}, and {y} are replaced by its values.
         points: (m, 2) x and y in the units of the axes.
-        name: Of the series.
-        labels: One for each mark; none if `text` has no {label}.
+        name: Name of the series.
+        labels: Label of each mark; none if `text` has no {label}.
         link: Address within the page that a click on one of `linked` marks leads to; empty for none.
         linked: Index of the mark with the link.
     """
@@ -45,7 +45,7 @@ class Panel:
     Attributes:
         axes: The `gid` of the axes that they are in.
         series: The marks.
-        decimals: Of x and y: all values are rounded to them.
+        decimals: Number of decimals of x and y, to which all values are rounded.
     """
 
     axes: str
@@ -64,11 +64,11 @@ class Marked(Protocol):
 
 
 def frames_of(figure: Figure, panels: Sequence[Panel]) -> tuple[tuple[float, ...], ...]:
-    """Return where the panels are in a figure that was drawn with linear axes.
+    """Return the positions of the panels in a figure that was drawn with linear axes.
 
     Returns:
-        For each panel a, b, c, d, left, top, right, and bottom, in points from the upper left corner: a value x that
-        is k units of its last decimal is at a + b k, and y at c + d k.
+        The numbers a, b, c, d, left, top, right, and bottom for each panel, in points from the upper left corner: a
+        value x of k units of its last decimal is at a + b k, and y at c + d k.
     """
     axes_by_name = {axes.get_gid(): axes for axes in figure.axes}
     height = float(figure.bbox.height)

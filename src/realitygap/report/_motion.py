@@ -29,7 +29,7 @@ from realitygap.robots import Robot
 from realitygap.runs import replay
 
 Each = Literal["individual", "generation", "condition"]
-"""Of what several trials are shown: each individual of a generation, the best of each generation or condition."""
+"""Selection of several trials: each individual of a generation, or the best of each generation or condition."""
 
 
 _SURPLUS: dict[Each, tuple[str, ...]] = {
@@ -63,16 +63,16 @@ def write_movie(
     Args:
         results: the results of a study, or the path to them; or several, of each of which one trial is shown, or
             trials that `realitygap.playback.in_motion` made.
-        path: ends in .gif or .mp4; a file that is there gives way once the new one is complete.
+        path: Path that ends in .gif or .mp4. An existing file is replaced once the new one is complete.
         each: show several trials: each individual of a generation (the first eight), the best one of each generation,
             or of each condition. Not given: one trial of each results.
-        condition: of which; the first one when not given.
-        replicate: which run; the typical one when not given, whose best trial is the median.
-        generation: of the run; that of its best trial when not given.
-        individual: of the generation; the best one by the task when not given.
+        condition: Condition. Default: the first one.
+        replicate: Run. Default: the typical one, whose best trial is the median.
+        generation: Generation of the run. Default: that of its best trial.
+        individual: Individual of the generation. Default: the best one by the task.
         speed: 1 is as fast as it was; 2 is twice as fast.
-        title: in the head; which trials they are when not given.
-        width: of the pictures [px].
+        title: Title in the head. Default: the names of the trials.
+        width: Width of the pictures [px].
 
     Returns:
         The path.
@@ -237,11 +237,11 @@ def watch(
 
     Args:
         what: results or trials, as in `write_movie`; or a robot, which is shown while the program drives it.
-        each, condition, replicate, generation, individual: which trials of results; see `write_movie`.
+        each, condition, replicate, generation, individual: Selection of trials of results; see `write_movie`.
         speed: to begin with: 0.25, 0.5, 1, 2, 4 or 8.
 
     Returns:
-        A widget; of a robot a `realitygap.playback.WatchedRobot`, which is used in place of the robot.
+        A widget; for a robot a `realitygap.playback.WatchedRobot`, which is used instead of the robot.
 
     Raises:
         RealityGapError: anywidget is not there (the extra `notebook`).

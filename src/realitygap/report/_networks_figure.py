@@ -41,8 +41,8 @@ def draw_networks(
 
     Args:
         folder: the results of a study, or the path to them.
-        structures: as `count_structures` returns them; counted if not given.
-        name: what the ids in the drawing begin with.
+        structures: Result of `count_structures`. Default: computed.
+        name: First part of the ids in the drawing.
 
     Raises:
         RecordError: there is no such folder, a file in it is damaged, or it holds no trials yet.
@@ -73,8 +73,8 @@ def draw_network(condition: Condition, row: Mapping[str, Any], measure: str) -> 
     """The network of a row of results.
 
     Args:
-        condition: as resolved.
-        row: of its results, with the genome.
+        condition: Condition as resolved.
+        row: Row of its results, with the genome.
         measure: the column of coverage that is shown.
 
     Raises:

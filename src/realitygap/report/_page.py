@@ -1,4 +1,4 @@
-"""One page that holds a whole study: what was run, its numbers and figures, and how to run it again."""
+"""A page for a whole study: its settings, its numbers and figures, and the command to run it again."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ LABELS = {
     "EMULATED": "driven over the robot’s own protocol, with a simulated robot behind it",
     "REAL": "driven on the physical robot",
 }
-"""What the labels of figures say."""
+"""Explanations of the labels of figures."""
 
 _MOST_GAPS = 12
 """Conditions whose missing runs are listed; of more it is said how many."""
@@ -73,8 +73,8 @@ def write_report(
     Args:
         folder: the results of a study, or the path to them. They are only read; trials that are drawn are
             recomputed.
-        out: the file to write, ending in .html; `report.html` in the folder when not given. A file that is there
-            gives way, and stays as it is until the new one is complete.
+        out: File to write, ending in .html. Default: `report.html` in the folder. An existing file is replaced once the
+            new one is complete.
         figures: a folder for every figure as SVG and PDF and every table as CSV; it is made when it is not there.
             Nothing but the page is written when not given.
 

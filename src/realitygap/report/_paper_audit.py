@@ -52,9 +52,9 @@ class Finding:
     """Something printed in the paper that does not follow from the rest of it.
 
     Attributes:
-        section: where it stands.
-        printed: what the paper says.
-        found: what comes out.
+        section: Place in the paper.
+        printed: Statement of the paper.
+        found: Computed result.
         bearing: why that matters.
     """
 

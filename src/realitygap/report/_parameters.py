@@ -22,10 +22,10 @@ class Parameter:
     """A row of Table 1.
 
     Attributes:
-        name: in the paper's words.
+        name: Name in the paper's words.
         paper: the paper's value.
         ours: the value of most conditions.
-        others: the conditions where it is another, such as "4 in novelty-10"; empty where there are none.
+        others: Conditions with another value, such as "4 in novelty-10"; empty if there are none.
     """
 
     name: str

@@ -49,11 +49,11 @@ class TracedPath:
     """A trial that is drawn.
 
     Attributes:
-        generation, individual: which.
+        generation, individual: Identity of the trial.
         coverage: its coverage [0..1], by the tally's measure.
         cells: cells along its line, columns * row + column.
-        poses: (t + 1, 3) x, y [m], heading [rad]; None where the trial cannot be recomputed.
-        stalled: (t + 1,) whether each step was blocked; None likewise.
+        poses: (t + 1, 3) x, y [m], heading [rad]; None if the trial cannot be recomputed.
+        stalled: (t + 1,) True if the step was blocked; None if the trial cannot be recomputed.
         others: poses and blocked steps of the other robots of the trial.
     """
 
@@ -67,7 +67,7 @@ class TracedPath:
 
     @property
     def tracks(self) -> tuple[Track, ...]:
-        """Poses and blocked steps of all robots; none where the trial cannot be recomputed."""
+        """Return poses and blocked steps of all robots; none if the trial cannot be recomputed."""
         if self.poses is None or self.stalled is None:
             return ()
         return ((self.poses, self.stalled), *self.others)
@@ -84,10 +84,10 @@ def draw_paths(
 
     Args:
         folder: the results of a study, or the path to them. The trials that are shown are recomputed.
-        condition: of which; the first one when not given.
-        replicate: which run; when not given the typical one, whose best trial by the task is the median of its
-            condition (the lower of the two middle ones, and the first of several alike).
-        name: what the ids in the drawing begin with.
+        condition: Condition. Default: the first one.
+        replicate: Run. Default: the typical one, whose best trial by the task is the median of its condition (the lower
+            of the two middle ones, and the first of several equal ones).
+        name: First part of the ids in the drawing.
 
     Raises:
         RecordError: there is no such folder, a file in it is damaged, or it holds no trials yet.
@@ -292,7 +292,7 @@ def draw_visited(axes: Axes, cells: Iterable[int], arena: Arena, body: Body) -> 
 
 
 def draw_path(axes: Axes, path: TracedPath, arena: Arena, body: Body) -> None:
-    """One trial: cells, path, start, end, and where it was blocked."""
+    """Draw one trial: cells, path, start, end, and the places where it was blocked."""
     draw_visited(axes, path.cells, arena, body)
     for robot, (poses, stalled) in enumerate(path.tracks):
         _draw_track(axes, poses, stalled, PENS[(robot + 1) % len(PENS)][0] if robot else Ink.OURS)

@@ -11,16 +11,16 @@ import numpy.typing as npt
 Values = npt.NDArray[np.float64]
 
 ALPHA = 0.05
-"""A difference is claimed where its p, corrected by Holm, is below this."""
+"""Level: a difference is claimed if its p, corrected by Holm, is below it."""
 
 MOST_ENUMERATED = 200_000
 """Relabelings that are counted one by one: two conditions of ten runs have 184,756."""
 
 MONTE_CARLO = 9_999
-"""Relabelings drawn where there are more; p is then never below 2 / 10,000."""
+"""Number of relabelings that are drawn if there are more; p is then never below 2 / 10,000."""
 
 SEED = 2_000
-"""Of every random draw in a report, so that the same results give the same page."""
+"""Seed of every random draw in a report, so that the same results give the same page."""
 
 _FINEST_UNIT = 256
 """An arena has at most so many cells, so that each coverage is a multiple of 1/N for an N up to this."""
@@ -40,15 +40,15 @@ def lattice(values: Values) -> npt.NDArray[np.int64] | None:
 
 
 def sign_flip_p(differences: Values) -> float:
-    """Two-sided p of the mean of paired differences, when each pair could as well be the other way round.
+    """Return the two-sided p of the mean of paired differences, if each pair could have the opposite sign.
 
     Args:
         differences: (n,) one per pair; zeros change nothing.
 
     Returns:
-        Twice the share of all 2^n sign patterns with a sum as large as the observed one, at most 1. Exact
-        where the differences are multiples of one unit, as coverages are, or n is at most 17; else from
-        9,999 patterns drawn with a fixed seed.
+        Twice the share of all 2^n sign patterns with a sum as large as the observed one, at most 1. Exact if the
+        differences are multiples of one unit, like coverages, or if n is at most 17; otherwise from 9,999 patterns
+        drawn with a fixed seed.
 
     Raises:
         ValueError: `differences` is empty or not finite.
@@ -98,8 +98,8 @@ def permutation_p(one: Values, other: Values) -> float:
         other: (m,) independent values.
 
     Returns:
-        Twice the share of relabelings with a difference as large, or as small, whichever are fewer; at most 1.
-        Exact up to 200,000 relabelings (ten runs against ten); else from 9,999 drawn with a fixed seed.
+        Twice the share of relabelings with a difference as large, or as small, whichever are fewer; at most 1. Exact up
+        to 200,000 relabelings (ten runs against ten); otherwise from 9,999 drawn with a fixed seed.
 
     Raises:
         ValueError: one of them is empty or not finite.
@@ -155,11 +155,11 @@ def holm(p: Values) -> Values:
     """The p values of a family, corrected so that one false claim in the whole family has its level.
 
     Args:
-        p: (m,) in any order.
+        p: (m,) p values in any order.
 
     Returns:
-        (m,) in the same order, at most 1: the smallest times m, the next times m - 1 and so on, none below
-        the one before it.
+        (m,) p values in the same order, at most 1: the smallest times m, the next times m - 1 and so on, none below the
+        one before it.
 
     Source: Holm (1979), Scandinavian Journal of Statistics 6(2).
     """

@@ -22,10 +22,10 @@ class FigureOnPage:
     """A figure in two widths, of which the page shows the one that fits.
 
     Attributes:
-        anchor: Its id on the page; the same in all studies.
+        anchor: Id on the page; the same in all studies.
         drawing: The wide form.
         counterpart: The paper's figure that shows the same; empty for none.
-        number: On the page, from 1; `number_figures` sets it.
+        number: Number on the page, from 1, which `number_figures` sets.
     """
 
     anchor: str

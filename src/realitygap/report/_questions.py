@@ -30,7 +30,8 @@ from realitygap.world import ArenaSettings
 Values = npt.NDArray[np.float64]
 
 MOST_BEHAVIORS = 40
-"""Behaviors of a run that are compared two by two: all of a run of the paper's size, else as many drawn."""
+"""Maximum number of behaviors of a run that are compared in pairs: all of a run of the paper's size, otherwise a
+sample."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +48,7 @@ class Share:
 
     @property
     def interval(self) -> tuple[float, float]:
-        """Its bounds, at least 95 %."""
+        """Return its bounds, at least 95 %."""
         beyond = (1 - CONFIDENCE) / 2
         low = special.betaincinv(self.count, self.n - self.count + 1, beyond) if self.count > 0 else 0.0
         high = (
@@ -70,7 +71,7 @@ def plateaus(tally: Tally, condition: str) -> Share | None:
     """Runs whose best coverage so far does not rise in the last half of their generations.
 
     Returns:
-        How many of how many; None with fewer than two generations.
+        The share as two counts; None with fewer than two generations.
     """
     bests = tally.generation_bests(condition, tally.measure)
     n, generations = bests.shape
@@ -94,10 +95,10 @@ class Spread:
         deviation: standard deviation [share of the reachable cells]; NaN with one run.
         robust: mean distance from the median, in standard deviations of a normal distribution with as much;
             a few extreme runs move it less.
-        reference: the condition that it is compared with; its own name where it is compared with none.
-        ratio: `deviation` over that of the reference; NaN where that is 0.
-        ratio_interval: BCa; None where n is too small.
-        robust_ratio: as `ratio`, of `robust`.
+        reference: Condition with which it is compared; its own name if there is none.
+        ratio: `deviation` divided by that of the reference; NaN if that is 0.
+        ratio_interval: BCa interval; None if n is too small.
+        robust_ratio: Ratio of `robust`, like `ratio`.
         robust_interval: BCa, likewise.
     """
 
@@ -240,7 +241,7 @@ def _visited(cells: pl.Series, columns: int, lines: int) -> npt.NDArray[np.bool_
 
 
 def grid_of(condition: Mapping[str, Any]) -> tuple[int, int]:
-    """Columns and rows of the arena's reachable cells; the paper's where the settings do not say."""
+    """Return columns and rows of the arena's reachable cells; the paper's if the settings have none."""
     try:
         grid = ArenaSettings.model_validate(settings_of(condition).get("arena", {})).arena().grid
     except ValueError:
@@ -252,8 +253,8 @@ def mean_sorted_distance(visited: npt.NDArray[np.bool_], points: Values, padding
     """Mean distance of sorted cells over all pairs of n behaviors [cells].
 
     Args:
-        visited: (n, c) which cells each behavior visits, cells in the order in which they are sorted.
-        points: (c, 2) where they are [cells].
+        visited: (n, c) cells that each behavior visits, in the order in which cells are sorted.
+        points: (c, 2) positions of the cells [cells].
         padding: distance for each cell without a counterpart.
     """
     lengths = visited.sum(axis=1)
@@ -289,8 +290,8 @@ class Chance:
     Attributes:
         conditions: names, one for each level.
         n_runs: runs of each that are drawn.
-        best: (k,) how often each comes out best, when runs are drawn from those observed [0..1].
-        best_if_equal: the same when all levels have one distribution, that of all their runs together.
+        best: (k,) share of draws from the observed runs in which each level is the best [0..1].
+        best_if_equal: The same share if all levels have one distribution, that of all their runs together.
     """
 
     conditions: tuple[str, ...]

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from markupsafe import Markup
 
 UNITS = {"length": 1e-4, "angle": 1e-3, "output": 1e-3}
-"""What numbers are rounded to: positions and readings [m], headings [rad], inputs and outputs of networks."""
+"""Units to which numbers are rounded: positions and readings [m], headings [rad], inputs and outputs of networks."""
 
 N_PENS = 4
 """Trials shown at once: of more, bodies and rays cover one another."""
@@ -66,8 +66,8 @@ class Lead:
     """The trial that the first screen plays.
 
     Attributes:
-        picture: Its whole path as one `svg` element, for readers without a script.
-        caption: What is shown.
+        picture: Drawing of its whole path as one `svg` element, for readers without a script.
+        caption: Caption.
     """
 
     picture: Markup

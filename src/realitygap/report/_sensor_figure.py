@@ -23,14 +23,14 @@ MOST_ABREAST = 3
 """Panels in a row."""
 
 _HEIGHT, _LEFT, _GAP, _TOP, _BELOW = 2.2, 0.55, 0.25, 0.35, 0.5
-"""Of a panel, and around it [in]."""
+"""Sizes of a panel and of the space around it [in]."""
 
 _STRIP = 0.8
 """Width of the strip of readings at a distance [in on the ground]."""
 
 
 def save_sensor_figure(calibration: Calibration, path: str | Path) -> Path:
-    """Draw a calibration's sensors into a file that ends in .svg, .pdf or .png; one that is there gives way.
+    """Draw a calibration's sensors into a .svg, .pdf or .png file. An existing file is replaced.
 
     Raises:
         RecordError: The calibration has no sensors' readings, or the file cannot be written.

@@ -19,9 +19,9 @@ def draw_picture(axes: Axes, picture: Picture, *, scale: float = 1.0) -> None:
     """Draw a picture into axes of its proportions.
 
     Args:
-        axes: emptied of all else.
-        picture: what to draw.
-        scale: of everything that is measured in points.
+        axes: Axes, from which everything else is removed.
+        picture: Picture to draw.
+        scale: Scale of everything that is measured in points.
     """
     axes.set_axis_off()
     axes.set_xlim(picture.left, picture.right)
@@ -49,8 +49,8 @@ def figure_of(picture: Picture, width: float) -> Figure:
     """A figure that holds nothing but a picture; call under `house_style`.
 
     Args:
-        picture: what to draw.
-        width: of the figure [in].
+        picture: Picture to draw.
+        width: Width of the figure [in].
     """
     height = width * (picture.top - picture.bottom) / (picture.right - picture.left)
     figure = new_figure(width, height)

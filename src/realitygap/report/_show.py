@@ -42,15 +42,15 @@ def save_view(
 
     Args:
         folder: the results of a study, or the path to them.
-        out: ends in .svg, .pdf, .png or, for one trial, .gif or .mp4; a file that is there gives way.
+        out: Path that ends in .svg, .pdf, .png or, for one trial, .gif or .mp4. An existing file is replaced.
         subject: run, the best path of each generation, or with `generation` or `individual` (or a .gif) one trial;
             network, that of one individual; species, their shares in one run and their number in all; lineage, the
             ancestors of one individual.
-        condition: of which; the first one when not given.
-        replicate: which run; when not given the typical one, and for species the one with most of them.
-        generation: of a trial, network or lineage; when not given that of the run's best trial, for a network the last
-            one.
-        individual: of the generation; the best one by the task when not given.
+        condition: Condition. Default: the first one.
+        replicate: Run. Default: the typical one, and for species the one with most of them.
+        generation: Generation of a trial, network or lineage. Default: that of the run's best trial, and for a network
+            the last one.
+        individual: Individual of the generation. Default: the best one by the task.
 
     Returns:
         The path of the file.
@@ -101,9 +101,9 @@ def save_arena(out: str | Path, name: str | Path = "paper", *, robot: str | Path
     """Draw an arena to scale into a file, with a robot at its start.
 
     Args:
-        out: ends in .svg, .pdf or .png; a file that is there gives way.
-        name: of an arena, or the path of its TOML or SVG file.
-        robot: name or file of the robot; when not given, `jyro` in the paper's arena and else none.
+        out: Path that ends in .svg, .pdf or .png. An existing file is replaced.
+        name: Name of an arena, or the path of its TOML or SVG file.
+        robot: Name or file of the robot. Default: `jyro` in the paper's arena, and none in other arenas.
 
     Returns:
         The path of the file.

@@ -57,7 +57,7 @@ class SpeciesCounts:
     counts: pl.DataFrame
 
     def mean_by_selection(self, tally: Tally) -> dict[str, npt.NDArray[np.float64]]:
-        """(g,) mean number of species in each generation, over all runs with a selection."""
+        """Return the mean number of species in each generation, over all runs with a selection, (g,)."""
         selections = pl.DataFrame(
             {
                 "condition": [each["name"] for each in tally.conditions],
@@ -99,10 +99,10 @@ def draw_species(
 
     Args:
         folder: the results of a study, or the path to them.
-        condition: of which; the first one that selects when not given.
-        replicate: which run; when not given the one with most species, the first of several alike.
-        species: as `count_species` returns them; counted if not given.
-        name: what the ids in the drawing begin with.
+        condition: Condition. Default: the first one with a selection.
+        replicate: Run. Default: the one with most species, the first of several equal ones.
+        species: Result of `count_species`. Default: computed.
+        name: First part of the ids in the drawing.
 
     Raises:
         RecordError: there is no such folder, a file in it is damaged, or it holds no trials yet.

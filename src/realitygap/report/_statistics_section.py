@@ -45,7 +45,7 @@ def statistics_content(
 
     Args:
         tally: The study.
-        comparisons: Its conditions compared, from `compare_conditions`.
+        comparisons: Comparisons of its conditions, from `compare_conditions`.
         champions: Its best networks on fresh noise, from `retry_champions`.
     """
     with_runs = [each for each in tally.conditions if len(tally.replicates(each["name"]))]

@@ -1,4 +1,4 @@
-"""Which networks evolved: how often each structure occurs in the last generation."""
+"""Structures of the evolved networks, and the number of each in the last generation."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ class Structure:
         outputs: names of the outputs.
         links: enabled links, in order.
         n_hidden: hidden nodes that a link reaches.
-        by_condition: how many networks of the last generation have it, by condition.
-        example: which is the one of highest coverage: condition, replicate, generation, individual.
+        by_condition: Number of networks of the last generation with it, by condition.
+        example: Network of highest coverage with it: condition, replicate, generation, individual.
     """
 
     inputs: tuple[str, ...]
@@ -68,10 +68,10 @@ class Structures:
     """Structures under one kind of selection, from the most frequent to the rarest.
 
     Attributes:
-        selection: what decided who had children.
+        selection: Rule that selected parents.
         inputs: names of the inputs.
         conditions: with that selection and these inputs.
-        n_networks: in their last generations.
+        n_networks: Number of networks in their last generations.
         found: all structures.
     """
 

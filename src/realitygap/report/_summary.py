@@ -38,17 +38,17 @@ SUMMARY_SCHEMA = pl.Schema(
 
 
 def summarize(folder: Results) -> pl.DataFrame:
-    """One row per condition, on the best coverage of each run (the highest of all its individuals).
+    """Return one row per condition, on the best coverage of each run (the highest of all its individuals).
 
     Args:
         folder: the results of a study, or the path to them. They are read chunk by chunk.
 
     Returns:
-        Columns `condition`; `label`, such as SIM; `n`, the number of runs; then for coverage along the line
-        (`line_`) and at the ends of steps (`ends_`) [0..1] `median`, the quartiles `q25` and `q75`, and the
-        bounds `low` and `high` of the median's 95 % interval; `interval_coverage`, what that interval covers
-        in truth; `published`, what the paper reports, one value per run of its own. Null where there are no
-        runs, no counted cells, too few for an interval (below 6), or nothing published.
+        Columns `condition`; `label`, such as SIM; `n`, the number of runs. Then for coverage along the line (`line_`)
+        and at the ends of steps (`ends_`) [0..1]: `median`, the quartiles `q25` and `q75`, and the bounds `low` and
+        `high` of the median's 95 % interval. `interval_coverage` is the true probability of that interval. `published`
+        has the paper's values, one for each of its runs. Null if there are no runs, no counted cells, too few for an
+        interval (below 6), or nothing published.
 
     Raises:
         RecordError: there is no such folder, a file in it is damaged, or it holds no trials yet.

@@ -17,7 +17,7 @@ from realitygap.records import ResultsFolder
 from realitygap.report._driven import Driven, read_driven
 
 Measure = Literal["line", "ends"]
-"""How cells are counted: those that the line driven crosses, or those in which steps end."""
+"""Kind of counted cells: those that the driven line crosses, or those in which steps end."""
 
 _COLUMNS = ["condition", "replicate", "generation", "coverage_line", "coverage_ends"]
 _BEST = {
@@ -35,12 +35,12 @@ class Tally:
     """A study's description and the best of each of its generations.
 
     Attributes:
-        folder: where it was read.
+        folder: Folder from which it was read.
         description: the study as resolved.
         best: one row per condition, replicate and generation, in key order: `trials`, how many individuals;
             `line` and `ends`, the highest coverage among them [0..1].
-        driven: what the ledger says of each condition that a robot drove.
-        uncounted: names of the conditions that are left out, because nobody counted their cells.
+        driven: State of each condition that a robot drove, from the ledger.
+        uncounted: Names of the conditions that are left out, because their cells were not counted.
     """
 
     folder: ResultsFolder
@@ -56,7 +56,7 @@ class Tally:
         return list(self.description["conditions"])
 
     def condition(self, name: str) -> Mapping[str, Any]:
-        """One condition by name.
+        """Return one condition by name.
 
         Raises:
             ValueError: there is none of that name.
@@ -84,7 +84,7 @@ class Tally:
         return "ends" if set(cells) == {"ends"} else "line"
 
     def run_bests(self, condition: str, measure: Measure) -> npt.NDArray[np.float64]:
-        """(n,) best coverage of each run of a condition, in the order of replicates [0..1]."""
+        """Return the best coverage of each run of a condition, in the order of replicates, (n,) [0..1]."""
         return self.runs.filter(pl.col("condition") == condition)[measure].to_numpy()
 
     def score_column(self, condition: str) -> str:
@@ -93,18 +93,18 @@ class Tally:
         return f"coverage_{self.measure}" if is_coverage else "task_fitness"
 
     def run_scores(self, condition: str) -> npt.NDArray[np.float64]:
-        """(n,) best of each run of a condition by its task, in the order of replicates."""
+        """Return the best score of each run of a condition by its task, in the order of replicates, (n,)."""
         if task_of(self.condition(condition)) == "coverage":
             return self.run_bests(condition, self.measure)
         found = bests_of(self.folder, condition)
         return found.max(axis=1) if len(found) else np.empty(0)
 
     def replicates(self, condition: str) -> npt.NDArray[np.uint32]:
-        """(n,) which replicates of a condition there are, in order."""
+        """Return the replicates of a condition, in order, (n,)."""
         return self.runs.filter(pl.col("condition") == condition)["replicate"].to_numpy()
 
     def generation_bests(self, condition: str, measure: Measure) -> npt.NDArray[np.float64]:
-        """(n, g) best coverage in each generation of each run [0..1]; NaN after a run's last generation."""
+        """Return the best coverage in each generation of each run, (n, g) [0..1]; NaN after a run's last generation."""
         rows = self.best.filter(pl.col("condition") == condition)
         if rows.is_empty():
             return np.empty((0, 0))
@@ -151,7 +151,7 @@ def read_tally(folder: Results, *, with_uncounted: bool = False) -> Tally:
 
     Args:
         folder: the results of a study, or the path to them. A tally is returned as it is.
-        with_uncounted: whether conditions of which nobody counted cells are kept; their coverage is NaN.
+        with_uncounted: True to include conditions whose cells were not counted; their coverage is NaN.
 
     Raises:
         RecordError: there is no such folder, a file in it is damaged, or it holds no trials yet.
@@ -219,7 +219,7 @@ def conditions_of(description: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 
 def settings_of(condition: Mapping[str, Any]) -> Mapping[str, Any]:
-    """The resolved settings of a condition; empty where the description has none."""
+    """Return the resolved settings of a condition; empty if the description has none."""
     settings = condition.get("settings")
     return settings if isinstance(settings, dict) else {}
 
@@ -239,7 +239,7 @@ def run_bests_of(folder: ResultsFolder, condition: str) -> pl.DataFrame:
 
 
 def bests_of(folder: ResultsFolder, condition: str) -> npt.NDArray[np.float64]:
-    """(n, g) best fitness by the task in each generation of each run."""
+    """Return the best fitness by the task in each generation of each run, (n, g)."""
     parts = [
         frame.group_by("replicate", "generation", maintain_order=True).agg(pl.col("task_fitness").max())
         for frame in folder.frames(condition, ["replicate", "generation", "task_fitness"])

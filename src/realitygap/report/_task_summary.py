@@ -25,16 +25,16 @@ TASK_SCHEMA = pl.Schema(
 
 
 def summarize_tasks(folder: ResultsFolder | str | Path) -> pl.DataFrame:
-    """One row per condition of another task than coverage, on the best fitness of each run by it.
+    """Return one row per condition of another task than coverage, on the best fitness of each run.
 
     Args:
         folder: the results of a study, or the path to them. They are read chunk by chunk.
 
     Returns:
         Columns `condition`; `label`, such as SIM; `task`, its kind; `n`, the number of runs; `first` and `last`, the
-        median of the best in the first and in the last generation; then of the best of the whole run `median`, the
-        quartiles `q25` and `q75`, and the bounds `low` and `high` of the median's 95 % interval. Null where there
-        are no runs, or too few for an interval (below 6). No rows where all conditions are of coverage.
+        median of the best in the first and in the last generation. Then for the best of the whole run: `median`, the
+        quartiles `q25` and `q75`, and the bounds `low` and `high` of the median's 95 % interval. Null if there are no
+        runs, or too few for an interval (below 6). No rows if all conditions are of coverage.
 
     Raises:
         RecordError: there is no such folder, or a file in it is damaged.

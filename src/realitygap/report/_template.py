@@ -11,8 +11,8 @@ def render_page(name: str, content: Mapping[str, Any], **filters: Callable[..., 
     """A page from a template, its style sheet and its content.
 
     Args:
-        name: of the template.
-        content: what the template shows; it has the style sheet as `css`, too.
+        name: Name of the template.
+        content: Content of the page, to which the style sheet is added as `css`.
         filters: functions that the template uses.
     """
     from jinja2 import Environment, PackageLoader, StrictUndefined

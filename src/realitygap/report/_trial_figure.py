@@ -1,4 +1,4 @@
-"""One trial: its path, what the sensors read and what the network answered, as a figure."""
+"""A figure of one trial: its path, the readings of the sensors, and the commands of the network."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class ChosenTrial:
     """A row of results with what belongs to it.
 
     Attributes:
-        condition: as resolved.
+        condition: Condition as resolved.
         label: SIM, TWIN, EMULATED or REAL.
         row: the row.
         measure: the column of coverage that figures show.
@@ -59,7 +59,7 @@ class ChosenTrial:
 
     @property
     def title(self) -> str:
-        """Which trial it is."""
+        """Name of the trial."""
         row = self.row
         return (
             f"{row['condition']}, run {row['replicate']}, generation {row['generation']}, "
@@ -80,11 +80,11 @@ def choose_trial(
 
     Args:
         tally: the study.
-        condition: of which.
-        replicate: which run.
-        generation: of the run; not given, the one with the run's best trial.
-        individual: of the generation.
-        of_last: take the best of the last generation where no generation is given.
+        condition: Condition to choose from.
+        replicate: Run to choose from.
+        generation: Generation of the run. Default: the one with the run's best trial.
+        individual: Individual of the generation.
+        of_last: True to take the best of the last generation if no generation is given.
 
     Raises:
         ValueError: there is none such; the message says which there are.
@@ -126,14 +126,14 @@ def draw_trial(
     generation: int | None = None,
     individual: int | None = None,
 ) -> Drawing:
-    """One trial, recomputed from its row: path, readings and commands.
+    """Draw one trial, recomputed from its row: path, readings and commands.
 
     Args:
         folder: the results of a study, or the path to them.
-        condition: of which; the first one when not given.
-        replicate: which run; the typical one when not given, as in `draw_paths`.
-        generation: of the run; that of its best trial when not given.
-        individual: of the generation; the best one by the task when not given.
+        condition: Condition. Default: the first one.
+        replicate: Run. Default: the typical one, as in `draw_paths`.
+        generation: Generation of the run. Default: that of its best trial.
+        individual: Individual of the generation. Default: the best one by the task.
 
     Raises:
         RecordError: there is no such folder, a file in it is damaged, it holds no trials yet, or the trial comes out

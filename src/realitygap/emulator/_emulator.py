@@ -286,7 +286,7 @@ class Emulator:
 
     @property
     def _turn(self) -> float:
-        """From the Scribbler's heading to that of the end that is ahead [rad]."""
+        """Return the angle from the Scribbler's heading to that of the end that is ahead [rad]."""
         return math.pi if self.fluke_ahead else 0.0
 
     @property

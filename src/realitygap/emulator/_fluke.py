@@ -190,7 +190,7 @@ class Fluke:
         return self._jobs
 
     def _give_up(self, job: int, now: int) -> None:
-        """The robot has not answered in time; what it still sends is passed on when it comes."""
+        """Stop waiting for the robot's answer. Its later bytes are passed on when they arrive."""
         if self._waiting == job:
             self._waiting = 0
             self.log = (self.log + b"scribbler: no answer to %d\n" % self._packet[0])[-LOG_BYTES:]

@@ -155,7 +155,7 @@ class S2Motors:
         self._next = None
 
     def _begin(self, shares: tuple[float, float], step: int) -> None:
-        """Turn the wheels in this proportion; the speed is kept unless a wheel turns back."""
+        """Turn the wheels in this proportion. The speed stays unless a wheel changes its direction."""
         back = any(old * new < 0 for old, new in zip(self._shares, shares, strict=True))
         if back or not self._step:
             self._step, self._phase = 1, 0
@@ -246,7 +246,7 @@ class S2Motors:
         return max(1, int((math.sqrt(8 * self._left + 1) - 1) / 2))
 
     def _finish(self) -> None:
-        """A motion by distance has come to its end."""
+        """End a motion by distance."""
         self._left = None
         following, self._next = self._next, None
         if not self._rolls_on:

@@ -122,7 +122,7 @@ class EmulatedPort(SerialBase):  # type: ignore[misc]  # pyserial has no types
     # time
 
     def _sync(self) -> None:
-        """Let the emulator's time come up to the real one."""
+        """Advance the emulator's time to the real one."""
         if self._speed is not None:
             self._robot.advance_to(nanoseconds((time.monotonic() - self._begun) * self._speed))
 

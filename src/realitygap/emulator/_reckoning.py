@@ -129,5 +129,5 @@ class Reckoning:
 
 
 def _shorter(units: float) -> float:
-    """The same turn by the shorter way round."""
+    """Return the same turn in the shorter direction."""
     return (units + CIRCLE / 2) % CIRCLE - CIRCLE / 2

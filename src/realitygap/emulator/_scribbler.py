@@ -461,7 +461,7 @@ class Scribbler:
         return 0
 
     def _sound(self, packet: bytes, now: int) -> int:
-        """A tone; the answer comes after it, also when the robot is quiet."""
+        """Play a tone. The answer follows it, also when the robot is quiet."""
         milliseconds = packet[1] << 8 | packet[2]
         second = packet[5] << 8 | packet[6] if packet[0] == Op.SET_SPEAKER_2 else 0
         if self.model == "s2":  # its counter of clock cycles has 32 bits

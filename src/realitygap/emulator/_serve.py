@@ -470,7 +470,7 @@ class Server:
         """Let the time of an emulator that waits pass until it has answered.
 
         Args:
-            is_silent: Whether the client has waited for a while: it may be that more is to come.
+            is_silent: True if the client has waited for a while for further bytes.
         """
         with self._lock:
             while self._is_asked and (is_silent or self.emulator.is_talking):
@@ -500,7 +500,7 @@ class Server:
                 return
 
     def _exchange(self) -> None:
-        """Let time pass, and hand on what has come out."""
+        """Let time pass, and transmit the output."""
         with self._lock:
             self._catch_up()
             self._follow_link()
@@ -516,7 +516,7 @@ class Server:
                 self._watch(self.emulator)
 
     def _follow_link(self) -> None:
-        """When the emulated link goes away, the client's does too."""
+        """Disconnect the client when the emulated link is interrupted."""
         is_away = not self.emulator.is_connected
         if is_away and not self._is_away:
             self._waiting = b""

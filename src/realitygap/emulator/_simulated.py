@@ -121,7 +121,7 @@ class BoxOnWheels:
         return rolled_left, rolled_right
 
     def _is_blocked(self, pose: Pose, moved: float) -> bool:
-        """Whether the outline touches a wall or an obstacle at a pose this far on."""
+        """Return whether the outline touches a wall or an obstacle at a pose displaced by this."""
         self._free -= moved
         if self._free > 0:
             return False

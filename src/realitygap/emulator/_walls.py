@@ -65,7 +65,7 @@ class Walls:
         return bool(((side * np.roll(side, -1, 0) <= 0) & (first * last <= 0)).any())
 
     def _touch_disc(self, xs: Floats, ys: Floats) -> bool:
-        """Whether a side of an outline comes as near to a disc as its radius."""
+        """Return whether a side of an outline is within the radius of a disc."""
         along_x, along_y = np.roll(xs, -1) - xs, np.roll(ys, -1) - ys
         to_x, to_y = self._discs[:, :1] - xs, self._discs[:, 1:2] - ys
         squared = along_x**2 + along_y**2
@@ -88,7 +88,7 @@ class Walls:
         return np.minimum(distance, reach), np.where(distance <= reach, which, -1)
 
     def _to_walls(self, xs: Floats, ys: Floats, ray_x: Floats, ray_y: Floats) -> Floats:
-        """(r, w) along each ray to each wall [m]; inf where it misses."""
+        """Return the distance along each ray to each wall, (r, w) [m]; inf if it misses."""
         to_x, to_y = self._x - xs[:, None], self._y - ys[:, None]
         across = ray_x * self._along_y - ray_y * self._along_x
         parallel = across == 0
@@ -99,7 +99,7 @@ class Walls:
         return np.asarray(np.where(meets, far, np.inf))
 
     def _to_discs(self, xs: Floats, ys: Floats, ray_x: Floats, ray_y: Floats) -> Floats:
-        """(r, d) along each ray to each disc [m]; 0 within it, inf where it misses."""
+        """Return the distance along each ray to each disc, (r, d) [m]; 0 inside it, inf if it misses."""
         to_x, to_y = self._discs[:, 0] - xs[:, None], self._discs[:, 1] - ys[:, None]
         ahead = to_x * ray_x + to_y * ray_y
         aside = to_x * ray_y - to_y * ray_x

@@ -20,7 +20,7 @@ RENDER_FPS = 10
 
 
 class _OneRobot(gymnasium.Env[Array, Array]):
-    """One robot, one step at a time."""
+    """An environment with one robot."""
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": RENDER_FPS}  # noqa: RUF012 - as Gymnasium declares it
 
@@ -35,7 +35,7 @@ class _OneRobot(gymnasium.Env[Array, Array]):
 
     @property
     def noise_key(self) -> NoiseKey:
-        """Which random numbers the trial draws; `trace_genome` with it gives the same trial."""
+        """Key of the trial's random numbers; `trace_genome` with it gives the same trial."""
         return self._robots.noise_key
 
     @property
@@ -49,8 +49,8 @@ class _OneRobot(gymnasium.Env[Array, Array]):
         """Begin a trial.
 
         Args:
-            seed: Of the keys of this trial's and all later trials' random numbers.
-            options: `noise_key`: the `NoiseKey` of this trial in place of a new one.
+            seed: Seed of the keys of this trial and of all later trials.
+            options: `noise_key`: the `NoiseKey` of this trial instead of a new one.
 
         Raises:
             ValueError: An unknown option, or a key whose numbers would repeat.

@@ -111,5 +111,5 @@ class MazeFleet:
         """See `Fleet.close`. There is nothing to close here."""
 
     def _gathered(self, blocks: list[NDArray[Any]]) -> Array:
-        """(m, LANES) numbers of each block as (n, m)."""
+        """Return numbers of each block, (m, LANES), as (n, m)."""
         return np.concatenate(blocks, axis=1)[:, : self._n].T.astype(np.float64)

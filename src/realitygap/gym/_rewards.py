@@ -89,7 +89,7 @@ class WallReward:
 
     @staticmethod
     def _poses(fleet: Fleet) -> Array:
-        """(3, n) from the start."""
+        """Return poses from the start, (3, n)."""
         start = fleet.arena.start
         return np.ascontiguousarray((fleet.facts()["pose"] - [start.x, start.y, 0.0]).T)
 
@@ -147,7 +147,7 @@ class LightReward(GrowingReward):
         return worth
 
     def _away(self, fleet: Fleet) -> Array:
-        """(n,) from the nearest light [m]."""
+        """Return distances from the nearest light, (n,) [m]."""
         pose = fleet.facts()["pose"]
         away: Array = np.hypot(self._x - pose[:, :1], self._y - pose[:, 1:2]).min(axis=1)
         return away

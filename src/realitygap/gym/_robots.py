@@ -259,7 +259,7 @@ def _task(kind: str, settings: Mapping[str, Any]) -> Any:
 
 
 def _platform(given: GivenPlatform, kind: str) -> Platform:
-    """Return the platform that was given, or that a name stands for; settings without a name are the default's."""
+    """Return the given platform, or that of a name. Settings without a name are those of the default."""
     if isinstance(given, Platform):
         return given
     if not isinstance(given, str):

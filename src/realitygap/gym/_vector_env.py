@@ -45,7 +45,7 @@ class _ManyRobots(VectorEnv[Array, Array, NDArray[Any]]):
 
     @property
     def noise_key(self) -> NoiseKey:
-        """Which random numbers robot 0 draws; robot k those of the individual k places on."""
+        """Key of the random numbers of robot 0. Robot k has those of the individual k numbers later."""
         return self._robots.noise_key
 
     def visited_cells(self, k: int) -> tuple[int, ...]:
@@ -88,7 +88,7 @@ class _ManyRobots(VectorEnv[Array, Array, NDArray[Any]]):
             self._robots.close()
 
     def _info(self) -> dict[str, Any]:
-        """Each array with another that says which robots it is of: all."""
+        """Return each array with a second one that marks the robots with a value, which are all of them."""
         facts = self._robots.facts()
         return {**facts, **{f"_{name}": np.ones(self.num_envs, np.bool_) for name in facts}}
 

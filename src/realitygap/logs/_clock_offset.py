@@ -74,7 +74,7 @@ def clock_offset(told: Floats, seen: Floats, step_s: float, *, seed: int = 0) ->
 
 
 def _block_sums(told: Floats, seen: Floats, lag: int) -> Floats:
-    """(blocks, k, 6) moments of the pairs of a lag: n, x, y, xx, yy, xy."""
+    """Return moments of the pairs of a lag: n, x, y, xx, yy, xy, (blocks, k, 6)."""
     n = len(told)
     x = told[max(0, -lag) : n - max(0, lag)]
     y = seen[max(0, lag) : n - max(0, -lag)]
@@ -88,7 +88,7 @@ def _block_sums(told: Floats, seen: Floats, lag: int) -> Floats:
 
 
 def _score(sums: Floats) -> Floats:
-    """(lags,) mean squared correlation over the signals that vary."""
+    """Return the mean squared correlation over the signals that vary, (lags,)."""
     n, x, y, xx, yy, xy = np.moveaxis(sums, -1, 0)
     with np.errstate(invalid="ignore", divide="ignore"):
         vx, vy, cov = xx - x * x / n, yy - y * y / n, xy - x * y / n

@@ -50,7 +50,7 @@ def converter(part: Part, speed: float, track: float) -> Convert:
 
 
 def _per_meter(place: str, part: WheelPart, unit: str) -> float:
-    """Meters, or m/s, that one unit of a wheel stands for."""
+    """Return the length of one unit of a wheel, in meters or m/s."""
     if unit.split("/")[0] == "ticks":
         if not part.ticks_per_m:
             raise LogError(

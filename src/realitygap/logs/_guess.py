@@ -98,7 +98,7 @@ def tokens_of(name: str) -> list[str]:
 
 
 def _pick(names: Iterable[str], wanted: Callable[[list[str]], bool]) -> str:
-    """Return the column that fits, poses seen from outside before the robot's own; empty if no column fits."""
+    """Return the column that fits, observed poses before the robot's own; empty if no column fits."""
     found = [name for name in names if wanted(tokens_of(name))]
     return min(found, key=lambda name: (not TRUTH & set(tokens_of(name)), len(name)), default="")
 

@@ -128,7 +128,7 @@ def _shifted(ways: Floats, shift: int) -> Floats:
 
 
 def _turns(xy: Floats, headings: Floats) -> Floats:
-    """(n,) turn in each step [rad]; by the path if there are no headings, and nan where the robot hardly moves."""
+    """Return the turn in each step, (n,) [rad], from headings or the path; nan if the robot hardly moves."""
     if np.isfinite(headings).any():
         return np.diff(headings)
     steps = np.diff(xy, axis=0)
@@ -245,7 +245,7 @@ def _compare_wheels(
 
 
 def _slopes(wheels: Floats, values: Floats) -> tuple[Floats | None, bool]:
-    """(2,) least squares of values over both wheels, and whether the signs of both slopes are sure."""
+    """Return the least-squares slopes of values over both wheels, (2,), and whether the signs of both are certain."""
     known = np.isfinite(values) & np.isfinite(wheels).all(1)
     x, y = wheels[known], values[known]
     if len(y) < FEWEST_WINDOWS or np.linalg.matrix_rank(x) < 2:
@@ -286,7 +286,7 @@ _PATTERNS: dict[tuple[int, int, int, int], tuple[str, str]] = {
         "Left and right are swapped, and the column of the right one is reversed. Swap them and set left_sign = -1.",
     ),
 }
-"""By the signs of the slopes: way over left and right wheel, turn over left and right wheel."""
+"""Patterns of the signs of the slopes: distance over left and right wheel, turn over left and right wheel."""
 
 
 def _signs(forward: Floats, round_: Floats, *, has_heading: bool) -> Mistake | None:

@@ -100,7 +100,7 @@ def read_logs(
 
 
 class _Stream:
-    """One part of a log: where its numbers come from, and how they become values."""
+    """A part of a log: the source of its numbers, and their conversion to values."""
 
     def __init__(
         self, name: str, part: Part, source: Source, speed: float, track: float, *, drop: bool

@@ -84,7 +84,7 @@ class HeldMean:
 
 
 class _AtPoints(ABC):
-    """Values of a signal at each point; nan where no sample is near."""
+    """Values of a signal at each point; nan if no sample is near."""
 
     def __init__(self, grid: Grid, width: int) -> None:
         self._grid, self._parts, self._n = grid, [np.empty((0, width))], 0
@@ -92,7 +92,7 @@ class _AtPoints(ABC):
         self._gap = 0.0
 
     def push(self, times: Floats, values: Floats) -> None:
-        """Take (b,) times and (b, k) values, after all that came before."""
+        """Add times (b,) and values (b, k), which follow all earlier ones."""
         if not len(times):
             return
         self._gap = self._gap or _gap_of(times, self._grid.step_s)
@@ -110,7 +110,7 @@ class _AtPoints(ABC):
         """Return (p, k) values at (p,) points, from (b,) times and (b, k) values."""
 
     def rows(self, n: int) -> Floats:
-        """(n, k) the values at the first n points; nan beyond the last sample."""
+        """Return the values at the first n points, (n, k); nan after the last sample."""
         return _padded(np.concatenate(self._parts), n)
 
 

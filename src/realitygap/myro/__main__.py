@@ -33,7 +33,7 @@ _GIVEN = ("myro", "Myro", "graphics", "Graphics")
 """The names of modules under which programs of the courses know these functions."""
 
 _SIGNAL = 128
-"""A status above it says that a signal ended the program; then nothing else is run."""
+"""Status above which a signal ended the program. Then no other program is run."""
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -154,7 +154,7 @@ def _run(program: Path, limit: float | None) -> str | None:
 
 
 def _said_at_exit(end: SystemExit) -> str | None:
-    """Why a program ended itself, as text; None where all was well."""
+    """Return the reason why a program ended itself, as text; None for a normal end."""
     if end.code is None or end.code == 0:
         return None
     if isinstance(end.code, int) and end.code > _SIGNAL:

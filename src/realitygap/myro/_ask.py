@@ -10,7 +10,7 @@ from ._colors import Color
 from ._mistakes import MyroError
 
 _answers: dict[str, str] = {}
-"""What was answered before, for `useCache`."""
+"""Earlier answers, for `useCache`."""
 
 
 def ask(

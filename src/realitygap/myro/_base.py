@@ -20,7 +20,7 @@ PLACES = {
 """Names of the positions of sensors in groups of three."""
 
 _GLANCE_S = 1e-3
-"""What a look at the clock takes where time stands still otherwise [s], so that loops that only wait for it end."""
+"""Time that a look at the clock takes if time passes in no other way [s], so that loops that only wait for it end."""
 
 
 class TimeUp(BaseException):

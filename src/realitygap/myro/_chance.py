@@ -9,7 +9,7 @@ from typing import Any
 from ._mistakes import MyroError, whole
 
 _LARGEST = 2**53
-"""Beyond it a float no longer tells whole numbers apart."""
+"""Largest whole number up to which a float is exact."""
 
 
 def randomNumber() -> float:

@@ -338,7 +338,7 @@ def _as_picture(item: object) -> Picture:
 
 
 def _flat(image: PIL.Image.Image, filename: str) -> PIL.Image.Image:
-    """Without alpha where the kind of file has none, or nothing is see-through: a GIF's colors then stay exact."""
+    """Return a picture without alpha if the format has none or nothing is transparent, so that GIF colors are exact."""
     is_opaque = image.getchannel("A").getextrema() == (255, 255)
     return (
         image.convert("RGB") if is_opaque or filename.lower().endswith((".jpg", ".jpeg", ".bmp")) else image

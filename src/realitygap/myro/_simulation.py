@@ -156,7 +156,7 @@ def _opened(url: str) -> Driver:
 
 
 def _plain(value: Any) -> Any:
-    """A number from text, as options behind a question mark come; anything else as it is."""
+    """Return a number from the text of an option after a question mark. Other values are returned unchanged."""
     if isinstance(value, str):
         try:
             return int(value)

@@ -13,7 +13,7 @@ from ._mistakes import MyroError, whole
 from ._robot import stop_robot
 
 _GRACE_S = 0.2
-"""How long a function that has to end may take for what it has just begun to say to the robot."""
+"""Time in which a function that has to end may finish its present exchange with the robot."""
 
 
 def loop(*functions: Any) -> str:

@@ -71,7 +71,7 @@ def best_view(simulation: Watched, wanted: Any = None) -> View | None:
 
 
 def _is_notebook() -> bool:
-    """Whether there is a notebook to draw in; IPython in a terminal is none."""
+    """Return whether there is a notebook to draw in; IPython in a terminal is none."""
     return getattr(notebook_shell(), "kernel", None) is not None
 
 
@@ -109,7 +109,7 @@ class NotebookView:
                 return
 
     def _draw(self) -> None:
-        """Show it, unless it stands where it was shown last."""
+        """Show it, unless it is still at the place where it was last shown."""
         with self._lock:
             self._last = time.monotonic()
             self._simulation.catch_up()

@@ -59,7 +59,7 @@ def gif_bytes(
 
 
 def _palette(pictures: Sequence[Image], colors: Sequence[tuple[int, int, int]]) -> NDArray[np.uint8]:
-    """(_N_COLORS, 3) the colors given, and what else a few of the pictures have."""
+    """Return the given colors, and further ones from a few of the pictures, (_N_COLORS, 3)."""
     from PIL import Image
 
     last = len(pictures) - 1
@@ -85,7 +85,7 @@ class _Nearest:
         self._known = np.full(1 << 24, _UNCHANGED, np.uint8)
 
     def __call__(self, pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        """(h, w) index of the nearest color of each pixel (h, w, 3)."""
+        """Return the index of the nearest color of each pixel (h, w, 3), (h, w)."""
         parts = pixels.astype(np.int32)
         packed = parts[..., 0] << 16 | parts[..., 1] << 8 | parts[..., 2]
         fresh = np.unique(packed[self._known[packed] == _UNCHANGED])
@@ -97,7 +97,7 @@ class _Nearest:
 
 
 def _changed(before: NDArray[np.uint8] | None, now: NDArray[np.uint8]) -> tuple[int, int, int, int]:
-    """Left, top, right and bottom of what differs; one pixel where nothing does."""
+    """Return left, top, right and bottom of the changed part; one pixel if nothing changed."""
     if before is None:
         return 0, 0, now.shape[1], now.shape[0]
     rows, columns = np.nonzero(before != now)

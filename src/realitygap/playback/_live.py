@@ -25,7 +25,7 @@ PERIOD_S = 0.05
 """Between two messages to a page: at most 20 a second."""
 
 _FAN = 1.0
-"""Between the outermost of sensors whose mounts nobody told [rad]."""
+"""Angle between the outermost sensors if their mounts are unknown [rad]."""
 
 
 class Page(Protocol):
@@ -224,7 +224,7 @@ class WatchedRobot:
         self._sent = _Sent()
 
     def _visit(self, pose: Pose) -> None:
-        """Note the cells on the way to a place."""
+        """Record the cells on the path to a place."""
         if self._visited is not None:
             self._visited.follow([(pose.x, pose.y)])
             self._cells = self._visited.cells
@@ -239,7 +239,7 @@ class WatchedRobot:
         return [packed]
 
     def _show(self, lasts: float, *, at_once: bool = False) -> None:
-        """Tell the page where the robot is, unless it was told a moment ago; nothing that it did is left out."""
+        """Send the robot's pose to the page, unless one was just sent. No part of its motion is left out."""
         pose = self._now()
         self._visit(pose)
         self._trail.append((round(pose.x, 4), round(pose.y, 4)))
@@ -339,4 +339,4 @@ def _sleep(seconds: float) -> None:
 
 
 _NOWHERE = Arena("nowhere", (), Grid(0.0, 0.0, 1.0, 1, 1), Pose(0.0, 0.0, 0.0))
-"""Stands for the arena of a robot of which nobody knows where it is."""
+"""Placeholder for the arena of a robot whose pose is unknown."""

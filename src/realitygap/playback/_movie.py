@@ -61,7 +61,7 @@ _COLORS = [
     + [Ink.GROUND, Ink.TEXT, Ink.MUTED, Ink.RULE, Ink.OURS, Ink.REACH]
     + [TILE, TILE_VISITED, TILE_OFTEN, FAR, MIDDLE, NEAR]
 ]
-"""That a movie needs unchanged, with the shades at their edges."""
+"""Colors that a movie needs unchanged, with the shades at their edges."""
 
 
 def save_movie(

@@ -19,7 +19,7 @@ from ._moving import MovingTrial, all_trials, extent
 from ._screen import FAR, LETTERS, MIDDLE, MOST_TRIALS, NEAR, TILE, TILE_OFTEN, TILE_VISITED
 
 _DIGITS = 4
-"""Of lengths [m] and angles [rad] that a page is sent."""
+"""Digits of lengths [m] and angles [rad] that are sent to a page."""
 
 _COLORS = {
     "far": FAR,

@@ -37,13 +37,13 @@ _NAME = 1.9
 """Width of a name below the arena."""
 
 _DOTS = 90
-"""Of a picture, per inch; one that is smaller than 4.8 in would be in smaller letters."""
+"""Dots per inch of a picture. A picture below 4.8 in would have smaller letters."""
 
 _ROOMY = 6.0
 """A picture of this width has room for words in its head [in]."""
 
 _FAN = 0.042
-"""How far from a robot's middle its letter stands where several robots stand on one spot, as a part of the width."""
+"""Distance of a robot's letter from its middle if several robots are at one place, as a part of the width."""
 
 
 _DOT = 1e-4
@@ -216,7 +216,7 @@ class Screen:
         self._add(self._all, self._clock)
 
     def _draw_names(self, top: float) -> None:
-        """Below the arena: letter, pen and name of each trial, and the coverage that it has come to."""
+        """Draw letter, pen, and name of each trial and its present coverage below the arena."""
         self._words: list[Any] = []
         if not self._several:
             return
@@ -282,7 +282,7 @@ class Screen:
         self._ground = self._canvas.copy_from_bbox(self._figure.bbox)
 
     def _move_letters(self, moments: Sequence[Moment]) -> None:
-        """Letters stand on the robots, and around the spot where several robots stand on one."""
+        """Place the letters on the robots, and around a place with several robots."""
         places = np.array([moment.pose[:2] for moment in moments])
         left, right = self._field.get_xlim()
         fan = _FAN * (right - left)
@@ -313,7 +313,7 @@ class Screen:
 
 
 class _Robot:
-    """The artists of one robot: trail, places where it was blocked, rays, outline, nose and letter."""
+    """Artists of one robot: trail, places where it was blocked, rays, outline, nose and letter."""
 
     def __init__(self, trial: MovingTrial, pen: int, *, several: bool) -> None:
         from matplotlib.collections import LineCollection, PolyCollection
@@ -353,7 +353,7 @@ class _Robot:
             self.artists.append(self._letter)
 
     def move(self, trial: MovingTrial, moment: Moment) -> None:
-        """Put it where it is at a moment."""
+        """Put it at its pose at a moment."""
         driven = np.vstack([trial.poses[: moment.row + 1, :2], moment.pose[:2]])
         self._trail.set_data(driven[:, 0], driven[:, 1])
         blocked = trial.poses[: moment.row + 1][trial.stalled[: moment.row + 1], :2]

@@ -38,10 +38,10 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _MOST_PATHS = 16
-"""Of archived individuals; more would hide each other."""
+"""Maximum number of drawn paths of archived individuals, because more would hide each other."""
 
 _HEIGHT = 2.25
-"""Of the curves [in]."""
+"""Height of the curves [in]."""
 
 
 def draw_archive(folder: Results, condition: str | None = None, replicate: int | None = None) -> Drawing:
@@ -126,7 +126,7 @@ def _rows_of(rows: pl.DataFrame, members: Sequence[Member]) -> pl.DataFrame:
 
 
 def _mean_novelty(tally: Tally, settings: NoveltySettings) -> dict[str, npt.NDArray[np.float64]]:
-    """(g,) of each condition whose novelty is measured in the same way."""
+    """Return the mean novelty of each condition with the same measure of novelty, (g,)."""
     alike = [
         str(each["name"])
         for each in tally.conditions

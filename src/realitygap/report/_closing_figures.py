@@ -300,7 +300,7 @@ def draw_strategies(summary: Summary) -> Drawing | None:
 
 
 def _spread(place: int, n: int) -> npt.NDArray[np.float64]:
-    """Return (n,) places around that of a row, so that equal values can be told apart."""
+    """Return places around that of a row, so that equal values are visible, (n,)."""
     return place + np.random.default_rng(place).uniform(-0.28, 0.28, n)
 
 

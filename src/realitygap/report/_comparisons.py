@@ -267,7 +267,7 @@ def same_but_for(key: str, conditions: Sequence[Mapping[str, Any]]) -> list[list
 
 
 def _pairs(tally: Tally) -> Iterator[tuple[Mapping[str, Any], Mapping[str, Any], Reason]]:
-    """Which conditions are compared, each two once."""
+    """Return the pairs of conditions to compare, each pair once."""
     seen: set[frozenset[str]] = set()
     for one, other, reason in _all_pairs(tally.conditions):
         both = frozenset((one["name"], other["name"]))

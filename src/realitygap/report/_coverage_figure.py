@@ -35,7 +35,7 @@ _MOST_SEGMENTS = 4000
 """Distinct pieces of lines in one panel; more would make the page heavy and the panel black."""
 
 _SHADES = 12
-"""How many opacities tell how many runs share a piece of line."""
+"""Number of opacities that show how many runs share a piece of line."""
 
 
 @dataclass(frozen=True)
@@ -140,7 +140,7 @@ def count_drawable(values: npt.NDArray[np.float64]) -> int:
 
 
 def _segments(values: npt.NDArray[np.float64]) -> list[tuple[npt.NDArray[np.float64], npt.NDArray[np.int64]]]:
-    """For each generation but the last: distinct (m, 2) values there and in the next; (m,) how many runs."""
+    """Return distinct values in a generation and the next, (m, 2), with their numbers of runs, (m,), by generation."""
     found = []
     for left in range(values.shape[1] - 1):
         pairs = values[:, left : left + 2]
@@ -220,7 +220,7 @@ def _columns(n_panels: int, width: float) -> int:
 
 
 def _coverage_axis(panels: list[Panel]) -> Axis:
-    """From 0 to the next tenth above everything shown."""
+    """Set the axis from 0 to the next tenth above all values."""
     highest = max([0.1, *(float(p.run_bests.max()) for p in panels if len(p.run_bests))])
     highest = max([highest, *(value for panel in panels for value in panel.published)])
     top = min(1.0, math.ceil(highest * 10 + 0.2) / 10)

@@ -36,7 +36,7 @@ CELL_M = 0.0762
 """The paper's cell of 3 in, as the unit of final positions of walks."""
 _RESAMPLES = 1000
 _TENTH = 1.1
-"""By how much cells must weigh more than others for it to be called a bias."""
+"""Factor by which cells must have more weight than others for a bias."""
 _LEAST_PAIRS = 10
 
 
@@ -255,7 +255,7 @@ def changed_walk(walk: Sequence[int], cell: int, columns: int) -> list[int]:
 def _leverages(
     distance: BehaviorDistance, walks: Sequence[list[int]], columns: int, rows: int, sort: CellOrder
 ) -> Values:
-    """(w, c) distance from each walk to itself with each cell changed."""
+    """Return the distance from each walk to itself with each cell changed, (w, c)."""
     found = np.empty((len(walks), columns * rows))
     for k, walk in enumerate(walks):
         variants = [changed_walk(walk, cell, columns) for cell in range(columns * rows)]
@@ -265,7 +265,7 @@ def _leverages(
 
 
 def _order(columns: int, rows: int, sort: CellOrder) -> npt.NDArray[np.int64]:
-    """(c,) cells as the paper sorts them."""
+    """Return cells in the paper's order, (c,)."""
     numbers = np.arange(columns * rows).reshape(rows, columns)
     return (numbers.T if sort == "x-then-y" else numbers).ravel()
 
@@ -279,7 +279,7 @@ def _resampled(leverages: Values, rng: np.random.Generator) -> tuple[Values, Val
 
 
 def _front_over_back(means: Values) -> Values:
-    """(b,) of (b, c) means in order: those of the first quarter over those of the last."""
+    """Return the mean of the first quarter divided by that of the last, (b,), for means in order, (b, c)."""
     quarter = max(1, means.shape[1] // 4)
     back = means[:, -quarter:].mean(axis=1)
     front = means[:, :quarter].mean(axis=1)
@@ -288,7 +288,7 @@ def _front_over_back(means: Values) -> Values:
 
 
 def _trend(means: Values) -> Values:
-    """(b,) Spearman's correlation of (b, c) means with their place; NaN where all are equal."""
+    """Return Spearman's correlation of means (b, c) with their place, (b,); NaN if all are equal."""
     from scipy import stats  # takes a third of a second, which most commands can do without
 
     # equal but for the rounding of sums is equal
@@ -368,7 +368,7 @@ def _open_for(distance: BehaviorDistance, folder: ResultsFolder | str | Path) ->
 def _confounds_of(
     folder: ResultsFolder, distance: BehaviorDistance, rng: np.random.Generator, n_pairs: int, sort: CellOrder
 ) -> list[Confound]:
-    """On the trials of each condition of a study."""
+    """Return the confounds for the trials of each condition of a study."""
     found = []
     for condition in folder.description["conditions"]:
         rows = folder.read(condition["name"], columns=["replicate", "cells"])

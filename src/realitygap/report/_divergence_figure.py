@@ -51,7 +51,7 @@ if TYPE_CHECKING:
 
 _COLORS = (Ink.OURS, Ink.PUBLISHED, Ink.PEN3)
 _DASHES: tuple[Any, ...] = ("solid", (0, (5, 1.5)), (0, (1, 1)))
-"""Of the platforms."""
+"""Dashes of the platforms."""
 
 _GHOSTS = 7
 """Robots drawn along a path."""
@@ -133,7 +133,7 @@ def compare_trials(
 def _compare(
     results: ResultsFolder | str | Path, against: str, repeats: int, *which: Any
 ) -> tuple[str, tuple[Side, ...]]:
-    """Which network it is, and its trials on all sides; `which` says it as `choose_trial` takes it."""
+    """Return the network's name and its trials on all sides; `which` has the arguments of `choose_trial`."""
     whole_number("repeats", repeats, 2, 1000)
     names = [name.strip() for name in against.split(",")]
     if not 1 <= len(names) < len(_COLORS):

@@ -39,7 +39,7 @@ _METRIC_FONT = "DejaVu Sans"
 
 
 _NOT_XML = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")
-"""What a user's text may hold and XML may not."""
+"""Characters that a user's text may contain but XML may not."""
 
 
 _STYLE: dict[Any, Any] = {
@@ -335,7 +335,7 @@ def _rename_ids(root: ET.Element, name: str) -> None:
 
 
 def _tidy(element: ET.Element) -> None:
-    """Hundredths of a point are enough; the reader's fonts in place of the measuring one."""
+    """Round to hundredths of a point, and use the reader's fonts instead of the one for measuring."""
     if "d" in element.attrib:
         element.set("d", _round(" ".join(element.attrib["d"].split())))
     for key in ("x", "y", "transform"):

@@ -87,7 +87,7 @@ def ratio_of_robust_spreads(values: Values, one: Values, other: Values) -> Value
 
 
 def _distances(values: Values, counts: Values) -> Values:
-    """(b,) mean distance from the median; between two middle values every point gives the same."""
+    """Return the mean distance from the median, (b,); any point between two middle values gives the same."""
     n = counts.sum(axis=1)
     median = values[(np.cumsum(counts, axis=1) >= n[:, None] / 2).argmax(axis=1)]
     return np.asarray((counts * np.abs(values - median[:, None])).sum(axis=1) / n)
@@ -179,10 +179,10 @@ class _Samples:
     """Two samples as places in their common values.
 
     Attributes:
-        values: (u,) in ascending order.
+        values: (u,) values in ascending order.
         one: (n,) the place of each of the first sample's values, and
-        other: (m,) of the second's.
-        paired: whether they are drawn together.
+        other: (m,) indices of the second sample's values.
+        paired: True if they are drawn together.
     """
 
     values: Values
@@ -192,12 +192,12 @@ class _Samples:
 
     @property
     def counts(self) -> tuple[Values, Values]:
-        """(u,) how often each value occurs in the one sample, and in the other."""
+        """Return the counts of each value in one sample, and in the other, (u,)."""
         one, other = (np.bincount(part, minlength=len(self.values)) for part in (self.one, self.other))
         return one.astype(float), other.astype(float)
 
     def resample(self, statistics: Sequence[Statistic], n_resamples: int) -> list[Values]:
-        """(b,) each statistic of the resamples."""
+        """Return each statistic of the resamples, (b,)."""
         most = max(len(self.one), len(self.other), len(self.values))
         block = max(1, _BLOCK // most)
         draw = _draw_once if n_resamples <= block else _draw
@@ -229,7 +229,7 @@ class _Samples:
 
 
 def _counts(draws: npt.NDArray[np.int64], places: npt.NDArray[np.int64], n_values: int) -> Values:
-    """(b, u) how often each value occurs in each of (b, n) draws from a sample of (m,) places."""
+    """Return the counts of each value in each draw (b, n) from a sample of places (m,), (b, u)."""
     counts = np.zeros((len(draws), n_values))
     count_drawn(draws, places, counts)
     return counts
@@ -239,7 +239,7 @@ _Draws = tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]
 
 
 def _draw(n: int, m: int | None, n_resamples: int, block: int) -> Iterator[_Draws]:
-    """Which of n values are in each resample, (b, n), and which of m others, in blocks; m None: the same."""
+    """Yield indices of n values in each resample, (b, n), and of m others, in blocks; m None: the same."""
     rng = np.random.default_rng(SEED)
     for first in range(0, n_resamples, block):
         b = min(block, n_resamples - first)
@@ -249,7 +249,7 @@ def _draw(n: int, m: int | None, n_resamples: int, block: int) -> Iterator[_Draw
 
 @functools.lru_cache(maxsize=2)
 def _draw_once(n: int, m: int | None, n_resamples: int, block: int) -> list[_Draws]:
-    """As `_draw`, kept for the next samples of these sizes."""
+    """Return the indices of `_draw`, cached for the next samples of these sizes."""
     return list(_draw(n, m, n_resamples, block))
 
 
@@ -308,7 +308,7 @@ def detectable_effect(n: int, *, paired: bool, alpha: float = ALPHA) -> float | 
 
 
 def _root(function: Callable[[float], float], low: float, high: float) -> float:
-    """Return the point between two bounds where a function changes its sign, by bisection, to about the last bit."""
+    """Return the point between two bounds at which a function changes its sign, by bisection, to about the last bit."""
     sign = function(low) > 0
     while low < (middle := (low + high) / 2) < high:
         if (function(middle) > 0) == sign:

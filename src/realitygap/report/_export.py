@@ -23,7 +23,7 @@ from realitygap.report._structures import structures_frame
 from realitygap.report._tally import Tally
 
 _NOTES = "figures.txt"
-"""What is in each file."""
+"""Content of each file."""
 
 
 @dataclass(frozen=True)

@@ -120,7 +120,7 @@ def _best(tally: Tally, leaders: Sequence[str], comparisons: Sequence[Comparison
 
 
 def _best_scores(tasks: Sequence[Mapping[str, Any]]) -> list[Finding]:
-    """For each task but coverage, the condition with the highest median score; nothing is compared."""
+    """Return the condition with the highest median score for each task except coverage, without a comparison."""
     findings = []
     for task in dict.fromkeys(str(row["task"]) for row in tasks):
         rows = [row for row in tasks if row["task"] == task and row["median"] is not None]
@@ -299,7 +299,7 @@ def _is_above(comparison: Comparison) -> bool:
 
 
 def _swapped(comparison: Comparison) -> Comparison:
-    """Return the same comparison the other way round."""
+    """Return the same comparison in the opposite direction."""
     interval = comparison.difference_interval
     return replace(
         comparison,

@@ -18,13 +18,13 @@ ENDINGS = (".gif", ".mp4", ".pdf", ".png", ".svg")
 """Endings of the names of pictures; `.gif` and `.mp4` only for trials, which move."""
 
 _DOTS = 200
-"""Of a PNG, per inch."""
+"""Dots per inch of a PNG."""
 
 _LETTERS = 16.5
-"""Of a caption, per inch, at most."""
+"""Maximum number of letters per inch of a caption."""
 
 _PICTURE_WIDTH = 6.4
-"""Of an arena, a robot or a network by itself [in]."""
+"""Width of the picture of one arena, robot or network [in]."""
 
 
 def check_ending(path: Path, endings: tuple[str, ...] = ENDINGS) -> str:

@@ -82,7 +82,7 @@ def _first(tally: Tally, selection: str, *, noise: float | None = None, driven: 
 
 
 def _listed(group: Structures, tally: Tally) -> dict[str, Any]:
-    """One kind of selection, for the table of structures."""
+    """Return one kind of selection, for the table of structures."""
     rows = [
         {
             "letter": chr(ord("A") + rank),

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _MOST_ACROSS = 4.4
-"""Of the square of a scatter [in]."""
+"""Maximum width of the square of a scatter [in]."""
 
 
 def draw_gap_pairs(gap: GapStudy) -> Drawing:
@@ -166,7 +166,7 @@ def draw_gap_differences(gap: GapStudy) -> Drawing:
 
 
 def _reaches(side: GapSide) -> Any:
-    """(c,) half the interval of each mean; 0 where there is one trial."""
+    """Return half the interval of each mean, (c,); 0 for one trial."""
     if side.trials < 2:
         return np.zeros(side.n)
     return float(special.stdtrit(side.trials - 1, 0.975)) * np.sqrt(side.noise)

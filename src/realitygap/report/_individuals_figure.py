@@ -268,7 +268,7 @@ def _number_ends(axes: Axes, paths: list[TracedPath], arena: Arena, *, small: bo
 
 
 def _moved_apart(ends: npt.NDArray[np.float64], least: float) -> npt.NDArray[np.float64]:
-    """(n, 2) places near the ends, in their unit, no two much nearer than `least`."""
+    """Return places near the ends, in their unit, of which no two are much nearer than `least`, (n, 2)."""
     places = ends.copy()
     angles = 2.4 * np.arange(len(ends))  # the golden angle: where many ends are one, they leave all around
     places += 0.02 * least * np.column_stack([np.cos(angles), np.sin(angles)])

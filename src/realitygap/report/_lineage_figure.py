@@ -28,13 +28,13 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _PENS = (Ink.PEN1, Ink.PEN2, Ink.PEN3, Ink.PEN5, Ink.PEN4, Ink.PEN6, Ink.PEN7, Ink.PEN0)
-"""Of species, as in the figure of species; its number stands in each dot, too."""
+"""Pens of species, as in the figure of species. The number of the species is also in each dot."""
 
 _MOST_LABELED = 12
 """Generations up to which each ancestor has its numbers, and all individuals are shown; half of it on a phone."""
 
 _MOST_ROWS = 16
-"""Individuals up to which all of a generation are shown, each at a height of its own."""
+"""Maximum number of individuals of a generation that are all shown, each at its own height."""
 
 _ORIGINS = {
     "first": "drawn at random",
@@ -214,7 +214,7 @@ def _draw(trial: ChosenTrial, rows: pl.DataFrame, ancestors: list[Ancestor], wid
 
 
 def _places(ancestors: list[Ancestor], shows_all: bool) -> dict[tuple[int, int], float]:
-    """The height of each: its number where all are shown, else near its descendants and apart from others."""
+    """Return the height of each: its number if all are shown, otherwise near its descendants and apart from others."""
     if shows_all:
         return {(each.generation, each.individual): float(each.individual) for each in ancestors}
     places: dict[tuple[int, int], float] = {}

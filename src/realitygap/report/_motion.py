@@ -37,7 +37,7 @@ _SURPLUS: dict[Each, tuple[str, ...]] = {
     "generation": ("generation", "individual"),
     "condition": ("condition", "generation", "individual"),
 }
-"""Which numbers mean nothing where several trials are shown."""
+"""Numbers that are meaningless if several trials are shown."""
 
 _MIXED = "Results and trials are given together, expected the ones or the others."
 

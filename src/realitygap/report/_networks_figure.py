@@ -31,7 +31,7 @@ _MARKS = (
 )
 
 _N_COMMON = 3
-"""Common structures drawn beside the first run's network."""
+"""Number of common structures drawn next to the first run's network."""
 
 
 def draw_networks(
@@ -90,7 +90,7 @@ def draw_network(condition: Condition, row: Mapping[str, Any], measure: str) -> 
 
 
 def _first_objective(tally: Tally) -> str:
-    """The condition that selects by coverage and has runs, of the least noise; else the first with runs."""
+    """Return the condition with runs that selects by coverage at the least noise; otherwise the first with runs."""
     with_runs = set(tally.runs["condition"])
     there = [each for each in tally.conditions if each["name"] in with_runs]
     objective = [each for each in there if settings_of(each).get("selection") == "coverage"]

@@ -62,7 +62,7 @@ LABELS = {
 """Explanations of the labels of figures."""
 
 _MOST_GAPS = 12
-"""Conditions whose missing runs are listed; of more it is said how many."""
+"""Maximum number of conditions whose missing runs are listed. Otherwise their number is reported."""
 
 
 def write_report(
@@ -376,7 +376,7 @@ def _facts(tally: Tally) -> list[tuple[str, str]]:
 
 
 def _robot_steps(tally: Tally) -> int | None:
-    """Steps of all trials together; None where a condition does not say how many a trial has."""
+    """Return the steps of all trials together; None if a condition has no number of steps."""
     total = 0
     for condition in tally.conditions:
         settings = settings_of(condition)
@@ -436,7 +436,7 @@ def _command(tally: Tally) -> dict[str, Any]:
 
 
 def _is_built_in(description: Mapping[str, Any]) -> bool:
-    """Whether these are the conditions, to the hash, of the study of this name that comes with realitygap."""
+    """Return whether the conditions equal, by hash, those of the built-in study of this name."""
     name = description.get("name")
     if name not in named_studies():
         return False

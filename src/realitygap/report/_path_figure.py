@@ -167,7 +167,7 @@ def trace_paths(
 
 
 def _driven_paths(tally: Tally, condition: Condition, rows: pl.DataFrame, column: str) -> list[TracedPath]:
-    """Trials of a robot: with the line where an emulator's witness saw it, else with their cells alone."""
+    """Return the trials of a robot: with the line if an emulator's witness recorded it, otherwise only with cells."""
     paths = []
     for (replicate,), part in rows.group_by("replicate", maintain_order=True):
         seen = driven_paths(tally.folder, condition.name, int(replicate))
@@ -301,7 +301,7 @@ def draw_path(axes: Axes, path: TracedPath, arena: Arena, body: Body) -> None:
 def _draw_track(
     axes: Axes, poses: npt.NDArray[np.float64], stalled: npt.NDArray[np.bool_], color: str
 ) -> None:
-    """One robot: its path, its end, and where it was blocked."""
+    """Draw one robot: its path, its end, and the places where it was blocked."""
     draw_points(axes, poses, color=color, linewidth=1.3, solid_joinstyle="round", zorder=5)
     blocked = np.unique(np.round(poses[stalled, :2], 6), axis=0)
     if len(blocked):

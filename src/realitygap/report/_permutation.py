@@ -23,7 +23,7 @@ SEED = 2_000
 """Seed of every random draw in a report, so that the same results give the same page."""
 
 _FINEST_UNIT = 256
-"""An arena has at most so many cells, so that each coverage is a multiple of 1/N for an N up to this."""
+"""Maximum number of cells of an arena, so that each coverage is a multiple of 1/N for an N up to this."""
 
 _ROUNDING = 1e-9
 """Sums that differ by less are equal: coverages are fractions of up to 256, held in double precision."""

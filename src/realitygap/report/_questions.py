@@ -231,7 +231,7 @@ def _variety(tally: Tally, condition: Mapping[str, Any]) -> Variety:
 
 
 def _visited(cells: pl.Series, columns: int, lines: int) -> npt.NDArray[np.bool_]:
-    """(n, c) which cells each of n behaviors visits, in the order of the paper: by x, then y."""
+    """Return the cells that each of n behaviors visits, in the paper's order: by x, then y, (n, c)."""
     visited = np.zeros((len(cells), columns * lines), np.bool_)
     # cells are numbered row by row
     row, column = np.divmod(cells.explode().drop_nulls().to_numpy().astype(np.int64), columns)
@@ -333,7 +333,7 @@ def _sum_distribution(values: npt.NDArray[np.int64], most: int, n_runs: int) -> 
 
 
 def _wins(sums: Values, below: Values, k: int) -> float:
-    """Probability that sample k is highest; where j others tie with it, it has 1 / (j + 1) of that."""
+    """Return the probability that sample k is highest. If it ties with j others, it counts 1 / (j + 1) of that."""
     # ties[j]: that j of the others so far equal k's sum, and the rest are below it
     ties = [np.ones(sums.shape[1])]
     for other in range(len(sums)):

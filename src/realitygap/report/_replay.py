@@ -44,11 +44,11 @@ class _Run:
     """The trials of one run that are embedded, ready for JSON, and what to say of it.
 
     Attributes:
-        data: what the script reads; None where no trial could be embedded.
-        n_embedded, n_trials: of the run.
-        note: what is missing and why; empty where nothing is.
+        data: Data for the script; None if no trial could be embedded.
+        n_embedded, n_trials: Number of embedded trials and of all trials of the run.
+        note: Note on what is missing and why; empty if nothing is.
         best: index of the best embedded trial by the task, the first of several alike.
-        link: address of that trial at the first step; empty where no trial could be embedded.
+        link: Address of that trial at the first step; empty if no trial could be embedded.
     """
 
     name: str
@@ -212,7 +212,7 @@ def _pack_run(tally: Tally, described: Mapping[str, Any], room: int) -> _Run:
 
 
 def _choose(rows: pl.DataFrame, most: int, column: str) -> pl.DataFrame:
-    """All rows where they fit; else the best few of each generation, of generations evenly spread if need be."""
+    """Return all rows if they fit; otherwise the best few of each generation, or of evenly spread generations."""
     if rows.height <= most:
         return rows
     generations = rows["generation"].unique().sort().to_numpy()

@@ -194,7 +194,7 @@ def _marks_of_means(means: Mapping[str, npt.NDArray[np.float64]]) -> Iterator[Se
 
 
 def _shares(rows: pl.DataFrame) -> dict[int, npt.NDArray[np.float64]]:
-    """(g,) share of each species in each generation, by the species' number."""
+    """Return the share of each species in each generation, by the species' number, (g,)."""
     numbers, species = np.unique(rows["species"].to_numpy(), return_inverse=True)
     generations = rows["generation"].to_numpy()
     counts = np.zeros((len(numbers), int(generations.max()) + 1))
@@ -228,7 +228,7 @@ def _draw_bars(
 def _draw_bands(
     axes: Axes, shares: Mapping[int, npt.NDArray[np.float64]], floors: npt.NDArray[np.float64]
 ) -> None:
-    """A band for each species, as long as it lives; the number of the larger ones where it has room."""
+    """Draw a band for each species during its life, and the number of the larger ones if it fits."""
     for index, share in enumerate(shares.values()):
         alive = np.flatnonzero(share)
         life = slice(alive[0], alive[-1] + 1)
@@ -242,7 +242,7 @@ def _draw_bands(
 def _numbers_with_room(
     axes: Axes, shares: Mapping[int, npt.NDArray[np.float64]], floors: npt.NDArray[np.float64]
 ) -> list[tuple[int, int, float]]:
-    """Species of which a number can stand where they are largest, the largest first, with its place."""
+    """Return species whose number fits at their largest size, the largest first, with the place of the number."""
     width, height = (side * 72.0 / axes.figure.dpi for side in axes.bbox.size)
     n = floors.shape[1]
     placed: list[tuple[int, int, float]] = []

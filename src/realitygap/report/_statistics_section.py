@@ -113,7 +113,7 @@ def _inputs_differ(conditions: Sequence[Mapping[str, Any]]) -> bool:
 def _selection_sentences(
     comparisons: Sequence[Comparison], conditions: Sequence[Mapping[str, Any]]
 ) -> list[str]:
-    """For each group of conditions that differ in selection alone: who is above whom, and by how much."""
+    """Return the order and the differences, in sentences, of each group of conditions that differ only in selection."""
     found = []
     by_names = {(each.one, each.other): each for each in comparisons}
     for group in same_but_for("selection", conditions):
@@ -218,7 +218,7 @@ def _trials_a_run(tally: Tally) -> str:
 
 
 def _references(key: str, conditions: Sequence[Mapping[str, Any]]) -> dict[str, str]:
-    """For each condition the first one of those that differ in `key` alone; the first itself is left out."""
+    """Return, for each condition, the first one of those that differ only in `key`; the first itself is left out."""
     return {
         str(each["name"]): str(group[0]["name"])
         for group in same_but_for(key, conditions)
@@ -334,7 +334,7 @@ def _chance(tally: Tally) -> dict[str, Any] | None:
 
 
 def _chance_sentence(tally: Tally) -> str | None:
-    """Describe how often 50 % comes out best of three levels, for objective and novelty search together."""
+    """Describe how often 50 % is the best of three levels, for objective and novelty search together."""
     by_selection = {}
     for each in chances(tally, 3):
         settings = [settings_of(tally.condition(name)) for name in each.conditions]

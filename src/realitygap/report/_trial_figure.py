@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _WIDTH = 9.6
-"""Of the figure [in]."""
+"""Width of the figure [in]."""
 
 _READINGS = ((Ink.PEN1, "solid"), (Ink.PEN0, (0, (5, 1.5))), (Ink.PEN2, (0, (1.3, 1.5))))
 

@@ -88,7 +88,7 @@ def cell_features(trace: Trace, grid: Grid) -> Floats:
 
 
 def _places(trace: Trace, grid: Grid) -> tuple[NDArray[np.int64], Floats]:
-    """(h, w) the cell of each point, -1 outside, and how far it lies from the cell's border, at most `DEEP` [m]."""
+    """Return the cell of each point, -1 outside, and its distance from the border, at most `DEEP` [m], (h, w)."""
     rows, columns = trace.own.shape
     u = (trace.box[0] + (np.arange(columns) + 0.5) * STEP - grid.x) / grid.cell
     v = (trace.box[3] - (np.arange(rows) + 0.5) * STEP - grid.y) / grid.cell

@@ -140,7 +140,7 @@ def _gray(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
 
 
 def _tag_corners(gray: NDArray[np.uint8]) -> dict[int, Floats]:
-    """(4, 2) of each of the four tags, upper left, upper right, lower right, lower left [px].
+    """Return the corners of the four tags, upper left, upper right, lower right, lower left, (4, 2) [px] each.
 
     Raises:
         SheetError: One of them is not seen.
@@ -176,7 +176,7 @@ def _first_view(here: Floats, there: Floats, width: int, height: int) -> View:
 
 
 def _fitted(view: View, here: Floats, there: Floats, lines: GridOffsets | None) -> View:
-    """The view with which tags and grid lie best where they are seen."""
+    """Return the view that fits the observed tags and grid best."""
     from scipy.optimize import least_squares
 
     width, height = view.width, view.height

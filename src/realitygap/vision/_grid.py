@@ -110,7 +110,7 @@ def grid_offsets(
 
 
 def _normals(view: View, points: Floats, along: int) -> Floats:
-    """(n, 2) across a printed line on the photograph, such that a product with pixels gives meters."""
+    """Return normals of a printed line on the photograph, whose product with pixels is in meters, (n, 2)."""
     small = 1e-4
     way, across = np.eye(2)[along], np.eye(2)[1 - along]
     line = view(points + small * way) - view(points - small * way)
@@ -122,7 +122,7 @@ def _normals(view: View, points: Floats, along: int) -> Floats:
 def _offsets(
     image: NDArray[np.uint8], view: View, middles: Floats, axis: int, reach: float, length: float
 ) -> Floats:
-    """Return the distance of a dark line from each middle along an axis [m]; nan if no line stands out."""
+    """Return the distance of a dark line from each middle along an axis [m]; nan if no line is distinct."""
     cv2 = from_extra("cv2", "vision")
     across = np.arange(-reach - 4 * STEP, reach + 4.5 * STEP, STEP)
     along = np.linspace(-0.42, 0.42, ALONG) * length
@@ -139,7 +139,7 @@ def _offsets(
 
 
 def _peak(profile: NDArray[np.float32], across: Floats, reach: float) -> float:
-    """Return the place at which a profile is darkest, between samples; nan if it does not stand out."""
+    """Return the place at which a profile is darkest, between samples; nan if it is not distinct."""
     inside = np.flatnonzero(np.abs(across) <= reach)
     best = int(inside[np.argmax(profile[inside])])
     level = float(np.median(profile))
@@ -153,7 +153,7 @@ def _peak(profile: NDArray[np.float32], across: Floats, reach: float) -> float:
 
 
 def _is_outlier(offsets: Floats) -> NDArray[np.bool_]:
-    """Which offsets are not like those around them."""
+    """Return whether offsets differ from those around them."""
     padded = np.pad(offsets, 2, constant_values=np.nan)
     around = np.lib.stride_tricks.sliding_window_view(padded, (5, 5)).reshape(*offsets.shape, 25)
     import warnings

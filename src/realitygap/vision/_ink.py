@@ -41,7 +41,7 @@ def ink_density(picture: NDArray[np.uint8], layout: SheetLayout, px_per_m: float
 
 
 def _paper(light: Floats, px_per_m: float) -> Floats:
-    """(h, w, 3) the light of bare paper: lines closed over, the edges of shadows kept.
+    """Return the light of bare paper, (h, w, 3), without lines but with the edges of shadows.
 
     Where lines lie so close that no paper is seen between them, it is taken from further away. A shadow is nearly
     gray and never black; what is colored or black is ink.
@@ -69,7 +69,7 @@ def _closed(light: Floats, size: float) -> Floats:
 
 
 def _without_print(density: Floats, layout: SheetLayout, px_per_m: float) -> Floats:
-    """The density less what the thin printed lines have, as far as they are seen."""
+    """Return the density minus that of the thin printed lines, as far as they are visible."""
     cv2 = from_extra("cv2", "vision")
     drawn = raster(layout.thin_marks(), layout.paper, px_per_m)
     drawn = cv2.GaussianBlur(cv2.dilate(drawn, np.ones((3, 3), np.uint8)), (0, 0), 0.8)

@@ -227,7 +227,7 @@ def _closing(
 
 
 def _goes_on(way: NDArray[np.int64], outward: NDArray[np.float64]) -> bool:
-    """Whether a way leaves the end of a line about in the direction in which the line came."""
+    """Return whether a path leaves the end of a line in about the direction of the line."""
     gone = way[min(LEAVING, len(way) - 1)] - way[0]
     return bool(gone @ outward >= LEAST_COSINE * np.hypot(*gone) * np.hypot(*outward))
 
@@ -293,7 +293,7 @@ def _graph(costs: Floats) -> tuple[Any, NDArray[np.int64]]:
 
 
 def _back(before: NDArray[np.int32], node: int) -> list[int]:
-    """The way from a point back to the stretch it was reached from."""
+    """Return the path from a point back to the stretch from which it was reached."""
     way = [int(node)]
     while before[way[-1]] >= 0:
         way.append(int(before[way[-1]]))

@@ -106,7 +106,7 @@ class Mixtures:
         return np.asarray((best / np.maximum(best.max(axis=1, keepdims=True), 1e-20))[self.color])
 
     def _holds(self) -> Floats:
-        """(p, s) 1 where a set holds a pen."""
+        """Return 1 for each set with a pen, (p, s)."""
         sets = ink_sets(self.n_pens)
         return np.array([[p in pens for pens in sets] for p in range(self.n_pens)], np.float32)
 
@@ -114,7 +114,7 @@ class Mixtures:
         return (slice(first, first + TOGETHER) for first in range(0, len(self.color), TOGETHER))
 
     def _shares(self, known: Floats, prior: Callable[[Floats], Floats]) -> Floats:
-        """(n, p) each ink's share of all sets, weighed by how likely they are."""
+        """Return each ink's share of all sets, weighted by likelihood, (n, p)."""
         holds = self._holds()
         found = np.empty((len(self.color), self.n_pens), np.float32)
         for part in self._parts():
@@ -125,7 +125,7 @@ class Mixtures:
 
 
 def _likelihoods(seen: Floats, inks: Floats) -> Floats:
-    """(n, s) how likely each color (n, 3) is under each set of inks."""
+    """Return the likelihood of each color (n, 3) under each set of inks, (n, s)."""
     table = []
     for pens in ink_sets(len(inks)):
         mixes = np.array(list(itertools.product(AMOUNTS[len(pens)], repeat=len(pens))))
@@ -137,12 +137,12 @@ def _likelihoods(seen: Floats, inks: Floats) -> Floats:
 
 
 def _at_edge(densities: NDArray[np.float64], share: float) -> NDArray[np.float64]:
-    """Densities (m, 3) of pixels that are covered by ink for a share, and else show paper."""
+    """Return the densities (m, 3) of pixels that ink covers in part."""
     return np.asarray(-np.log(1 - share * (1 - np.exp(-densities))))
 
 
 def _likelihood(seen: Floats, densities: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(n,) how likely colors are, as a mean over (m, 3) densities of mixed inks."""
+    """Return the likelihood of colors as a mean over densities (m, 3) of mixed inks, (n,)."""
     shown = -np.log(np.exp(-densities) + np.exp(-DARKEST) * 0.8)
     deviation = SPREAD[0] + SPREAD[1] * np.linalg.norm(shown, axis=1)
     off = ((seen[:, None, :] - shown[None].astype(np.float32)) ** 2).sum(axis=2) / deviation**2

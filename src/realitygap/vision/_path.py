@@ -51,7 +51,7 @@ def trace_path(trace: Trace, start: tuple[float, float]) -> Floats:
 
 
 def _beads(trace: Trace) -> Floats:
-    """(k, 2) points along the middle of a trace, about `SPACING` apart [m]."""
+    """Return points along the middle of a trace, about `SPACING` apart, (k, 2) [m]."""
     from scipy.spatial import cKDTree
 
     rows, columns = np.nonzero(trace.own | trace.links)
@@ -69,7 +69,7 @@ def _beads(trace: Trace) -> Floats:
 
 
 def _way_to_what_is_left(here: int, around: list[NDArray[np.int64]], left: NDArray[np.bool_]) -> list[int]:
-    """Back along the line to the next point that is left; a jump where none can be reached."""
+    """Return the path back along the line to the next remaining point; a jump if there is no path."""
     before = {here: here}
     queue = [here]
     for point in queue:

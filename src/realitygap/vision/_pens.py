@@ -165,7 +165,7 @@ def _inks(
 
 
 def _tried(density: Floats, box: Box, layout: SheetLayout, px_per_m: float) -> Floats | None:
-    """The density of a full stroke in a pen's box; None where the box is empty."""
+    """Return the density of a full stroke in a pen's box; None if the box is empty."""
     inset = 0.003
     corners = np.array([(box[0] + inset, box[3] - inset), (box[2] - inset, box[1] + inset)])
     (left, upper), (right, lower) = np.round(to_pixels(corners, layout.paper, px_per_m)).astype(int)
@@ -203,7 +203,7 @@ def _named(pen: str) -> Floats:
 
 
 def _around(presence: Floats, strength: Floats, px_per_m: float, place: Place) -> Floats:
-    """(n, p) how much of the ink around each place is each pen's."""
+    """Return each pen's share of the ink around each place, (n, p)."""
     cv2 = from_extra("cv2", "vision")
     sigma = NEAR * px_per_m / 4
     small = [
@@ -221,7 +221,7 @@ def _around(presence: Floats, strength: Floats, px_per_m: float, place: Place) -
 
 
 def _on_map(values: Floats, place: Place, shape: tuple[int, ...]) -> Floats:
-    """(p, h, w) values (n, p) at their places, 0 elsewhere."""
+    """Return values (n, p) at their places, 0 elsewhere, (p, h, w)."""
     maps = np.zeros(shape, np.float32)
     for p in range(shape[0]):
         maps[p][place] = values[:, p]

@@ -69,7 +69,7 @@ def _check_size(name: str, width: int, height: int) -> None:
 
 
 def _upright(picture: Image.Image) -> NDArray[np.uint8]:
-    """(h, w, 3) of any kind of picture: gray, 16 bits deep, for print, with a palette or see-through."""
+    """Return any kind of picture as (h, w, 3): gray, 16 bits deep, for print, with a palette or transparent."""
     from PIL import Image, ImageOps
 
     turn = picture.getexif().get(ORIENTATION, 1)

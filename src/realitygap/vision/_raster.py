@@ -59,7 +59,7 @@ def raster(marks: Iterable[Mark], box: Box, px_per_m: float) -> NDArray[np.float
 
 
 def _stroke(ends: NDArray[np.float64], width: float) -> NDArray[np.float64]:
-    """(4, 2) corners of a line as wide as this."""
+    """Return the corners of a line of this width, (4, 2)."""
     along = ends[1] - ends[0]
     length = float(np.hypot(*along))
     across = np.array([-along[1], along[0]]) * (width / 2 / length)

@@ -110,12 +110,12 @@ def corner_tags(
 
 
 def _ring(arena: Arena) -> float:
-    """The least way from the walls to the reachable cells [m]."""
+    """Return the smallest distance from the walls to the reachable cells [m]."""
     (left, lower, right, upper), grid = bounds(arena), arena.grid
     far_x, far_y = grid.x + grid.columns * grid.cell, grid.y + grid.rows * grid.cell
     return min(grid.x - left, grid.y - lower, right - far_x, upper - far_y)
 
 
 def _square(x: float, y: float, size: float) -> Floats:
-    """(4, 3) of an upright square whose lower left is at x, y."""
+    """Return the corners of an upright square whose lower left is at x, y, (4, 3)."""
     return np.array([(x, y + size, 0.0), (x + size, y + size, 0.0), (x + size, y, 0.0), (x, y, 0.0)])

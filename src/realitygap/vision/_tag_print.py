@@ -60,7 +60,7 @@ def print_tags(
 
 
 def _with_border(size: float) -> float:
-    """With white all around, an eighth of the square and more on each side."""
+    """Return the tag with white all around, an eighth of the square and more on each side."""
     return size * 4 / 3
 
 

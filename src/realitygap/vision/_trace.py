@@ -86,7 +86,7 @@ def follow_traces(maps: PenMaps, start: tuple[float, float]) -> list[Trace]:
 
 
 def _widened(trust: Floats, shape: tuple[int, ...]) -> Floats:
-    """(h, w) a trust at the maps' resolution, also of the points next to a line."""
+    """Return a trust at the maps' resolution, also for the points next to a line, (h, w)."""
     from scipy import ndimage
 
     cv2 = from_extra("cv2", "vision")
@@ -133,7 +133,7 @@ def follow_trace(maps: PenMaps, pen: int, start: tuple[float, float]) -> Trace:
 
 
 def _is_near(ends: NDArray[np.int64], shape: tuple[int, ...]) -> NDArray[np.bool_]:
-    """(h, w) what lies near an end that leads nowhere."""
+    """Return the points near an end without a link, (h, w)."""
     cv2 = from_extra("cv2", "vision")
     near = np.zeros(shape, np.uint8)
     for row, column in ends.tolist():
@@ -142,7 +142,7 @@ def _is_near(ends: NDArray[np.int64], shape: tuple[int, ...]) -> NDArray[np.bool
 
 
 def _pooled(maps: PenMaps, pen: int) -> tuple[Floats, Floats, Floats, Floats]:
-    """Presence, where it leads, how well it may be hidden, and strength of ink, at points a millimeter apart.
+    """Return presence, links, likelihood of hidden ink, and strength of ink, at points a millimeter apart.
 
     A pixel at the edge of a line has a color of its own; those in the middle of the line tell.
     """
@@ -193,7 +193,7 @@ POINTS_ACROSS = 2.2
 
 
 def _costs(presence: Floats, hidden: Floats, strength: Floats) -> Floats:
-    """Return the cost of a trace through each point, per millimeter; inf where it cannot pass."""
+    """Return the cost of a trace through each point, per millimeter; inf if it cannot pass."""
     from scipy import ndimage
 
     ink = strength > 0.5

@@ -166,7 +166,7 @@ def _split(signature: str) -> list[str]:
 
 
 class _Reader:
-    """Reads values from bytes; `base` is where the bytes begin in their message."""
+    """A reader of values from bytes; `base` is the position of the bytes in their message."""
 
     def __init__(self, data: bytes, at: int, base: int = 0) -> None:
         self._data, self._at, self._base = data, at, base

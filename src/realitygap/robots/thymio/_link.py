@@ -275,7 +275,7 @@ class Link:
         return [tuple(values[offset + k] for k in range(count)) for offset, count in spans]
 
     def _span(self, start: int, count: int) -> Span:
-        """Return offset and count of a question whose answer differs from all answers that may still come late."""
+        """Return offset and count of a question whose answer differs from all answers that may still arrive late."""
         now = time.monotonic()
         self._late = {span: asked_s for span, asked_s in self._late.items() if now - asked_s < LATE_S}
         for more in range(MOST_MORE + 1):
@@ -329,7 +329,7 @@ class Link:
             self._stop, self._guardian = stop, Guardian(descriptor, self._replace_guardian, stop)
 
     def _replace_guardian(self) -> None:
-        """Stop the motors, as nobody would now if this program were killed, and start another guardian."""
+        """Stop the motors, which would otherwise turn on if this program were killed, and start another guardian."""
         with self.lock:
             if self.is_open and self._guardian is not None:
                 self._guardian.end()

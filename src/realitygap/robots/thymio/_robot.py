@@ -73,11 +73,11 @@ class ThymioInfo:
 
 @dataclass(frozen=True)
 class _Seen:
-    """One reading of everything that a step needs.
+    """A reading of everything that a step needs.
 
     Attributes:
         values: The robot's variables.
-        own: Those of the program on board.
+        own: Values of the program on board.
     """
 
     values: dict[str, tuple[int, ...]]

@@ -55,7 +55,7 @@ class TwinCamera(ClosedOnExit):
             stack.pop_all()
 
     def _aim(self, arena: Arena) -> None:
-        """Stand where the whole arena is in view."""
+        """Move the camera so that the whole arena is in view."""
         segments = np.array(arena.segments or [(0.0, 0.0, 1.0, 1.0)])
         xs, ys = segments[:, [0, 2]], segments[:, [1, 3]]
         across, up = float(np.ptp(xs)), float(np.ptp(ys))

@@ -250,7 +250,7 @@ def _drawn(how: Range | Value, random: np.random.Generator) -> Value:
 
 
 def _put(values: dict[str, Any], path: list[str], value: Value) -> None:
-    """Put a value where its dotted name says, making tables, and lists for numbered entries."""
+    """Put a value at its dotted name, making tables, and lists for numbered entries."""
     for key, following in itertools.pairwise(path):
         values = values.setdefault(key, [0.0, 0.0] if following.isdigit() else {})
     if isinstance(values, list):

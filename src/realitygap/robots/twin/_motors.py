@@ -164,7 +164,7 @@ class Servo:
             self._wander[wheel] = keep * self._wander[wheel] + new * self._drawn.pop()
 
     def _on_patch(self, pose: Pose, side: int) -> float:
-        """Share of its speed that a wheel keeps where it stands."""
+        """Return the share of its speed that a wheel has at its place."""
         patch = self._odd.patch
         if patch is None:
             return 1.0

@@ -160,7 +160,7 @@ class TwinRobot(ProgramRobot):
         self._advance(round(seconds / STEP_S))
 
     def _advance(self, steps: int) -> None:
-        """Let steps of the physics pass, cut where the regulator ticks or a command is heard."""
+        """Advance the physics in steps that end when the regulator ticks or a command takes effect."""
         end = self._steps + steps
         while self._steps < end:
             while self._heard and self._heard[0][0] <= self._steps:

@@ -179,7 +179,7 @@ def _box(x: float, y: float, heading: float, length: float, width: float, look: 
 
 
 def _obstacle(obstacle: Obstacle, look: str) -> Iterator[str]:
-    """Its sides as boxes around its edge, and a cylinder at each rounded corner."""
+    """Add its sides as boxes around its edge, and a cylinder at each rounded corner."""
     placed = obstacle.placed
     if obstacle.radius:
         for x, y in placed:

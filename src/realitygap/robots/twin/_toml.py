@@ -43,7 +43,7 @@ def _lines(model: Settings, place: str) -> Iterator[str]:
 
 
 def _bare(model: Settings) -> Iterator[str]:
-    """The values of a further table of a list, whose meanings stand with the first."""
+    """Return the values of a further table of a list, without comments, which the first table has."""
     for key in type(model).model_fields:
         yield f"{key} = {_value(getattr(model, key))}"
 

@@ -75,7 +75,7 @@ def find_beginning(track: Track, times: Floats, commands: Floats, stalled: NDArr
 def _agreement(
     track: Track, beginnings: Floats, times: Floats, commands: Floats, which: NDArray[np.bool_]
 ) -> Floats:
-    """(b,) for each beginning."""
+    """Return the agreement for each start, (b,)."""
     poses = track.at(np.clip((beginnings[:, None] + times).ravel(), track.times[0], track.times[-1]))
     poses = poses.reshape(len(beginnings), len(times), 3)
     moved = np.diff(poses, axis=1)

@@ -128,7 +128,7 @@ def track_of(found: Sightings, camera: Camera, tag: RobotTag) -> Track:
 
 
 def _leaps(times: Floats, middles: Floats, seen: Bools) -> Bools:
-    """(t,) single sightings that are farther from both neighbors than any robot drives."""
+    """Return single sightings that are farther from both neighbors than any robot drives, (t,)."""
     rows = np.flatnonzero(seen)
     leaps = np.zeros(len(seen), np.bool_)
     if len(rows) < 3:
@@ -152,7 +152,7 @@ def _filled(times: Floats, poses: Floats, seen: Bools, size_error: float) -> Tra
 
 
 def _curve(times: Floats, poses: Floats, before: float, after: float, at: Floats) -> Floats:
-    """(n, 3) poses at times between the last sighting before a gap and the first after it."""
+    """Return poses at times between the last sighting before a gap and the first after it, (n, 3)."""
     from scipy.interpolate import CubicHermiteSpline
 
     left = (times > before - SLOPE_S) & (times <= before)
@@ -165,7 +165,7 @@ def _curve(times: Floats, poses: Floats, before: float, after: float, at: Floats
 
 
 def _slope(times: Floats, poses: Floats, otherwise: Floats) -> Floats:
-    """(3,) speed over some sightings."""
+    """Return the speed over some sightings, (3,)."""
     if len(times) < 3:
         return otherwise
     slope: Floats = np.polyfit(times - times[0], poses, 1)[0]

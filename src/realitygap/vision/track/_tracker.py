@@ -174,7 +174,7 @@ class Tracker:
         return None if found is None else found + low
 
     def _look_everywhere(self, gray: Image) -> Floats | None:
-        """In all families, until one of them has shown it often enough."""
+        """Search in all families until one of them has shown the tag often enough."""
         seen = {name: find_tags(gray, each).get(self.tag.number) for name, each in self._detectors.items()}
         for name, corners in seen.items():
             self._seen_of[name] += corners is not None

@@ -102,7 +102,7 @@ def test_a_card_of_many_bytes_leaves_medians_out(folder, monkeypatch):
     monkeypatch.setattr("realitygap.records._cards.MOST_READ_BYTES", 1)
     page = ResultsFolder.open(folder.path)._repr_html_()
     assert "polyline points" not in page
-    assert "Medians of so many runs: realitygap.summarize(folder)." in page
+    assert "Medians of these runs: realitygap.summarize(folder)." in page
 
 
 @pytest.mark.parametrize("damage", ["foreign file", "torn file", "no ledger", "no description", "no folder"])

@@ -90,7 +90,7 @@ def test_what_deviates_from_a_recording_is_said_with_the_step(tmp_path):
         robot.drive(Command(0.0, -0.25))
     robot.observe()
     with pytest.raises(
-        RobotError, match=r"In step 1, .* drove 0.0, -0.25, not 0.5, 0.0: a recorded robot can only"
+        RobotError, match=r"In step 1, .* has the command 0.0, -0.25, got 0.5, 0.0. A recorded robot can only"
     ):
         robot.drive(Command(0.5, 0.0))
     robot.stop()

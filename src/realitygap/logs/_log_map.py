@@ -26,7 +26,7 @@ Map = TypeVar("Map", bound=Settings)
 class TextFormat(Settings):
     """The notation of a text file. Each setting is found out if it is not given."""
 
-    separator: Literal["", ",", ";", "tab", "space"] = Field("", description="Between the columns.")
+    separator: Literal["", ",", ";", "tab", "space"] = Field("", description="Separator of the columns.")
     decimal: Literal["", ".", ","] = Field("", description="Mark before the fraction of a number.")
     header: bool | None = Field(None, description="True if the first line has the names of the columns.")
     names: tuple[str, ...] = Field((), description="Names of the columns, if the file has none.")
@@ -70,7 +70,7 @@ class WheelPart(Part):
 class Commands(WheelPart):
     """Commands to the robot: the speeds of both wheels, or forward speed and turn rate."""
 
-    forward: Column = Field("", description="Column of the forward speed, in place of both wheels.")
+    forward: Column = Field("", description="Column of the forward speed, instead of both wheels.")
     turn: Column = Field("", description="Column of the turn rate, positive to the left.")
     unit: str = Field(
         "m/s",
@@ -100,7 +100,7 @@ class Wheels(WheelPart):
 
     unit: str = Field(
         "m",
-        description="Unit of ways: m, cm, mm, in, ticks, rad, deg, or turn. Speeds, which are summed up, "
+        description="Unit of distances: m, cm, mm, in, ticks, rad, deg, or turn. Speeds, which are summed up, "
         "have the same with /s, or rpm.",
     )
     wraps_at: float = Field(
@@ -125,7 +125,7 @@ class Poses(Part):
     y: Column = Field(description="Column of y.")
     heading: Column = Field("", description="Column of the heading. Default: the log has none.")
     quaternion: tuple[Column, ...] = Field(
-        (), max_length=4, description="Columns x, y, z, w of the orientation, in place of the heading."
+        (), max_length=4, description="Columns x, y, z, w of the orientation, instead of the heading."
     )
     unit: str = Field("m", description="Unit of x and y: m, cm, mm, or in.")
     heading_unit: str = Field("rad", description="Unit of the heading: rad, deg, or turn.")
@@ -136,8 +136,12 @@ class Poses(Part):
         False, description="True if y points down, as in images: y and headings change sign."
     )
     heading_offset_deg: float = Field(0.0, description="Added to the heading: 90 if 0 is along +y.")
-    marker_x_mm: float = Field(0.0, description="Seen point ahead of the middle between the wheels.")
-    marker_y_mm: float = Field(0.0, description="Seen point to the left of the middle between the wheels.")
+    marker_x_mm: float = Field(
+        0.0, description="Position of the observed point ahead of the middle between the wheels."
+    )
+    marker_y_mm: float = Field(
+        0.0, description="Position of the observed point to the left of the middle between the wheels."
+    )
 
     @model_validator(mode="after")
     def _has_one_heading(self) -> Self:
@@ -171,9 +175,11 @@ class LogMap(Settings):
 
     robot: str = Field("", description="The robot that drove: a name or a file. `--base` takes precedence.")
     speed: float = Field(
-        0.0, ge=0, description="Its wheel speed at full command, in place of the robot file's [m/s]."
+        0.0, ge=0, description="Wheel speed at full command that replaces the robot file's [m/s]."
     )
-    track: float = Field(0.0, ge=0, description="Between its wheels, in place of the robot file's [m].")
+    track: float = Field(
+        0.0, ge=0, description="Distance between the wheels that replaces the robot file's [m]."
+    )
     step_s: float = Field(
         0.0, ge=0, description="Length of a step after resampling [s]. Default: the interval of the commands."
     )
@@ -190,7 +196,7 @@ class LogMap(Settings):
     text: TextFormat = TextFormat()
     commands: Commands | None = Field(None, description="Commands to the robot.")
     wheels: Wheels | None = Field(None, description="Counts of its encoders.")
-    poses: Poses | None = Field(None, description="Poses that were seen.")
+    poses: Poses | None = Field(None, description="Observed poses.")
     readings: Readings | None = Field(None, description="Readings of its range sensors.")
 
     @model_validator(mode="after")

@@ -91,7 +91,7 @@ def _folder_card(folder: PublishedResults) -> Card:
 def _conditions_table(folder: PublishedResults, read: _Read | None) -> Table:
     if read is None:
         rows = [[name, f"{folder.count_of(name):,}"] for name in folder.conditions]
-        return Table(["condition", "runs"], rows, "Medians of so many runs: realitygap.summarize(folder).")
+        return Table(["condition", "runs"], rows, "Medians of these runs: realitygap.summarize(folder).")
     lines = {name: _line(read.bests[name]) for name in folder.conditions}
     ends = [value for line in lines.values() for value in line]
     table = [

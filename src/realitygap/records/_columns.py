@@ -31,7 +31,7 @@ _GENOME = (
     Column("source", _IDS, "Node ids that the connections start from."),
     Column("target", _IDS, "Node ids that the connections lead to."),
     Column("weight", pl.List(pl.Float64()), "Weights of the connections."),
-    Column("enabled", pl.List(pl.Boolean()), "Whether each connection takes part in the network."),
+    Column("enabled", pl.List(pl.Boolean()), "True for each connection that takes part in the network."),
 )
 
 COLUMNS: tuple[Column, ...] = (
@@ -55,14 +55,14 @@ COLUMNS: tuple[Column, ...] = (
     Column(
         "coverage_line",
         pl.Float64(),
-        "Visited share of the reachable cells, along the line driven [0..1]; null where a robot drove for another task "
-        "and nobody counted.",
+        "Visited share of the reachable cells, along the driven line [0..1]; null if a robot drove for another task "
+        "and the cells were not counted.",
     ),
     Column(
         "coverage_ends",
         pl.Float64(),
-        "Visited share of the reachable cells, at the ends of steps [0..1]; null where a person scored a robot's trial "
-        "and saw the line only.",
+        "Visited share of the reachable cells, at the ends of steps [0..1]; null if a person scored a robot's trial "
+        "and saw only the line.",
     ),
     Column(
         "cells",
@@ -79,25 +79,25 @@ COLUMNS: tuple[Column, ...] = (
         "The genome.",
         fields=_GENOME,
     ),
-    Column("key", pl.UInt64(), "Key of the random numbers; with the study it gives the trial again."),
+    Column("key", pl.UInt64(), "Key of the random numbers, with which the study repeats the trial."),
 )
 
 EXTRA: tuple[Column, ...] = (
     Column(
         "drawn",
         pl.List(pl.Float64()),
-        "Of platform sim: what was drawn for the trial, in the order of the names that the study's description has as "
-        "`drawn` of the condition; empty where nothing is.",
+        "Platform sim: numbers that were drawn for the trial, in the order of the names in the study's description, "
+        "`drawn` of the condition; empty if no number is drawn.",
     ),
     Column(
         "task_fitness",
         pl.Float64(),
-        "Of another task than coverage: what the trial is worth by it, whatever selection uses.",
+        "Other tasks than coverage: score of the trial, also if selection does not use it.",
     ),
     Column(
         "behavior",
         pl.List(pl.Float64()),
-        "Of a distance that compares other things than cells: the behavior, such as the final x and y [m].",
+        "Distances that do not compare cells: the behavior, such as the final x and y [m].",
     ),
     Column(
         "partners",

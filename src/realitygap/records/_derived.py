@@ -178,9 +178,9 @@ DERIVED: Mapping[str, Derived] = {
             *_RUN_COLUMNS,
             Column("generation", _U32, "Generation within the run, from 0."),
             Column("species", _U32, "Number of the species, never used again in the run."),
-            Column("founded", _U32, "Generation in which the species arose."),
-            Column("size", _U32, "Individuals in it."),
-            Column("best", _U32, "Individual of highest fitness, the first of several alike."),
+            Column("founded", _U32, "First generation of the species."),
+            Column("size", _U32, "Number of its individuals."),
+            Column("best", _U32, "Individual of highest fitness, the first of several equal ones."),
             Column("best_fitness", pl.Float64(), "Its fitness."),
             Column("mean_fitness", pl.Float64(), "Mean fitness of the members."),
             Column(
@@ -194,16 +194,18 @@ DERIVED: Mapping[str, Derived] = {
         "one innovation number in one run",
         (
             *_RUN_COLUMNS,
-            Column("innovation", _U32, "The number."),
+            Column("innovation", _U32, "Innovation number."),
             Column("source", pl.Int32(), "Node id that the connection starts from."),
             Column("target", pl.Int32(), "Node id that it leads to."),
             Column(
-                "generation", _U32, "Generation in which it arose; 0 for those that all networks begin with."
+                "generation",
+                _U32,
+                "Generation in which it arose; 0 for the connections of all first networks.",
             ),
-            Column("individual", _U32, "First individual of that generation that carried it."),
-            Column("carriers", _U32, "Individuals that carried it, enabled or not, in all generations."),
-            Column("carriers_last", _U32, "Of these, in the last generation."),
-            Column("last_generation", _U32, "Last generation in which any carried it."),
+            Column("individual", _U32, "First individual of that generation with it."),
+            Column("carriers", _U32, "Number of individuals with it, enabled or not, in all generations."),
+            Column("carriers_last", _U32, "Number of individuals with it in the last generation."),
+            Column("last_generation", _U32, "Last generation with it."),
         ),
         (*_INDIVIDUAL, "genome"),
         _innovations,
@@ -217,10 +219,10 @@ DERIVED: Mapping[str, Derived] = {
             Column(
                 "parent_1",
                 _U32,
-                "Its parent in the generation before; null where it has none.",
+                "Its parent in the generation before; null if it has none.",
                 nullable=True,
             ),
-            Column("parent_2", _U32, "Its second parent; null where it has none.", nullable=True),
+            Column("parent_2", _U32, "Its second parent; null if it has none.", nullable=True),
             Column(
                 "origin",
                 pl.String(),
@@ -237,8 +239,8 @@ DERIVED: Mapping[str, Derived] = {
             Column(
                 "to_champion",
                 pl.Boolean(),
-                "Whether it is the run's champion (highest coverage_line, the first of several alike) or an ancestor "
-                "of it.",
+                "True for the run's champion (highest coverage_line, the first of several equal ones) and its "
+                "ancestors.",
             ),
         ),
         (*_INDIVIDUAL, "species", "parents", "fitness", "coverage_line", "coverage_ends", "genome"),

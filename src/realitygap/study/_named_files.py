@@ -40,7 +40,7 @@ def _read_task(task: dict[str, Any], folder: Path, problems: Problems) -> None:
     if task.pop("source", None) is not None:
         problems.add(
             "task.source",
-            "code in a study file is not run. Put it into a Python file beside the study file, and name that: "
+            "code in a study file is not run. Put it into a Python file next to the study file, and name that: "
             'kind = "python:FILE.py:FUNCTION".',
         )
     kind = task.get("kind")

@@ -29,21 +29,21 @@ class StudySection(Settings):
     name: str = Field(
         pattern=NAME_PATTERN,
         max_length=80,
-        description="Letters, digits, dot, dash, underscore; names the folder.",
+        description="Name of the study and of its folder: letters, digits, dot, dash, and underscore.",
     )
     title: Line = Field("", max_length=200, description="Title of the report. Default: the name.")
     note: Line = Field("", max_length=500, description="Remark, shown in the summary.")
-    seed: int = Field(1, ge=0, le=2**63 - 1, description="All random numbers follow from it.")
+    seed: int = Field(1, ge=0, le=2**63 - 1, description="Seed of all random numbers.")
     replicates: int = Field(
         100,
         ge=1,
         le=1_000_000_000,
-        description="Runs per condition. Increase it to extend an existing study.",
+        description="Number of runs per condition. Increase it to extend an existing study.",
     )
     pair: bool = Field(
         True,
-        description="Conditions draw the same random numbers where that makes sense, which narrows the difference "
-        "between them; false draws them apart.",
+        description="Use the same random numbers for all conditions, if possible. This narrows the intervals of their "
+        "differences. false: each condition has its own.",
     )
 
 
@@ -82,7 +82,8 @@ class TrialsSection(Settings):
         ["black", "red", "blue", "green", "orange", "purple", "brown", "pink"],
         min_length=1,
         max_length=64,
-        description="Colors to draw with, one a trial; as many trials share a sheet of paper (section 2.1: eight).",
+        description="Pens by color, one for each trial on a sheet of paper. Their number is that of the trials on a "
+        "sheet (section 2.1: eight).",
     )
 
 
@@ -93,7 +94,7 @@ class ConditionNotes(Settings):
         None, description="Published values of the best coverage of a run, shown next to ours."
     )
     published_source: Line | None = Field(None, max_length=200, description="Source of these values.")
-    baseline: str | None = Field(None, description="The condition that this one is compared with.")
+    baseline: str | None = Field(None, description="Condition with which this one is compared.")
     change: Line | None = Field(
         None, max_length=200, description="Difference from the baseline, in a few words."
     )

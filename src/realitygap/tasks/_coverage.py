@@ -26,18 +26,18 @@ class CoverageTask(Settings):
 
     cells: Literal["line", "ends"] = Field(
         "line",
-        description="Which cells selection counts: those that the line travelled crosses, or those in which "
-        "steps end. The paper leaves it open; a full-speed step (0.1 m) is longer than a cell (0.0762 m). "
-        "Both are recorded always, and the start counts for both.",
+        description="Cells that selection counts. line: cells that the robot's line crosses. ends: cells in which a "
+        "step ends. The paper leaves it open; a full-speed step (0.1 m) is longer than a cell (0.0762 m). Both are "
+        "always recorded, and the start counts for both.",
     )
     bias_input: Literal["with-novelty", "always", "never"] = Field(
         "with-novelty",
-        description="When the network has a fourth, constant input. The paper (section 2.1): with novelty.",
+        description="Conditions whose networks have a fourth, constant input. The paper (section 2.1): with novelty.",
     )
     time_input: Literal["from-0"] = Field(
         "from-0",
-        description="The third input is step / steps, 0 at the first step. The paper says only 'a measure "
-        "of time'; no alternative is offered.",
+        description="Third input of networks: step / steps, 0 at the first step. The paper states only 'a measure of "
+        "time'. There is no alternative.",
     )
 
     inputs: Inputs = Field(

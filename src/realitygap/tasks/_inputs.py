@@ -20,7 +20,7 @@ Inputs = Annotated[
     Field(
         min_length=1,
         max_length=256,
-        description="Older name of controller.inputs: what networks see, in order.",
+        description="Older name of controller.inputs: the inputs of networks, in order.",
     ),
 ]
 """Names of inputs, in order."""
@@ -35,12 +35,12 @@ class ControllerSettings(Settings):
         description="Names of the inputs of networks, in order: obstacle (the largest range reading), stall, time, "
         + "".join(f"{kind}.K, " for kind in SENSORS)
         + "encoder.K, goal_sector.K, goal_distance, last_move, last_turn. The "
-        "constant input is bias, the last one. The robot and the arena must have them. None: those of the task.",
+        "constant input is bias, the last one. The robot and the arena must have them. Empty: those of the task.",
     )
     outputs: Annotated[tuple[str, ...], BeforeValidator(_as_tuple)] = Field(
         ("move", "turn"),
-        description="Outputs of networks, each -1..1: move and turn, or the wheel speeds left and right. Of wheel "
-        "speeds, half the sum is the move, and half of right less left is the turn.",
+        description="Outputs of networks, each -1..1: move and turn, or the wheel speeds left and right. With wheel "
+        "speeds, move = (left + right) / 2 and turn = (right - left) / 2.",
     )
 
     @model_validator(mode="after")

@@ -29,12 +29,14 @@ class Distribution(Settings):
         ValueError: No kind or more than one, ends in the wrong order, or a limit that leaves nothing.
     """
 
-    uniform: Pair | None = Field(None, description="Between two numbers, each as likely.")
+    uniform: Pair | None = Field(None, description="Minimum and maximum of a uniform distribution.")
     normal: Pair | None = Field(None, description="Mean and standard deviation.")
     log_uniform: Pair | None = Field(
-        None, description="Between two numbers above 0, each ratio as likely: their logarithm is uniform."
+        None, description="Minimum and maximum above 0 of a distribution whose logarithm is uniform."
     )
-    choice: tuple[float, ...] | None = Field(None, description="One of these, each as likely.")
+    choice: tuple[float, ...] | None = Field(
+        None, description="Numbers of which one is drawn, all with the same probability."
+    )
     per: Literal["trial", "run", "study"] = Field(
         "trial", description="Scope of each sample: one trial, one run, or the whole study."
     )
@@ -43,8 +45,8 @@ class Distribution(Settings):
     together: str = Field(
         "",
         max_length=80,
-        description="Numbers with the same word here are drawn by the same random number: choices of one length row by "
-        "row.",
+        description="Word that joins numbers: those with the same word use the same random number. Choices of one "
+        "length are then drawn row by row.",
     )
 
     @model_validator(mode="after")

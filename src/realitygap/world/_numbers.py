@@ -76,7 +76,7 @@ class Described(Settings):
 
     vary: dict[str, Distribution] = Field(
         default_factory=dict,
-        description="Which numbers are drawn, by dotted name; a file writes the distribution in the number's place.",
+        description="Distributions of the numbers that are drawn, by dotted name. A file has them instead of numbers.",
         json_schema_extra={"hidden": True},
     )
 

@@ -34,7 +34,7 @@ class Contact(Settings):
         "and does not slide. `slide`: it skids and turns along the obstacle.",
     )
     friction: NotNegative = Field(
-        0.3, description="Between body and wall: mu, the tangent of the friction angle."
+        0.3, description="Friction coefficient mu between body and wall, the tangent of the friction angle."
     )
     long: Positive = Field(1.0, description="Mobility along the heading when pushed, relative to `lat`.")
     lat: Positive = Field(1.0, description="Mobility sideways when pushed, against the grip of the wheels.")

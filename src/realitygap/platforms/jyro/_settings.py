@@ -49,14 +49,14 @@ class JyroSettings(SimulatedPlatform):
     )
     noisy_reading: Literal["leave", "clip"] = Field(
         "leave",
-        description="After adding noise: leave the reading as it is, or limit it to 0..1. The paper limits it "
-        "before adding noise and does not say what happens after.",
+        description="Treatment of a reading after noise is added: leave it, or clip it to 0..1. The paper limits it "
+        "before adding noise and does not state what happens after.",
     )
 
     precision: Literal["single", "double"] = Field(
         "single",
-        description="Precision of the arithmetic of trials: 32 or 64 bits. Single is about a third faster; "
-        "rounding changes what one in several hundred trials visits.",
+        description="Precision of the arithmetic of trials: 32 or 64 bits. Single is about a third faster. "
+        "Rounding changes the visited cells of one in several hundred trials.",
     )
 
     @property

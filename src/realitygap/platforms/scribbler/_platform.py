@@ -49,8 +49,8 @@ class ScribblerPlatform(PortPlatform):
     )
     forwardness: Literal["fluke", "scribbler"] = Field(
         "fluke",
-        description="Which end goes ahead, where there is a Fluke: the one with it, to which its obstacle sensors "
-        "look, or the other.",
+        description="End that is ahead on a robot with a Fluke: the end with the Fluke, to which its obstacle sensors "
+        "point, or the other one.",
     )
 
     @classmethod

@@ -129,29 +129,29 @@ class SimSettings(SimulatedPlatform):
 
     robot: Annotated[RobotModel, BeforeValidator(_as_robot)] = Field(
         default_factory=lambda: _named_robot(DEFAULT_ROBOT),
-        description="A robot by name (`realitygap show robot`), the file of one, or a calibration, the robot with the "
-        f"numbers that were fitted; {DEFAULT_ROBOT} when not given. Results store its whole content.",
+        description="Robot by name (`realitygap show robot`), robot file, or calibration, which is a robot with fitted "
+        f"numbers. Default: {DEFAULT_ROBOT}. Results store its whole content.",
     )
     steps: int = Field(
         100, ge=1, le=100_000, description="Steps of a trial: commands (section 2.2, the paper's robot: 100)."
     )
     step_s: float = Field(
-        0.0, ge=0, le=60, description="Duration of a command [s]; 0: as the robot file has it."
+        0.0, ge=0, le=60, description="Duration of a command [s]; 0: that of the robot file."
     )
     contact: Literal["robot", "freeze", "stop", "slide"] = Field(
         "robot",
-        description="Contact with walls. robot: as the robot file has it. freeze: as in Jyro. stop: the robot turns if "
+        description="Contact with walls. robot: that of the robot file. freeze: as in Jyro. stop: the robot turns if "
         "its body allows. slide: it skids and turns along walls.",
     )
     noise: bool = Field(
         True,
-        description="Noise of sensors and motors, as the robot file has it. A condition's own noise, the paper's a, is "
+        description="Use the noise of sensors and motors in the robot file. A condition's own noise, the paper's a, is "
         "added to it.",
     )
     noisy_reading: Literal["leave", "clip"] = Field(
         "leave",
-        description="After adding the paper's noise: leave the reading as it is, or limit it to 0..1. It concerns "
-        "sensors with a linear response.",
+        description="Treatment of a reading after the paper's noise is added: leave it, or clip it to 0..1. It applies "
+        "to sensors with a linear response.",
     )
     set: dict[str, float | Distribution] = Field(
         default_factory=dict,
@@ -173,7 +173,7 @@ class SimSettings(SimulatedPlatform):
     )
     draws: dict[str, tuple[float, ...]] = Field(
         default_factory=dict,
-        description="The draws of the calibration, by dotted name, so that results need no file.",
+        description="Draws of the calibration, by dotted name, so that results need no file.",
         json_schema_extra={"hidden": True},
         repr=False,
     )

@@ -55,7 +55,7 @@ class TwinPlatform(Platform):
         *("encoder.0", "encoder.1"),
     )
 
-    file: str = Field("", description="The twin's file, as `realitygap twin sample` writes one.")
+    file: str = Field("", description="File of the twin, such as one that `realitygap twin sample` writes.")
     sha256: str = Field(
         "",
         pattern="^([0-9a-f]{64})?$",

@@ -416,16 +416,16 @@ def distances() -> str:
 
 # choices
 
-# What the paper leaves open; what we do; the alternatives, each with the conditions of `paper-choices` that try it.
+# Choices that the paper leaves open, ours, and the alternatives with the conditions of `paper-choices` that try them.
 CHOICES: list[tuple[str, str, str, list[tuple[str, list[str]]]]] = [
     (
-        "What comes out of the network",
+        "Output of the network",
         "“a direction for the robot composed of a move and a turn”",
         '`neat.activation = "tanh"`: −1 to 1',
         [('`"sigmoid"`: 0 to 1, which can neither reverse nor turn right', ["coverage-sigmoid"])],
     ),
     (
-        "Where trials begin",
+        "Start of trials",
         "“the same initial point for every path”",
         '`arena.start = "corner"`: the center of cell (1, 1), facing along the long side',
         [
@@ -434,20 +434,20 @@ CHOICES: list[tuple[str, str, str, list[tuple[str, list[str]]]]] = [
         ],
     ),
     (
-        "Which cells count as visited",
+        "Visited cells",
         "squares that the path “crosses through”; a full-speed step is longer than a cell",
         '`task.cells = "line"`: all cells that the line crosses',
         [('`"ends"`: the cells in which steps end', ["coverage-cells-ends", "novelty-cells-ends"])],
     ),
     (
-        "Where the sensors sit",
+        "Position of the sensors",
         "three sensors on the front, facing straight ahead",
         "`jyro.sensor_offset = 0.05`: 0.05 m apart, on the front edge",
         [("`0.02`", ["coverage-sensors-near"]), ("`0.08`", ["coverage-sensors-wide"])],
     ),
     (
         "A reading after noise was added",
-        "limited to 1 before; nothing is said of after",
+        "limited to 1 before; not stated for after",
         '`jyro.noisy_reading = "leave"`',
         [('`"clip"`: limited to 0..1', ["coverage-clip"])],
     ),
@@ -480,7 +480,7 @@ CHOICES: list[tuple[str, str, str, list[tuple[str, list[str]]]]] = [
         [],
     ),
     (
-        "Which NEAT",
+        "Version of NEAT",
         "“Kenneth O. Stanley's Python implementation”; Table 1 uses an old neat-python's words",
         '`neat.settings = "rosenzweig-remy"`: the published NEAT with Table 1 on top',
         [('`"rosenzweig-remy-neat-python"`: a bias in every node, its slope', ["coverage-neat-python"])],
@@ -492,13 +492,13 @@ CHOICES: list[tuple[str, str, str, list[tuple[str, list[str]]]]] = [
         [("`3.0`", ["coverage-weights-wide"]), ("`0.3`", ["coverage-weights-narrow"])],
     ),
     (
-        "How far weights move",
+        "Step of weights",
         "not given",
         "`neat.weight_step = 2.5`",
         [("`0.5`", ["coverage-steps-small"])],
     ),
     (
-        "Weights drawn anew",
+        "Replaced weights",
         "not given",
         "`neat.replace_weight = 0.1`",
         [("`0.0`", ["coverage-replace-none"])],
@@ -516,7 +516,7 @@ CHOICES: list[tuple[str, str, str, list[tuple[str, list[str]]]]] = [
         [("`4`", ["novelty-archive-4"]), ("`20`", ["novelty-archive-20"])],
     ),
     (
-        "Who enters the full archive",
+        "Condition to enter the full archive",
         "a behavior “more novel than the other behaviors in the archive”",
         '`novelty.enter = "above-all"`',
         [('`"above-least"`: above the least novel', ["novelty-least"])],
@@ -534,7 +534,7 @@ CHOICES: list[tuple[str, str, str, list[tuple[str, list[str]]]]] = [
         [('`"lehman-stanley"`: the nearest in population and archive', ["novelty-nearest"])],
     ),
     (
-        "What Figure 4 shows at a generation",
+        "Value of a generation in Figure 4",
         "not given",
         '`report.points = "best-of-generation"`',
         [('`"best-so-far"`; changes the figure and no result', [])],

@@ -1,8 +1,8 @@
 """One network, a hundred Scribblers.
 
-No two robots are alike. Track, wheels, drift and delay of each are drawn anew, as `[platform.sim.set]` in a study file
-says it, and one network drives them all; beside it a hundred trials of one robot, whose sensors and motors are noisy.
-Of two hundred random networks, it is the one that comes farthest without noise.
+No two robots are alike. Track, wheels, drift, and delay of each are drawn separately, as with `[platform.sim.set]` in a
+study file. One network drives them all. The other picture shows a hundred trials of one robot, whose sensors and motors
+are noisy. The network is the one of two hundred random networks that drives farthest without noise.
 """
 
 import sys

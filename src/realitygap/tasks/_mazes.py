@@ -15,19 +15,19 @@ UNIT = 0.01
 class MazeAgent:
     """The disc that drives in the mazes; lengths [m], angles [rad], both speeds per step.
 
-    In a step its two outputs, each less one half, are added to the turning and, in `push`, to the speed. It moves
-    along the heading from before and then turns; a move that would end nearer to a wall than its radius is
-    refused as a whole, and the turn is kept.
+    In a step, its two outputs, each minus one half, change the turn rate and the speed, in units of `twist` and `push`.
+    It moves along the previous heading and then turns. A move that would end nearer to a wall than its radius is
+    refused as a whole, but the turn takes place.
 
     Attributes:
         steps: Number of steps.
         radius: Radius of the disc.
-        rays: Directions of its range finders from ahead, which look out of its center [rad].
+        rays: Directions of its range finders relative to its heading, from its center [rad].
         reach: Reach of the range finders. Their reading is the distance divided by the reach.
-        push: Speed gained in a step for each whole that its second output is above one half.
-        top_speed: Forward or backward.
-        twist: Change of the turn rate in a step by its first output.
-        top_spin: Left or right.
+        push: Change of the speed in a step per unit that its second output is above one half.
+        top_speed: Maximum speed, forward or backward.
+        twist: Change of the turn rate in a step per unit that its first output is above one half.
+        top_spin: Maximum turn rate, left or right.
 
     Source: Lehman & Stanley (2011), section 4; numbers as in public re-implementations.
     """

@@ -1,13 +1,13 @@
 """The physics of a push: the motion of bodies that touch something and give way, in lanes.
 
-At the deepest two contacts the wall pushes along its normal n and rubs along its tangent t; the body gives way along
-A * wrench, until it is free. While its wheels grip the more the more they slip, A = diag(long, lat, ang) in the frame
-of its axle. Where their grip gives out, each wheel is half of that by the secant to its grip, and A is of both
-together: a robot turns about the wheel that still holds.
+At the deepest two contacts, the wall pushes along its normal n and rubs along its tangent t. The body moves by
+A * wrench until it is free. If the grip of its wheels is proportional to their slip, A = diag(long, lat, ang) in the
+frame of its axle. If the grip saturates, each wheel contributes half of A with the secant to its own grip. So a robot
+turns about the wheel with the better grip.
 
 Source: the wrench n - mu * sign(slip) * t, and A, of quasi-static pushing; secants, which lead to the motion of least
-dissipation, as iteratively reweighted least squares (Weiszfeld 1937). Differs: friction holds the contact point where
-less than mu times the normal push is enough for that (Coulomb); a full push against the slip would drag the body back.
+dissipation, as iteratively reweighted least squares (Weiszfeld 1937). Differs: friction holds the contact point if
+less than mu times the normal push is enough for that (Coulomb). A full push against the slip would drag the body back.
 """
 
 from __future__ import annotations
@@ -33,9 +33,9 @@ def _held_up(deep, slip, friction, nn, tt, nt):
     """Return the push and the rub of a contact that free it of `deep`, and of `slip` as far as friction can.
 
     Args:
-        deep, slip: What the body is to be moved along the normal, and has slipped along the tangent [m].
-        friction: Coefficient.
-        nn, tt, nt: What a body gives along the normal and tangent by a wrench of 1 of either.
+        deep, slip: Distance to move along the normal, and distance slipped along the tangent [m].
+        friction: Coefficient of friction.
+        nn, tt, nt: Motion of the body by unit forces, as `_gives` returns it.
     """
     real = type(deep)
     # Friction holds it: no slip is left. Both are divided by `whole` later.
@@ -57,12 +57,12 @@ def _held_up(deep, slip, friction, nn, tt, nt):
 
 @inlined
 def _gives(along, across, around, both, a, b, turn_n, turn_t):
-    """Return a body's motion along a contact's normal by it, along its tangent by that, and along either by the other.
+    """Return a body's motion by unit forces: normal by a normal one, tangential by a tangential one, and mixed.
 
     Args:
-        along, across, around, both: Motion by a force of 1 ahead and by one to the left, turn by a torque of 1 and by
-            that force ahead.
-        a, b: Normal.
+        along, across, around, both: Motion by a force of 1 ahead and by one to the left, turn by a torque of 1, and
+            turn by the force ahead.
+        a, b: Normal of the contact.
         turn_n, turn_t: Torques of normal and tangent.
     """
     real = type(a)
@@ -80,7 +80,7 @@ def _moves(along, across, around, both, ahead, aside, torque):
 
 @inlined
 def _between(angle):
-    """An angle, as far as `sin_cos_of_small` goes."""
+    """Return an angle limited to +-MOST_TURN, which is in the range of `sin_cos_of_small`."""
     real = type(angle)
     most = real(MOST_TURN)
     angle = angle if angle < most else most
@@ -89,7 +89,7 @@ def _between(angle):
 
 @stage
 def unsaturated(p, row, give):
-    """Compute a body's give while its wheels' grip grows with slip: along, across, around, and around by along."""
+    """Compute a body's give if its wheels' grip is proportional to slip: along, across, around, and around by along."""
     long, lat, ang = p[row + LONG], p[row + LAT], p[row + ANG]
     along, across, around, both = give[0], give[1], give[2], give[3]
     real = both.dtype.type
@@ -102,17 +102,17 @@ def unsaturated(p, row, give):
 
 @stage
 def saturated(p, row, seconds, parts, moved, give):
-    """Compute the give with wheels that slipped as far as a push moved them: the more each slips, the less it holds.
+    """Compute the give of bodies whose wheels slipped as far as a push moved them: more slip means less grip.
 
-    A wheel's grip is slip / sqrt(1 + (saturation * speed of slip) ** 2), slip to the side counting sqrt(long / lat)
-    times, as it does where nothing gives out; here it is the secant to the slip that there was, which makes the slip
-    that there will be the least dissipation's if it is done again and again.
+    A wheel's grip is slip / sqrt(1 + (saturation * speed of slip) ** 2). Slip to the side counts sqrt(long / lat)
+    times, as it does without saturation. The function uses the secant to the previous slip. Repeated calls lead to the
+    slip of least dissipation.
 
     Args:
-        p, row: Numbers of the robots, and the first of contact.
-        seconds, parts: (LANES,) how long the motion lasts that is carried out in so many parts [s].
-        moved: Of `give_way`.
-        give: As of `unsaturated`; written.
+        p, row: Numbers of the robots, and the first row of contact.
+        seconds, parts: (LANES,) duration of the motion [s], and number of its parts.
+        moved: Result of `give_way`.
+        give: Written, in the form of `unsaturated`.
     """
     long, lat, ang, saturation = p[row + LONG], p[row + LAT], p[row + ANG], p[row + SATURATION]
     go_x, go_y, spin = moved[0], moved[1], moved[2]
@@ -139,7 +139,7 @@ def saturated(p, row, seconds, parts, moved, give):
 
 @stage
 def _turn_alone(first, friction, give, pose, before, spins):
-    """The turn by the deepest contact alone, with bodies halfway through their free motion [rad]."""
+    """Compute the turn by the deepest contact alone, with bodies halfway through their free motion [rad]."""
     x, y, heading, sine, cosine = pose.x, pose.y, pose.heading, pose.sine, pose.cosine
     old_x, old_y, old_heading = before.x, before.y, before.heading
     gap, facing, beside, corner_x, corner_y, rounding = first
@@ -169,14 +169,14 @@ def _turn_alone(first, friction, give, pose, before, spins):
 
 @stage
 def _stand_halfway(pose, before, spins, half_sine, half_cosine, halfway):
-    """Bodies halfway through their motion with the push of `_turn_alone`.
+    """Compute headings and motion of bodies halfway through their motion with the push of `_turn_alone`.
 
     Args:
-        pose, before: Of `give_way`.
-        spins: Of `_turn_alone`.
-        half_sine, half_cosine: Written: of the heading halfway.
-        halfway: (5, LANES) written: sine and cosine of the turn to there; the motion along and across [m], and around
-            [rad].
+        pose, before: Arguments of `give_way`.
+        spins: Result of `_turn_alone`.
+        half_sine, half_cosine: Written: sine and cosine of the heading halfway.
+        halfway: (5, LANES) written: sine and cosine of the turn to there; the free motion along and across [m], and
+            around [rad], in the frame halfway.
     """
     x, y, heading, sine, cosine = pose.x, pose.y, pose.heading, pose.sine, pose.cosine
     old_x, old_y, old_heading = before.x, before.y, before.heading
@@ -200,12 +200,12 @@ def _stand_halfway(pose, before, spins, half_sine, half_cosine, halfway):
 
 @stage
 def _see_halfway(contact, give, halfway, held):
-    """A contact with bodies as `_stand_halfway` has them.
+    """Compute the values of a contact with bodies at the poses of `_stand_halfway`.
 
     Args:
-        contact, give: Of `give_way`.
-        halfway: Of `_stand_halfway`.
-        held: (8, LANES) written: normal; torques of normal and tangent; what the body gives; slip.
+        contact, give: Arguments of `give_way`.
+        halfway: Result of `_stand_halfway`.
+        held: (8, LANES) written: normal; torques of normal and tangent; result of `_gives`; slip.
     """
     facing, beside, corner_x, corner_y, rounding = contact[1:]
     along, across, around, both = give[0], give[1], give[2], give[3]
@@ -233,12 +233,12 @@ def _see_halfway(contact, give, halfway, held):
 
 @stage
 def _push_by(gap, friction, give, held, go_x, go_y, spin, next_x, next_y, next_spin):
-    """The motion by one contact, given that by the other one.
+    """Compute the motion by one contact, given the motion by the other one.
 
     Args:
-        gap: Of the contact.
-        friction, give: Of `give_way`.
-        held: Of `_see_halfway`.
+        gap: Gap of the contact.
+        friction, give: Arguments of `give_way`.
+        held: Result of `_see_halfway`.
         go_x, go_y, spin: Motion by the other contact: along and across [m], around [rad].
         next_x, next_y, next_spin: Written: motion by this one.
     """
@@ -269,7 +269,7 @@ def _push_by(gap, friction, give, held, go_x, go_y, spin, next_x, next_y, next_s
 
 @stage
 def _move_by_both(gap, go_x, go_y, spin, next_x, next_y, next_spin, to_x, to_y, to_spin):
-    """The motion by both contacts in lanes in which the deepest one touches."""
+    """Add the motions by both contacts, limited to a turn of MOST_TURN; 0 in lanes whose deepest one does not touch."""
     real = gap.dtype.type
     for k in range(LANES):
         turn = spin[k] + next_spin[k]
@@ -285,16 +285,16 @@ def _move_by_both(gap, go_x, go_y, spin, next_x, next_y, next_spin, to_x, to_y, 
 def give_way(first, second, friction, give, pose, before, pushes, moved):
     """Compute the push that frees touching bodies at their deepest two contacts, in the frames of their axles.
 
-    What the contacts push depends on how the body is turned meanwhile: it is worked out as it stands halfway, which
-    a push by the deepest contact alone foretells. The two are then worked out in turn, each with what the other does.
-    There are several short loops: a processor overlaps vectors of a loop only if its body is short.
+    The pushes depend on the turn of the body during the motion. So they are computed at the pose halfway, which is
+    estimated with a push by the deepest contact alone. Then the two are computed in turn, each with the motion by the
+    other. There are several short loops, because a processor overlaps vectors of a loop only if its body is short.
 
     Args:
-        first, second: Contacts.
-        friction: Coefficient.
-        give: (4, LANES) of `unsaturated` or `saturated`.
-        pose, before: Now, and before the motion.
-        pushes: (28, LANES) room.
+        first, second: The deepest two contacts.
+        friction: Coefficient of friction.
+        give: (4, LANES) result of `unsaturated` or `saturated`.
+        pose, before: Pose after and before the free motion.
+        pushes: (28, LANES) working memory.
         moved: (5, LANES) written: along and across [m], around [rad], sine and cosine of the heading halfway.
     """
     real = first.gap.dtype.type

@@ -112,7 +112,7 @@ def mixture_words(sensors):
 
 
 def make_senses(shape, dtype):
-    """Room for the senses of a block of trials in a precision."""
+    """Return memory for the senses of a block of trials in a precision."""
     s = shape.row_range.size
     pulses = int(shape.range_pulses.max(initial=0))
     words = max(
@@ -178,7 +178,7 @@ def _start_range(shape, p, senses):
 
 @kernel
 def start_senses(shape, rules, lanes):
-    """Make the senses of a block ready, robots at their starts and their numbers in `lanes.p`."""
+    """Prepare the senses of a block, with robots at their starts and their numbers in `lanes.p`."""
     real = lanes.low.dtype.type
     p, senses = lanes.p, lanes.senses
     _start_range(shape, p, senses)
@@ -236,7 +236,7 @@ def _respond(shape, lanes, senses):
 
 @stage
 def _mix(shape, key, lanes, senses, step):
-    """Gain noise, dropouts and outliers. Three sensors share a block of four words."""
+    """Apply gain noise, compression, dropouts, and outliers. Three sensors share a block of four words."""
     p, words, value, n = lanes.p, senses.words, senses.value, shape.row_range.size
     seen_from = senses.dim if senses.slanted[0] > 0 else senses.near
     draw_words_of(PURPOSE_RANGE, step, mixture_words(n), lanes.counters, key, words)
@@ -261,7 +261,7 @@ def _mix(shape, key, lanes, senses, step):
 
 @stage
 def _count_all_pulses(shape, key, lanes, senses, step):
-    """Sensor k takes its words from reading step * sensors + k of the stream."""
+    """Count pulses. Sensor k takes its words from reading step * sensors + k of the stream."""
     p, spare, n = lanes.p, senses.spare, shape.row_range.size
     seen_from = senses.dim if senses.slanted[0] > 0 else senses.near
     for s in range(n):
@@ -346,11 +346,11 @@ def _sense_bumps(shape, lanes, senses, first):
 
 @stage
 def answer(shape, rules, key, lanes, step):
-    """Write what the sensors answer into `lanes.readings`: range, light, line and bump sensors in turn.
+    """Write the readings into `lanes.readings`: range, light, line and bump sensors in turn.
 
     Args:
-        shape, rules, key: Structure, how trials are run, and of the random numbers.
-        lanes: `distances` along the rays, poses, and the numbers of each trial are read.
+        shape, rules, key: Structure, rules of the trials, and key of the random numbers.
+        lanes: Block; `distances` along the rays, poses, and the numbers of each trial are read.
         step: Number of the reading: 0 at the start, k after k commands.
     """
     senses = lanes.senses
@@ -375,10 +375,10 @@ def _tell(said, stalled, n_stalls):
 
 @stage
 def feel_motion(shape, rules, key, lanes, step):
-    """Update, after a command has ended, the encoders' counts, and on an S2 the stall sensor.
+    """Update the encoders' counts and pose after a command, and on an S2 the stall sensor.
 
     Args:
-        shape, rules, key, lanes: As in `answer`; `wheels` and `pose` are read, `stalled` is changed.
+        shape, rules, key, lanes: Arguments of `answer`; `wheels` and `pose` are read, `stalled` is changed.
         step: Number of the command, from 0 on.
     """
     p, senses, words = lanes.p, lanes.senses, lanes.senses.words

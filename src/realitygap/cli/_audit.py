@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from realitygap.report import Audit, AuditProgress
 
 MANY_RUNS = 1000
-"""From so many on an audit takes longer than a breath, and says how far it is."""
+"""Number of runs from which an audit takes seconds and reports its progress."""
 
 
 def audit_results(

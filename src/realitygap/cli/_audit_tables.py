@@ -16,7 +16,7 @@ _PROBLEMS = {"impossible": "no k/{n}", "cut": "cut, not rounded", "raised": "rai
 
 
 def conditions_table(audit: Audit, title: str) -> Table:
-    """One row a condition."""
+    """Return a table with a row for each condition."""
     table = table_of(title)
     _columns(table, ["condition"], ["runs", "mean", "sd", "median", "its 95 % interval"])
     for each in audit.conditions:
@@ -33,7 +33,7 @@ def conditions_table(audit: Audit, title: str) -> Table:
 
 
 def doubtful_table(audit: Audit) -> Table:
-    """One row a value that is not the rounded share that it should be."""
+    """Return a table with a row for each value that is not the rounded share that it should be."""
     n = audit.denominator or 1
     table = table_of(f"Values that are not k/{n}, rounded")
     _columns(table, ["line", "condition", "run", "value", "problem", "nearest"], [])
@@ -52,7 +52,7 @@ def doubtful_table(audit: Audit) -> Table:
 
 
 def pairs_table(audit: Audit) -> Table:
-    """One row for each two conditions."""
+    """Return a table with a row for each pair of conditions."""
     table = table_of(
         "Each two conditions",
         "A12: how likely a run of the first is above one of the second, [95 % interval]; p by permutation, "

@@ -1,4 +1,4 @@
-"""The operator of a calibration at a terminal: puts the robot where it has to stand, and measures where it ends."""
+"""The operator of a calibration at a terminal, who places the robot and measures the ends of paths."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ class CalibrationOperator(Operator):
     """Leads through the trials of a calibration.
 
     Args:
-        arena: In which the robot stands.
-        robot: Which one it is.
+        arena: Arena of the robot.
+        robot: Name of the robot.
         ask: Prints a question and waits for the answer; a terminal when not given.
         say: Prints.
     """
@@ -46,7 +46,7 @@ class CalibrationOperator(Operator):
         self._say = say
 
     def lead(self, plan: TrialPlan, number: int, n: int) -> Led:
-        """Say where the robot has to stand, and wait for Enter."""
+        """Print the place of the robot, and wait for Enter."""
         from realitygap.study import placing_words
 
         self._say(f"\nTrial {number + 1} of {n}: {placing_words(plan, self._arena, self._robot)}")
@@ -65,7 +65,7 @@ class CalibrationOperator(Operator):
             )
 
     def measure(self, plan: TrialPlan, trial: TrialRecord) -> TrialRecord | None:
-        """Ask where a path ended, unless an observer saw it; None has the trial driven again."""
+        """Ask for the end of a path, unless an observer recorded it. None repeats the trial."""
         from realitygap.study import with_ruled_end
 
         if plan.purpose == "sensors":

@@ -25,12 +25,12 @@ CAMERA_HELP = (
 def under_camera(
     spec: str | None, arena: Arena, observer: PortObserver | None
 ) -> Iterator[PortObserver | None]:
-    """The observer of a robot, with a camera where one is named.
+    """Return the observer of a robot, with a camera if one is named.
 
     Args:
-        spec: Of the camera; None where there is none.
-        arena: Where.
-        observer: Without a camera; None if nobody has to put the robot at its start.
+        spec: Camera, as given by the user; None for none.
+        arena: Arena of the robot.
+        observer: Observer without a camera; None if no person has to place the robot.
 
     Raises:
         StudyError: The camera's options cannot be, or nobody stands beside the robot.
@@ -54,11 +54,11 @@ def under_camera(
 
 @contextlib.contextmanager
 def operated_under_camera(spec: str | None, study: Study, operator: Operator) -> Iterator[Operator]:
-    """The operator of a physical study, with a camera where one is named.
+    """Return the operator of a physical study, with a camera if one is named.
 
     Args:
-        spec: Of the camera; None where there is none.
-        study: Whose first physical condition says in which arena.
+        spec: Camera, as given by the user; None for none.
+        study: Study whose first physical condition gives the arena.
         operator: Without a camera.
 
     Raises:

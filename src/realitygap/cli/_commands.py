@@ -28,7 +28,7 @@ class Command:
 
     Attributes:
         name: The word on the command line.
-        summary: One line for the list; for a command, the first line of its docstring.
+        summary: Line for the list; for a command, the first line of its docstring.
         module: The module of `realitygap.cli` that defines it.
         attribute: The function or the Typer group in that module.
     """

@@ -24,12 +24,12 @@ _WAYS = {
 
 @dataclass
 class GridEdit:
-    """Which cells are marked, and where the cursor is.
+    """The marked cells and the cursor of an editor.
 
     Attributes:
-        columns, rows: Of the grid; row 0 is the lowest.
+        columns, rows: Size of the grid; row 0 is the lowest.
         cells: Marked ones in the order in which they were marked, columns * row + column.
-        column, row: Of the cursor.
+        column, row: Position of the cursor.
         is_drawing: Whether moving marks.
     """
 
@@ -111,9 +111,9 @@ def edit_cells(
     """Let the operator pick cells, beginning at the start cell of trials.
 
     Args:
-        grid: Of reachable cells.
-        start: Where trials begin.
-        read_key: The next key; None where there will be no more.
+        grid: Grid of reachable cells.
+        start: Start of trials.
+        read_key: Function that returns the next key; None if there are no more.
         write: Puts text on the terminal.
         cells: Marked at first.
 

@@ -54,7 +54,7 @@ if sys.platform == "win32":
         """Keys of the console."""
 
         def read(self, timeout_s: float | None = None) -> str | None:
-            """The next key by its name or letter; None where none comes in time."""
+            """Return the next key by its name or letter; None if none arrives in time."""
             until = None if timeout_s is None else time.monotonic() + timeout_s
             while not msvcrt.kbhit():
                 if until is not None and time.monotonic() >= until:
@@ -83,7 +83,7 @@ else:
             self._descriptor = descriptor
 
         def read(self, timeout_s: float | None = None) -> str | None:
-            """The next key by its name or letter; None where none comes in time.
+            """Return the next key by its name or letter; None if none arrives in time.
 
             Raises:
                 KeyboardInterrupt: The terminal is gone.

@@ -1,4 +1,4 @@
-"""The operator of a physical study: a person at a terminal, or nobody if the robot is emulated."""
+"""The operator of a physical study: a person at a terminal, or none if the robot is emulated."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ class Answers:
 
     Attributes:
         who: Enters the scores; the account's name when None.
-        in_flight: What becomes of a trial that was cut off, `void` or `driven`; None asks.
-        score: When to ask what was drawn: `trial`, `sheet` or `later`.
+        in_flight: Decision about a trial that was cut off, `void` or `driven`; None asks.
+        score: Time to ask for the drawn cells: `trial`, `sheet` or `later`.
         wait: Whether to wait for Enter before each trial.
         despite_preflight: Whether to drive whatever the pre-flight finds.
 
@@ -70,13 +70,13 @@ class Answers:
 def choose_operator(
     port: str, witness: str | None, answers: Answers, folder: Path, *, quiet: bool = False
 ) -> Operator:
-    """Nobody for an emulator with a witness, in this program or in another; else a person at the terminal.
+    """Return no operator for an emulator with a witness; otherwise the person at the terminal.
 
     Args:
-        port: Of the robot.
+        port: Port of the robot.
         witness: HOST:PORT of an emulator's witness.
-        answers: What was answered in advance.
-        folder: Of the results, in whose ledger notes are kept.
+        answers: Answers that were given in advance.
+        folder: Folder of the results, whose ledger stores notes.
         quiet: Whether standard output is for something else: a person is spoken to on standard error, and a witness's
             trials are not told of.
     """
@@ -129,7 +129,7 @@ class PersonOperator(Operator):
             self._ask("Stand it free, then press Enter: ", "--no-wait drives without waiting")
 
     def accept(self, preflight: Preflight) -> bool:
-        """Show what was found; ask where there is something against it."""
+        """Show the result of the pre-flight check, and ask if there is a problem."""
         for name, value in preflight.facts.items():
             self._say(f"  {name}: {value}")
         if not preflight.problems:

@@ -184,7 +184,7 @@ def _as_name(stem: str) -> str:
 
 
 class RunsBar:
-    """Runs done, rate and time left, on standard error where that is a terminal."""
+    """Finished runs, rate, and remaining time, on standard error if that is a terminal."""
 
     def __init__(self, *, quiet: bool) -> None:
         from rich.console import Console
@@ -219,7 +219,7 @@ class RunsBar:
             self._progress.stop()
 
     def show(self, progress: Progress) -> None:
-        """Show how far the study is; nothing where nothing is missing."""
+        """Show the progress of the study; nothing if all runs are finished."""
         if progress.n_done == progress.n_runs and not self._progress.live.is_started:
             return
         if not self._progress.live.is_started:

@@ -19,7 +19,7 @@ _SILENCE_S = 10.0
 
 
 class TellingOperator(Operator):
-    """Tells of each generation that is closed, and of a trial where that takes long."""
+    """An operator that reports each closed generation, and each trial if that takes long."""
 
     _told = 0.0
 

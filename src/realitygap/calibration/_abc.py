@@ -1,8 +1,8 @@
 """The posterior of a robot's parameters from whole trials, by simulation alone.
 
-Rounds of approximate Bayesian computation: parameters are drawn from the prior within a box, trials carried out with
-them, vectors of what is seen pressed into summaries (`_score.py`), and parameters regressed on these. The box then
-shrinks to where the posterior is.
+The method is approximate Bayesian computation in rounds. Parameters are drawn from the prior within a box, and trials
+are simulated with them. Vectors of the observations are compressed to summaries (`_score.py`), on which the parameters
+are regressed. Then the box shrinks to the posterior.
 
 Sources: semi-automatic summaries, Fearnhead & Prangle, JRSS B 74 (2012); regression adjustment, Beaumont, Zhang &
 Balding, Genetics 162 (2002); rounds whose proposals are the prior cut to where the posterior can be, so that no
@@ -184,9 +184,9 @@ def _adjusted(
 def _predict(summaries: Floats, places: Floats, here: Floats) -> tuple[Floats, Floats]:
     """Ridge regression of places on summaries and their curvature: for the simulations, and for the observed.
 
-    For each simulation it is the regression without it, which follows from the whole one (Allen 1974): a regression
-    knows too well what it was made from, and the observed is none of these. Means and the first predictions, whose
-    squares are the curvature, stay those of all, as one simulation hardly changes them.
+    Each simulation is predicted by the regression without it, which follows from the whole one (Allen 1974). A
+    regression overfits its own data, which the observations are not part of. Means and the first predictions, whose
+    squares are the curvature, are those of all, because one simulation hardly changes them.
     """
     mean = places.mean(axis=0)
     slopes, _ = _ridge(summaries, places - mean)

@@ -1,7 +1,8 @@
 """A check on friction without a simulator: whether a robot that drives straight into a wall aligns with it or stalls.
 
-The wall's push, tilted by friction, passes the axle on one side or on the other: the robot aligns where
-a + atan(mu) < atan(c_x / |c_y|), with a between its heading and the wall, and c where it touches, from its axle.
+Friction tilts the wall's push, which passes the axle on one side or the other. The robot aligns if a + atan(mu) <
+atan(c_x / |c_y|). Here a is the angle between its heading and the wall, and c is the touching point in the frame of its
+axle.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """All parameters of a robot from whole trials with poses.
 
-With poses each command, each reading and each stall can be predicted by itself from where the robot was seen, so that
-likelihoods take the place of simulation alone (`fit_all`): of motion (`_single_commands.py`), of readings
+With poses, each command, each reading, and each stall can be predicted separately from the robot's observed pose. So
+likelihoods replace the summaries of whole simulations (`fit_all`): of motion (`_single_commands.py`), of readings
 (`infrared/_pulses.py`, `infrared/_mixture.py`), and of stalls.
 """
 

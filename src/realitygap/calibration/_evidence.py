@@ -1,13 +1,12 @@
 """Trials as long vectors: the observed ones, and the same trials run in `sim`.
 
-Each vector is a fixed function of what is seen, so a simulator that is right makes vectors of the same distribution:
+Each vector is a fixed function of the observations. So a correct simulator gives vectors of the same distribution:
 
-* Commands given one by one are given again, and all that is seen counts.
-* With poses, a robot is put back to where it was seen before each command, and each command is predicted by itself
-  (multiple shooting): what it answers does not depend on what it was about to do then, so trials of controllers serve
-  too.
-* With encoders, the wheels of any trial are predicted from its commands: in `sim` nothing else moves them.
-* Without poses, controllers drive anew, as what they do next depends on what they saw.
+* Given commands are repeated, and all observations count.
+* With poses, a robot is put back to its observed pose before each command, and each command is predicted separately
+  (multiple shooting). So trials of controllers can be used, too.
+* With encoders, the wheels of any trial are predicted from its commands, because nothing else moves them in `sim`.
+* Without poses, controllers drive again in simulation, because their commands depend on their readings.
 """
 
 from __future__ import annotations

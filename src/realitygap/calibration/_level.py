@@ -1,7 +1,7 @@
 """Ends of the values that observations do not refute: of each parameter, by its profile likelihood.
 
-Where a likelihood is level, as of readings that count pulses, or highest at an end of what is possible, draws from a
-posterior leave out an edge on which the truth may lie. A likelihood ratio does not.
+A likelihood can be constant over a range, as with readings that count pulses, or highest at an end of the prior. Then
+draws from a posterior leave out an edge that may contain the true value. A likelihood ratio does not.
 
 Source: Wilks (1938); intervals by the profile likelihood, Venzon & Moolgavkar (1988). Differs: ends are searched by
 random steps, as the likelihood has steps, so that they may lie a little inside.

@@ -27,10 +27,10 @@ def motion_plans(
 ) -> list[TrialPlan]:
     """Trials to fit a drive to: straight runs, turns in place, arcs, steps of the command, slow commands, mixed.
 
-    Whatever is driven is driven back at once, so that a robot which is not quite as its file says stays where there is
-    room: for each gain alone, for both wheels, track and axle (straight and around), lag and delay (steps of the
-    command), dead band (slow commands), noise that grows with the way and with the time (fast and slow), the battery
-    (trials of 100 commands).
+    The robot drives each part back immediately, so that it stays in the free space even if it differs from its file.
+    There are parts for each gain, for both wheels, track and axle (straight and around), lag and delay (steps of the
+    command), dead band (slow commands), noise that grows with the distance and with the time (fast and slow), and the
+    battery (trials of 100 commands).
 
     Args:
         arena: Trials begin in the middle of the largest free place on a grid in it, along its longer side.

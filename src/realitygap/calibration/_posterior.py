@@ -111,9 +111,9 @@ def sample_clusters(
 ) -> Floats:
     """Return places in 0 to 1 that observations in clusters allow, (n_draws, p), for a model that is not smooth.
 
-    Places are looked for around the best so far, with a t distribution that each round fits anew (population Monte
-    Carlo, Cappe et al. 2004). Each draw weighs the clusters anew (weighted likelihood bootstrap, Newton & Raftery
-    1994): where clusters disagree by more than noise, draws spread.
+    Places are drawn around the best ones so far, from a t distribution that is refitted in each round (population Monte
+    Carlo, Cappe et al. 2004). Each draw has new weights of the clusters (weighted likelihood bootstrap, Newton &
+    Raftery 1994). So draws spread if clusters disagree by more than noise.
 
     Args:
         rng: Random numbers.

@@ -1,7 +1,7 @@
 """The posterior predictive check of a simulator against observations, and errors of predictions.
 
-With enough trials any robot differs from any simulator significantly, so what counts is a size: the share of the
-observations' variance that the fitted simulator neither predicts nor makes by chance.
+With enough trials, any robot differs significantly from any simulator. So the size of the difference counts: the share
+of the observations' variance that the fitted simulator neither predicts nor reproduces by chance.
 
 Source: posterior predictive checks, Gelman, Meng & Stern, Statistica Sinica 6 (1996). The limits in `TOLERATED` are
 chosen on twins, see docs/explanations/inference.md.

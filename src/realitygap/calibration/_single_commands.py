@@ -1,8 +1,8 @@
 """The fit of motion to the effect of each command from its observed pose.
 
-The mean is fitted without noise by damped least squares whose weights fall with the size of a difference, as where a
-robot aligns or stalls flips at a border; then the noise, to what is left. Draws weigh blocks of commands anew, so that
-they spread where blocks disagree: what `sim` cannot make is not taken for knowledge.
+First, the mean is fitted without noise by damped least squares. The weights fall with the size of a difference, because
+a robot near a border may align or stall. Then the noise is fitted to the residuals. Each draw has new weights of blocks
+of commands, so that draws spread if blocks disagree. So effects that `sim` cannot model do not count as information.
 
 Sources: multiple shooting, Bock 1983; t-distributed differences, Lange, Little & Taylor, JASA 84 (1989); damping,
 Marquardt 1963; weighted likelihood bootstrap, Newton & Raftery, JRSS B 56 (1994), with a draw from the prior each

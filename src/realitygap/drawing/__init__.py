@@ -1,9 +1,9 @@
 """Plain shapes to SVG and pixels, without matplotlib: how arenas, robots, networks and paths show themselves.
 
-It lies below `world`, because it knows nothing but points, colors and text. What has a picture (an `Arena`, a
-`JyroPlatform`, a `Genome`, a `Trajectory`) says so as a `Picture` of shapes, which notebooks show; the report draws the
-same shapes into its figures, and matplotlib is imported only there. Results show themselves as a `Card` of tables and
-pictures.
+It is a layer below `world`, because it has only points, colors, and text. An object with a picture (an `Arena`, a
+`JyroPlatform`, a `Genome`, a `Trajectory`) returns it as a `Picture` of shapes, which notebooks show. The report draws
+the same shapes into its figures, and only the report imports matplotlib. Notebooks show results as a `Card` of tables
+and pictures.
 """
 
 from ._card import Bar, Card, Spark, Table

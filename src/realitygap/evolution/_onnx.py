@@ -32,8 +32,8 @@ def to_onnx(
     """The network as an `onnx.ModelProto`, whose `SerializeToString()` is what goes into a file.
 
     A feed-forward network maps `inputs` (b, n_inputs) to `outputs` (b, n_outputs), a row for each of b sets of inputs.
-    A recurrent one is exported as one step: it also takes `state` (b, m), the activations of its m outputs and hidden
-    nodes after the step before (zeros at first), and gives `next_state`. The constant input is part of the biases.
+    A recurrent one is exported as one step. It also takes `state` (b, m), the activations of its m outputs and hidden
+    nodes after the step before (zeros at first), and returns `next_state`. The constant input is part of the biases.
 
     In double precision the outputs are those of `Network.activate` but for rounding, below 1e-12.
 

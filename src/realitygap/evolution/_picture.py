@@ -28,8 +28,8 @@ def network_picture(
 ) -> Picture:
     """The network of a genome: inputs on the left, outputs on the right.
 
-    A link is as broad as its weight is large and has its weight beside it; a positive one is unbroken and ends in an
-    arrow, a negative one is dashed and ends in a bar. Disabled genes are faint and dotted.
+    The width of a link shows the size of its weight, which is printed next to it. A positive link is a solid line with
+    an arrow, and a negative one is a dashed line with a bar. Disabled genes are faint and dotted.
 
     Args:
         genome: Genome to draw.

@@ -40,10 +40,10 @@ class Population:
             genomes = population.ask()
             population.tell([fitness_of(genome.network()) for genome in genomes])
 
-    The same kernels carry out the whole runs of a study; both roads give the same genomes. What comes is a
-    function of the seed, the settings and the fitness told, on any machine: not of how many workers found the
-    fitness, nor of whether the population was saved and loaded on the way. Genomes and networks can be pickled,
-    so `pool.map(fitness_of, population.ask())` works with threads and with processes.
+    The same kernels compute the whole runs of a study, and both methods give the same genomes. The genomes are a
+    function of the seed, the settings, and the given fitness, on any machine. They do not depend on the number of
+    workers, or on saving and loading the population in between. Genomes and networks can be pickled, so
+    `pool.map(fitness_of, population.ask())` works with threads and with processes.
     """
 
     def __init__(

@@ -1,6 +1,6 @@
 """The gap between two platforms: arrays of trials in, measures with intervals out.
 
-`measure_gap` gives all measures; each has a file of its own, and can be had alone. No platform is run here.
+`measure_gap` returns all measures. Each measure has its own file and can be computed alone. No platform is run here.
 """
 
 from ._bootstrap import SMALLEST_N, bootstrap, interval, resampled, shrunk_means

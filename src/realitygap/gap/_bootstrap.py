@@ -34,10 +34,10 @@ def resampled(
 ) -> Iterator[tuple[Values, Values]]:
     """Yield resamples in blocks: (b, c, r) of the source and (b, c, q) of the target.
 
-    Controllers are drawn, both their means together; then trials of each, by residuals. Means of few trials spread
-    more than controllers do, and drawing trials anew would add that noise a second time. So means are first drawn
-    towards the common mean until they spread, and go together on both sides, as controllers without noise do;
-    residuals are lengthened by sqrt(r / (r - 1)).
+    Controllers are resampled with both their means together, and then the trials of each, by residuals. Means of few
+    trials spread more than the true means, and resampled trials would add that noise a second time. So means are first
+    shrunk towards the common mean until they have the covariance of controllers without noise. Residuals are lengthened
+    by sqrt(r / (r - 1)).
 
     Args:
         source: The simulator's trials.

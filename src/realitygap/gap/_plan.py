@@ -132,13 +132,13 @@ def plan_correlation(
 ) -> Needed:
     """Controllers with which a rank correlation is shown to be above a least one.
 
-    It is shown if the correlation of means is above the one that `least` gives with so much noise, one-sided at 5 %.
-    The normal formula gives a first number of controllers. Then studies are simulated, of normal controllers whose
-    trials have noise on both platforms, and the number is raised until so many of them show it.
+    It is shown if the correlation of means is above the one that `least` gives with this noise, one-sided at 5 %. The
+    normal formula gives a first number of controllers. Then studies of normal controllers with noise on both platforms
+    are simulated, and the number is raised until the share `power` of them shows it.
 
     Args:
-        correlation: The true one, of controllers without noise.
-        least: Above which it shall be shown; below `correlation`.
+        correlation: True correlation, of controllers without noise.
+        least: Correlation that the true one is shown to exceed; below `correlation`.
         reliability: Reliability of the means of both platforms with this number of trials [0..1]. It lowers both
             observed correlations.
         trials: Number of trials of each controller on each platform.

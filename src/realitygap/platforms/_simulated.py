@@ -79,9 +79,9 @@ class SimulatedPlatform(Platform):
 class SimTarget(RepeatableTarget):
     """A simulator as a target.
 
-    Controllers are tried in calls of the compiled trials, commands one by one on the simulated robot; what comes out is
-    the same as if a controller had driven that robot (in double precision; a network computes in it outside of trials).
-    Trial `number` draws the random numbers of individual `number`, as in `try_genomes`.
+    Controllers run in calls of the compiled trials, and given commands run one by one on the simulated robot. The
+    result is the same as if a controller had driven that robot (in double precision, in which a network computes
+    outside of trials). Trial `number` draws the random numbers of individual `number`, as in `try_genomes`.
 
     Args:
         platform: The robot as simulated.

@@ -1,9 +1,9 @@
 """Result files of studies: the only code that reads or writes them.
 
-A `ResultsFolder` holds `study.json`, the study as resolved; `trials/CONDITION.FIRST-LAST.parquet`, one file
-per chunk of replicates, written beside, synced and renamed into place; and `log.jsonl`, times and hosts,
-outside the digest. A `Ledger` beside them, `ledger.sqlite`, has the trials that a robot drove. This package handles
-plain dicts, arrays and polars frames. It knows nothing of genomes or studies.
+A `ResultsFolder` has three parts: `study.json`, the study as resolved; `trials/CONDITION.FIRST-LAST.parquet`, one file
+per chunk of replicates, which is written under another name, synced, and renamed; and `log.jsonl`, times and hosts,
+which are not part of the digest. A `Ledger` next to them, `ledger.sqlite`, has the trials that a robot drove. This
+package handles plain dicts, arrays and polars frames. It knows nothing of genomes or studies.
 """
 
 from realitygap.records import _cards  # noqa: F401  # what notebooks show

@@ -1,8 +1,8 @@
 """A digest of rows that depends only on their values.
 
-Every column is hashed apart, as a stream of little-endian values in the order of the rows; a list is two
-streams, its lengths and its entries, so that rows may arrive in chunks of any size. Not a number has one
-pattern, a null is a mark in a stream beside with 0 in its place, and -0.0 stays what it is.
+Every column is hashed separately, as a stream of little-endian values in the order of the rows. A list has two streams,
+its lengths and its entries, so that rows may arrive in chunks of any size. NaN has one pattern. A null is a mark in a
+second stream and 0 in the first. -0.0 stays -0.0.
 """
 
 from __future__ import annotations

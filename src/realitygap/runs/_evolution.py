@@ -64,9 +64,9 @@ def named(genome: Genome, condition: Condition) -> Genome:
 class Evolution:
     """One run with an ask-and-tell interface: `ask` for a generation, `tell` the score of each individual, and so on.
 
-    What is asked is a function of the condition, the replicate and what was told: as in the whole runs that
-    `run_replicates` carries out, by the same kernels and with the same random numbers. The novelty archive is updated
-    after the whole generation, in the order of individuals.
+    The generation that `ask` returns is a function of the condition, the replicate, and the scores so far. It is the
+    same as in the whole runs of `run_replicates`, with the same kernels and random numbers. The novelty archive is
+    updated after the whole generation, in the order of individuals.
     """
 
     def __init__(self, condition: Condition, replicate: int) -> None:

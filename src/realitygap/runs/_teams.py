@@ -14,8 +14,8 @@ def draw_teams(
 ) -> NDArray[np.int32]:
     """Return the individuals that drive the robots of each trial of a generation, shape (population, n_robots).
 
-    The first robot of trial i is individual i's. Individuals stand in a circle in random order, and the other robots
-    are those of the next ones: so each individual drives once in each place, and twice in no trial.
+    The first robot of trial i has individual i. Individuals are in a circle in random order, and the other robots have
+    the next ones in the circle. So each individual drives once from each start, and never twice in a trial.
     """
     counters = np.empty((population, 3), np.uint32)
     counters[:, 0] = np.arange(population, dtype=np.uint32) << 8 | np.uint32(PURPOSE_TEAM)

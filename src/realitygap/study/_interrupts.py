@@ -14,8 +14,8 @@ from realitygap._interrupts import on_interrupt
 def held_interrupts() -> Iterator[None]:
     """Hold Ctrl-C back until the end of a block; a second one is immediate.
 
-    In the middle of another library's code it may be lost, as in a finalizer, or come out as that library's own error.
-    Where somebody else handles it, and in other threads than the main one, nothing changes.
+    In another library's code, such as a finalizer, it may be lost or become that library's own error. If another
+    handler is installed, and in threads other than the main one, nothing changes.
 
     Raises:
         KeyboardInterrupt: It came in the block.

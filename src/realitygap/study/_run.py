@@ -37,7 +37,7 @@ class Progress:
 
     Attributes:
         n_done: Runs published, those of earlier sittings counted.
-        n_runs: Runs in all.
+        n_runs: Total number of runs.
         n_computed: Runs computed in this sitting.
         seconds: Computing time since the start [s].
         waiting_for: Missing part of a cluster, such as a worker; empty if computing continues.
@@ -84,17 +84,17 @@ def run_study(
 ) -> StudyResult:
     """Compute the simulated conditions of a study, or what is missing of them; `drive_study` drives the others.
 
-    What is in the folder already is kept: an interrupted study goes on, more replicates and new conditions
-    extend it. Interrupt it (Ctrl-C) at any moment; runs that were published are safe, and the results do not
-    depend on threads, chunks or interruptions.
+    Existing results stay: an interrupted study resumes, and more replicates and new conditions extend it. You can
+    interrupt it (Ctrl-C) at any moment. Published runs are safe, and the results do not depend on threads, chunks, or
+    interruptions.
 
     Args:
         study: Study, name of one that comes with realitygap, or path of a study file.
         out: Folder for the results; `results/NAME` when not given.
         seed: Seed that replaces the study's, if the study is given by name or path.
         replicates: Number of replicates that replaces the study's, if the study is given by name or path.
-        threads: Kernels at once; as many as there are processors when not given.
-        chunk: Runs computed and written together; chosen by their length when not given.
+        threads: Number of threads. Default: the number of processors.
+        chunk: Number of runs that are computed and written together. Default: chosen by their length.
         fresh: True to delete a study in the folder first. A folder with a ledger of physical trials is never deleted.
         cluster: Cluster that replaces this machine's threads: `tcp://HOST:PORT` of a running Dask scheduler, or
             `slurm`, `pbs`, `sge`, `lsf`, `oar`, `htcondor` or `moab` for jobs of that batch system, with the user's
@@ -105,9 +105,8 @@ def run_study(
 
     Raises:
         TaskError: A Python file is not allowed, cannot be run, or lacks its function; nothing was written.
-        StudyError: The study cannot be carried out as written, or the folder holds another one: the
-            difference is shown.
-        RecordError: The folder holds something that cannot be trusted, or cannot be written.
+        StudyError: The study cannot be run as written, or the folder has another one; the message shows the difference.
+        RecordError: The folder has an untrustworthy file, or cannot be written.
         RealityGapError: The cluster cannot be reached.
         TypeError: A count is not a whole number, or study or cluster is none of these.
         ValueError: A count below 1, or both threads and a cluster.

@@ -21,9 +21,9 @@ from ._trajectories import Trajectories
 class GoalTask(StepTask):
     """A task that rewards the distance to the goal covered by the end: 1 - d / d0, or 1 if it was reached.
 
-    d is the straight distance from the goal at the end and d0 that at the start, whatever walls stand between; reached
-    is nearer than the goal's radius at the start or the end of any step. With `selection = "novelty"` and the distance
-    `final` the same trials are rewarded for ending where none did.
+    d is the straight distance from the goal at the end, and d0 is that at the start; walls do not count. The goal is
+    reached if the robot is nearer than the goal's radius at the start or the end of any step. With `selection =
+    "novelty"` and the distance `final`, the same trials are rewarded for ending at new positions.
 
     Source: Lehman & Stanley (2011), section 4. Differs: a part of the first distance, and 1 once it was reached.
     """

@@ -20,11 +20,11 @@ from ._trajectories import Trajectories
 class LightTask(StepTask):
     """A task that rewards the mean nearness to the nearest light, reduced by the time spent blocked, 0 to 1.
 
-    At each step 1 - d / d0, at least 0, with d the distance to the nearest light and d0 that of the start; its mean
-    over steps, times the share of steps that were not blocked.
+    The score of a step is 1 - d / d0, at least 0. d is the distance to the nearest light, and d0 is that at the start.
+    The score of a trial is the mean over steps, times the share of steps that were not blocked.
 
     Source: light seeking and obstacle avoidance are the tasks of Jakobi, Husbands & Harvey (1995), "Noise and the
-    reality gap". Differs: they evolve the two apart, by formulas that were not at hand; this one is ours.
+    reality gap". Differs: they evolve the two tasks separately, by formulas that were not available; this one is ours.
     """
 
     kind: Literal["light"] = Field("light", description="Light seeking.")

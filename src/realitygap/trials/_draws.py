@@ -16,8 +16,8 @@ from realitygap.world import Distribution
 class Draws:
     """The numbers that are drawn, each a function of the key, of its name and of the trial, the run or the study.
 
-    A number does not depend on which others are drawn, so that conditions of one study draw the same where both do;
-    those that are drawn `together` share one random number.
+    A number does not depend on the other drawn numbers, so that two conditions of a study draw the same values. Numbers
+    that are drawn `together` share one random number.
 
     Args:
         numbers: Numbers by dotted name. Only distributions are drawn.

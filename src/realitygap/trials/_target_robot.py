@@ -33,11 +33,11 @@ LATE = 0.02
 class PacedRobot(ClosedOnExit):
     """A robot whose commands follow each other in time: what its readings take counts as a part of the command.
 
-    So a command takes effect that much after its readings, and lasts `step_s` all the same. Where readings take longer
-    than that, commands do, too.
+    So a command takes effect after its readings, and still lasts `step_s`. If readings take longer than that, commands
+    last longer, too.
 
     Args:
-        robot: Whom to pace.
+        robot: Robot to pace.
         step_s: Duration of a command [s].
         clock: Clock of the robot.
     """
@@ -99,13 +99,13 @@ class PacedRobot(ClosedOnExit):
 class RobotTarget(ClosedOnExit):
     """A robot on a port, and its observer.
 
-    Where the link is lost in a trial, what was seen of it is told as a trial that ended as LOST, and the link is opened
-    anew. The motors are stopped on every way out.
+    If the link is lost in a trial, its observed part is reported as a trial that ended as LOST, and the link is
+    reopened. The motors are always stopped at the end.
 
     Args:
-        open_robot: Opens the robot.
+        open_robot: Function that opens the robot.
         arena: Arena of the trials.
-        observer: Places it and says what it drew.
+        observer: Observer, who places it and reports what it drew.
         name: Name of the target, as the user gave it.
         step_s: Duration of a command [s].
         on_lost: Reaction to a trial in which the link was lost.

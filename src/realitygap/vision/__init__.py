@@ -1,8 +1,9 @@
 """Cameras: pictures in, values out. OpenCV comes with the extra `vision`.
 
-Pen traces on a photograph of a sheet: a `SheetLayout` is what is printed for an arena, its grid, four tags, the start,
-and a box to try each pen in; `score_sheet` finds that sheet and says which cells each pen's trace crosses, and how sure
-that is. Its steps are `find_sheet`, `rectify`, `ink_density`, `separate_pens`, `follow_trace` and `visited_cells`.
+Pen traces on a photograph of a sheet: a `SheetLayout` is the printed sheet of an arena, with its grid, four tags, the
+start, and a box to try each pen in. `score_sheet` finds the sheet and returns the cells that each pen's trace crosses,
+with their confidence. Its steps are `find_sheet`, `rectify`, `ink_density`, `separate_pens`, `follow_trace` and
+`visited_cells`.
 
 A map of ROS is a picture, too: `arena_of_map` traces its free space, and `save_map` draws an arena.
 

@@ -18,8 +18,8 @@ from ._trials import jyro_rules, jyro_scene
 class JyroRobot(ProgramRobot):
     """The paper's simulated Scribbler, one command at a time.
 
-    A controller that answers each observation drives the very trial that `try_genomes` gives its genome with the same
-    noise and key (in double precision; networks compute in it outside of trials).
+    A controller that answers each observation drives the same trial as `try_genomes` with its genome, the same noise,
+    and the same key (in double precision, in which networks compute outside of trials).
 
     | command | least | most | unit |
     |---|---|---|---|
@@ -33,7 +33,7 @@ class JyroRobot(ProgramRobot):
     Noise carries a reading beyond 0..1, unless the platform clips it; `raw` is without noise.
 
     Args:
-        platform: The robot as simulated; the paper's when not given.
+        platform: Settings of the simulated robot. Default: the paper's.
         arena: Arena. Default: the paper's.
         noise: Level a: each reading is moved by a * U(-1, 1).
         noise_key: Key of the random numbers, the same in each trial until `noise_key` is changed.

@@ -25,9 +25,9 @@ if TYPE_CHECKING:
 class SimPlatform(SimSettings):
     """A robot of a file, simulated with its outline, contact, motors and sensors.
 
-    Every number of the robot and of the arena has a dotted name, such as `drive.track` or `arena.start.x`; `set` gives
-    any of them another value, or says how it is drawn for each trial, run or study. Where nothing is said, numbers are
-    the robot file's, which says where they come from.
+    Every number of the robot and of the arena has a dotted name, such as `drive.track` or `arena.start.x`. `set` gives
+    any of them another value, or a distribution from which it is drawn for each trial, run, or study. All other numbers
+    are those of the robot file, which gives their sources.
     """
 
     def inputs(self, arena: Arena) -> tuple[str, ...]:

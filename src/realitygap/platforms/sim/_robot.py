@@ -26,9 +26,9 @@ from ._trials import sensor_names, sim_rules
 class SimRobot(ProgramRobot):
     """A robot of a file, simulated, one command at a time.
 
-    It is stepped by the kernels that try whole populations: a controller that answers each observation drives the very
-    trial that `try_genomes` gives its genome with the same noise and key. What is drawn for a trial is drawn again with
-    each `reset`, for the trial that `noise_key` names.
+    The kernels of whole populations simulate it. So a controller that answers each observation drives the same trial as
+    `try_genomes` with its genome, the same noise, and the same key. The numbers of a trial are drawn again with each
+    `reset`, for the trial that `noise_key` names.
 
     | command | least | most | unit |
     |---|---|---|---|
@@ -42,7 +42,7 @@ class SimRobot(ProgramRobot):
     `select` adds any other input that networks can have on `sim`: light, line, bumpers, encoders, the goal.
 
     Args:
-        platform: The robot as simulated; the default one when not given.
+        platform: Settings of the simulated robot. Default: the default ones.
         arena: Arena. Default: the paper's.
         noise: The paper's a, on top of the robot's own noise.
         noise_key: Key of the random numbers, the same in each trial until `noise_key` is changed.

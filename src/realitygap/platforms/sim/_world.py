@@ -40,9 +40,9 @@ class SimWorld:
         ada.move(0.8, 0.1)
         world.step(10)
 
-    In a step each robot, in the order of adding, is asked for a command (its `brain`, if it has one) and moved; the
-    outlines of the others stand in its way where they are at that moment. Then all sensors answer. Nothing is pushed:
-    a robot slides along another as along an obstacle that stands firm. One robot alone does what `SimRobot` does.
+    In a step, each robot, in the order of adding, gets a command (from its `brain`, if it has one) and moves. The
+    outlines of the others at that moment are obstacles. Then all sensors are read. Nothing is pushed: a robot slides
+    along another as along a fixed obstacle. A single robot moves like `SimRobot`.
 
     Args:
         arena: Arena. Default: the paper's.
@@ -215,7 +215,8 @@ class SimWorld:
 class SimWorldRobot(ProgramRobot):
     """One robot of a `SimWorld`, made by `SimWorld.add`. It has the contract of a physical robot.
 
-    Under the contract `drive` is a command and one step of the whole world, and `reset` is one of the whole world.
+    With the contract of robots, `drive` gives a command and runs one step of the whole world, and `reset` resets the
+    whole world.
 
     | command | least | most | unit |
     |---|---|---|---|

@@ -38,8 +38,8 @@ except OSError as error:
 class TwinPlatform(Platform):
     """A twin, as pseudo-reality to evolve on.
 
-    It is tried in processes of their own, which alone read its file; here it is known by its hash. Figures draw the
-    Scribbler's outline, whatever the twin's own is.
+    It runs in separate processes, and only they read its file. This process identifies it by its hash. Figures draw the
+    Scribbler's outline for any twin.
     """
 
     name: ClassVar[str] = "twin"

@@ -69,9 +69,9 @@ def preflight(robot: Robot, known: Sequence[Mapping[str, str]] = ()) -> Prefligh
     facts["readings"] = ", ".join(f"{value:g}" for value in raws[-1])
     problems += _insane(raws, robot)
     volts = _battery_under_load(robot)
-    facts["battery under load"] = "not told" if volts is None else f"{volts:.2f} V"
+    facts["battery under load"] = volts if isinstance(volts, str) else f"{volts:.2f} V"
     least = getattr(robot, "least_battery_v", 0.0)
-    if volts is not None and volts < least:
+    if not isinstance(volts, str) and volts < least:
         problems.append(f"the battery has {volts:.2f} V under load, expected at least {least} V: change it")
     return Preflight(facts, tuple(problems), identity)
 
@@ -87,7 +87,7 @@ def identity_of(robot: Robot) -> dict[str, str]:
 
 def _other_robot(identity: Mapping[str, str], before: Mapping[str, str]) -> list[str]:
     differing = [
-        f"{name} is {identity.get(name, 'not told')!r}, before {value!r}"
+        f"{name} is {identity.get(name, 'unknown')!r}, before {value!r}"
         for name, value in before.items()
         if identity.get(name) != value
     ]
@@ -110,16 +110,18 @@ def _insane(raws: list[tuple[float, ...]], robot: Robot) -> list[str]:
     return []
 
 
-def _battery_under_load(robot: Robot) -> float | None:
-    """Return the voltage while both motors run [V]; None if the robot does not measure it."""
-    volts = getattr(robot, "volts", None)
-    if volts is None:
-        return None
+def _battery_under_load(robot: Robot) -> float | str:
+    """Return the voltage while both motors run [V], or why it is unknown."""
+    measure = getattr(robot, "volts", None)
+    if measure is None:
+        return "unknown: this robot does not report its voltage"
     try:
         robot.drive(_LOAD)
-        found = float(volts())
-        return None if math.isnan(found) else found
-    except RobotError:
-        return None
+        volts = float(measure())
+    except RobotError as error:
+        return f"unknown: {error}"
     finally:
         robot.stop()
+    if math.isnan(volts):
+        return "unknown: nothing measures it (a Scribbler's Fluke does, if one is plugged in)"
+    return volts

@@ -76,7 +76,7 @@ def scrub(page, step: int) -> None:
 def visited(page) -> int:
     return page.evaluate(
         "() => [...document.querySelectorAll('.rg-tile')]"
-        ".filter(tile => tile.style.fill !== 'rgb(243, 245, 248)').length"
+        ".filter(tile => tile.style.fill !== 'var(--rg-tile)').length"
     )
 
 
@@ -136,6 +136,22 @@ def test_keys_do_what_buttons_do(show):
 
 
 @pytest.mark.slow
+def test_a_player_is_as_dark_as_the_page_or_else_as_the_system(show):
+    page = show(play([straight(10), straight(5)]), color_scheme="dark")
+    colors = """() => [['.rg-player', 'backgroundColor'], ['.rg-clock', 'color'], ['.rg-walls', 'stroke'],
+        ['.rg-tile', 'fill'], ['.rg-letter text', 'fill'], ['.rg-trail', 'stroke']]
+        .map(([name, key]) => getComputedStyle([...document.querySelectorAll(name)].at(-1))[key])"""
+    dark = ["28, 32, 38", "163, 171, 181", "230, 232, 235", "20, 23, 27", "28, 32, 38", "90, 169, 230"]
+    light = ["255, 255, 255", "90, 98, 109", "28, 31, 36", "246, 247, 249", "255, 255, 255", "0, 114, 178"]
+    assert page.evaluate(colors) == [f"rgb({each})" for each in dark]
+    page.evaluate("() => { document.body.dataset.jpThemeLight = 'true'; }")
+    assert page.evaluate(colors) == [f"rgb({each})" for each in light]
+    page.emulate_media(color_scheme="light")
+    page.evaluate("() => { document.body.dataset.jpThemeLight = 'false'; }")
+    assert page.evaluate(colors) == [f"rgb({each})" for each in dark]
+
+
+@pytest.mark.slow
 def test_rays_are_as_long_as_they_read_and_colored_by_nearness(show):
     page = show(play(straight(10)))
     rays = page.evaluate(
@@ -143,7 +159,11 @@ def test_rays_are_as_long_as_they_read_and_colored_by_nearness(show):
         "ray.style.stroke])"
     )
     assert [(float(to) - float(start)) for start, to, _ in rays] == pytest.approx([200.0, 100.0, 0.0])
-    assert [color for _, _, color in rays] == ["rgb(169, 180, 194)", "rgb(227, 154, 27)", "rgb(194, 24, 43)"]
+    assert [color for _, _, color in rays] == [
+        "var(--rg-far)",
+        "color-mix(in srgb, var(--rg-near) 0.0%, var(--rg-middle))",
+        "color-mix(in srgb, var(--rg-near) 100.0%, var(--rg-middle))",
+    ]
     page.uncheck("label:has-text('rays') input")
     assert not page.locator(".rg-ray").first.is_visible()
     page.uncheck("label:has-text('cells') input")

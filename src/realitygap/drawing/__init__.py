@@ -11,7 +11,7 @@ from ._ink import PENS, Ink
 from ._picture import FONT, Disc, Line, Picture, Point, Shape, Text
 from ._pixels import to_image, to_png
 from ._shown import card_of, picture_of, widget_of
-from ._theme import theme_rules, themed
+from ._theme import theme_rules, themed, themed_color
 from ._x11 import hex_of, rgb_of
 
 __all__ = [
@@ -34,6 +34,7 @@ __all__ = [
     "rgb_of",
     "theme_rules",
     "themed",
+    "themed_color",
     "to_image",
     "to_png",
     "widget_of",

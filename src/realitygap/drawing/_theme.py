@@ -45,9 +45,9 @@ def theme_rules(selector: str) -> str:
 
 def themed(svg: str) -> str:
     """Return a picture as SVG whose colors follow the theme, and are the light ones if styles are stripped."""
+    return _COLOR.sub(lambda match: f'"{themed_color(match[1] or match[2])}"', svg)
 
-    def variable(match: re.Match[str]) -> str:
-        color = match[1] or match[2]
-        return f'"var(--ink-{_NAMES[color]}, {color})"'
 
-    return _COLOR.sub(variable, svg)
+def themed_color(color: str) -> str:
+    """Return a color that follows the theme, as CSS; one that is no `Ink` stays as it is."""
+    return f"var(--ink-{_NAMES[color]}, {color})" if color in _NAMES else color

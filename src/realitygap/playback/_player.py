@@ -11,24 +11,15 @@ from typing import Any
 import numpy as np
 
 from realitygap._how_to_run import install_command
-from realitygap.drawing import PENS, Disc, Ink, Line, Shape
+from realitygap.drawing import PENS, Disc, Ink, Line, Shape, theme_rules, themed_color
 from realitygap.errors import RealityGapError
 from realitygap.world import Arena, floor_shapes, things_in
 
 from ._moving import MovingTrial, all_trials, extent
-from ._screen import FAR, LETTERS, MIDDLE, MOST_TRIALS, NEAR, TILE, TILE_OFTEN, TILE_VISITED
+from ._screen import LETTERS, MOST_TRIALS
 
 _DIGITS = 4
 """Digits of lengths [m] and angles [rad] that are sent to a page."""
-
-_COLORS = {
-    "far": FAR,
-    "middle": MIDDLE,
-    "near": NEAR,
-    "tile": TILE,
-    "visited": TILE_VISITED,
-    "often": TILE_OFTEN,
-}
 
 
 def play(trials: MovingTrial | Iterable[MovingTrial], *, title: str = "", speed: float = 1.0) -> Any:
@@ -89,7 +80,7 @@ def player_class() -> type:
         """Trials in motion in a notebook."""
 
         _esm = files.joinpath("player.js").read_text("utf-8")
-        _css = files.joinpath("player.css").read_text("utf-8")
+        _css = theme_rules(".rg-player") + files.joinpath("player.css").read_text("utf-8")
         scene = traitlets.Dict().tag(sync=True)
         trials = traitlets.List().tag(sync=True)
         speed = traitlets.Float(1.0).tag(sync=True)
@@ -102,7 +93,7 @@ def player_class() -> type:
 def pack_scene(arena: Arena | None, title: str) -> dict[str, Any]:
     """Return the fixed parts of a scene, ready for JSON; without an arena a bare rectangle around the origin."""
     if arena is None:
-        return {"title": title, "extent": [-0.4, 0.4, -0.25, 0.25], "colors": _COLORS}
+        return {"title": title, "extent": [-0.4, 0.4, -0.25, 0.25]}
     grid = arena.grid
     return {
         "title": title,
@@ -110,7 +101,6 @@ def pack_scene(arena: Arena | None, title: str) -> dict[str, Any]:
         "shapes": [_pack_shape(shape) for shape in (*floor_shapes(arena.floor), *things_in(arena))],
         "walls": [list(wall) for wall in arena.walls],
         "grid": {"x": grid.x, "y": grid.y, "cell": grid.cell, "columns": grid.columns, "rows": grid.rows},
-        "colors": _COLORS,
     }
 
 
@@ -120,14 +110,24 @@ def _pack_shape(shape: Shape) -> dict[str, Any]:
         points = [[round(x, _DIGITS), round(y, _DIGITS)] for x, y in shape.points]
         return {
             "points": [*points, points[0]] if shape.closed else points,
-            "fill": shape.fill or "none",
-            "stroke": shape.color or "none",
+            "fill": _paint(shape.fill),
+            "stroke": _paint(shape.color),
             "width": shape.width,
             "dash": list(shape.dash),
         }
     if isinstance(shape, Disc):
-        return {"x": shape.x, "y": shape.y, "radius": shape.radius, "fill": shape.fill}
-    return {"x": shape.x, "y": shape.y, "text": shape.text, "up": shape.shift[1], "fill": shape.color}
+        return {"x": shape.x, "y": shape.y, "radius": shape.radius, "fill": themed_color(shape.fill)}
+    return {
+        "x": shape.x,
+        "y": shape.y,
+        "text": shape.text,
+        "up": shape.shift[1],
+        "fill": themed_color(shape.color),
+    }
+
+
+def _paint(color: str | None) -> str:
+    return "none" if color is None else themed_color(color)
 
 
 def pack_trials(trials: Sequence[MovingTrial], *, placed: bool = True) -> list[dict[str, Any]]:
@@ -137,7 +137,7 @@ def pack_trials(trials: Sequence[MovingTrial], *, placed: bool = True) -> list[d
             "title": trial.title,
             "label": trial.label,
             "letter": LETTERS[pen],
-            "color": PENS[pen][0] if len(trials) > 1 else Ink.OURS,
+            "color": themed_color(PENS[pen][0] if len(trials) > 1 else Ink.OURS),
             "dashes": list(PENS[pen][1]) if len(trials) > 1 else [],
             "placed": placed,
             "outlines": [[list(corner) for corner in outline] for outline in trial.shape.outlines],

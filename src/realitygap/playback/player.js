@@ -23,16 +23,12 @@ const tag = (name, attributes = {}, text = "") => {
 const short = (value) => value.toFixed(1);
 const share = (value) => value.toFixed(3).replace(/^0/, "");
 
-// colors
+// colors of the style sheet, which follow the theme
 
-const parse = (color) => [1, 3, 5].map((place) => parseInt(color.slice(place, place + 2), 16));
-const mixed = (one, other, part) => {
-  const second = parse(other);
-  return `rgb(${parse(one).map((value, k) => Math.round(value + part * (second[k] - value))).join(" ")})`;
-};
-function rayColor(colors, near) {
-  if (near <= 0) return colors.far;
-  return near < 0.5 ? mixed(colors.far, colors.middle, 2 * near) : mixed(colors.middle, colors.near, 2 * near - 1);
+const mixed = (one, other, part) => `color-mix(in srgb, var(--rg-${other}) ${(100 * part).toFixed(1)}%, var(--rg-${one}))`;
+function rayColor(near) {
+  if (near <= 0) return "var(--rg-far)";
+  return near < 0.5 ? mixed("far", "middle", 2 * near) : mixed("middle", "near", 2 * near - 1);
 }
 
 // where a robot is
@@ -194,7 +190,7 @@ function render({ model, el }) {
     if (trails) drawTrail(part, moment);
     trial.mounts.forEach(([forward, left, direction], k) => {
       const length = moment.rays[k], known = length !== null && length !== undefined && shows.rays.checked;
-      const near = known ? Math.min(Math.max(1 - length / trial.reach[k], 0), 1) : 0, color = rayColor(scene.colors, near);
+      const near = known ? Math.min(Math.max(1 - length / trial.reach[k], 0), 1) : 0, color = rayColor(near);
       const endX = (forward + (known ? length : 0) * Math.cos(direction)) * MM, endY = -(left + (known ? length : 0) * Math.sin(direction)) * MM;
       const line = { x1: forward * MM, y1: -left * MM, x2: endX, y2: endY };
       for (const [key, value] of Object.entries(line)) part.rays[k].setAttribute(key, short(value));
@@ -244,9 +240,9 @@ function render({ model, el }) {
         for (const cell of live ? live.cells : trial.cells.slice(0, moments[k].nCells)) counts[cell] += 1;
       });
     }
-    const most = Math.max(trials.length - 1, 1), { tile, visited, often } = scene.colors;
+    const most = Math.max(trials.length - 1, 1);
     tiles.forEach((rect, cell) => {
-      const fill = counts[cell] ? mixed(visited, often, (counts[cell] - 1) / most) : tile;
+      const fill = counts[cell] ? mixed("visited", "often", (counts[cell] - 1) / most) : "var(--rg-tile)";
       if (rect.dataset.fill !== fill) rect.dataset.fill = rect.style.fill = fill;
     });
   }

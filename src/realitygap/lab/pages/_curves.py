@@ -7,7 +7,7 @@ from typing import Any
 
 from nicegui.element import Element
 
-from realitygap.drawing import PENS
+from realitygap.drawing import PENS, themed_color
 
 
 class Curves(Element, component="curves.js"):
@@ -27,7 +27,9 @@ class Curves(Element, component="curves.js"):
         """Show these curves."""
         inks = [PENS[k % len(PENS)] for k in range(len(curves))]
         self._props["curves"] = list(curves)
-        self._props["inks"] = [{"color": color, "dashes": list(dashes)} for color, dashes in inks]
+        self._props["inks"] = [
+            {"color": themed_color(color), "dashes": list(dashes)} for color, dashes in inks
+        ]
         self.update()
 
     def choose(self, condition: str) -> None:

@@ -7,7 +7,7 @@ export default {
     name: String,
   },
   template: `
-    <div class="lab-curves lab-paper" ref="place">
+    <div class="lab-curves" ref="place">
       <svg :viewBox="'0 0 ' + width + ' ' + height" role="img" tabindex="0" :aria-label="name + '. Arrow keys read the values.'"
            @pointermove="point" @pointerdown="point" @pointerleave="mark = null" @keydown="key" @blur="mark = null">
         <g class="lab-curves-axis">

@@ -6,7 +6,7 @@ export default {
     score: String,
   },
   template: `
-    <div class="lab-curves lab-paper lab-scatter" ref="place">
+    <div class="lab-curves lab-scatter" ref="place">
       <svg :viewBox="'0 0 ' + size + ' ' + size" role="img" tabindex="0" :aria-label="name + ' Arrow keys read the values.'"
            @pointermove="point" @pointerdown="point" @pointerleave="mark = null" @keydown="key" @blur="mark = null">
         <g class="lab-curves-axis">

@@ -42,6 +42,7 @@ selection = "novelty"
 
 def keep(page: Any, name: str, **options: Any) -> None:
     """Take the picture; write it where somebody asked for it."""
+    page.mouse.move(2, 200)  # away from buttons, which are paler below it
     page.wait_for_timeout(700)  # until nothing fades in any more
     picture = Image.open(io.BytesIO(page.screenshot(**options))).convert("RGB")
     file = io.BytesIO()
@@ -114,7 +115,7 @@ def test_a_sheet_counted_from_its_photo(lab, visit):
     page.locator("[data-counting] image").wait_for()
     card = page.locator("[data-counting]")
     card.evaluate("it => it.scrollIntoView({block: 'start'})")
-    page.evaluate("() => window.scrollBy(0, -70)")
+    page.evaluate("() => window.scrollBy(0, -100)")
     keep(page, "photo")
 
 

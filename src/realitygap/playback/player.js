@@ -258,7 +258,8 @@ function render({ model, el }) {
     slider.setAttribute("aria-valuetext", `step ${step} of ${nSteps}, ${time.toFixed(1)} seconds`);
     svg.setAttribute("aria-label", `${scene.title}: ${parts.join(", ")}`);
     drawn.forEach((part, k) => {
-      const text = `${part.trial.letter} ${part.trial.title} ${moments[k] && moments[k].stalled ? "× " : ""}${nCells ? share(moments[k].nCells / nCells) : ""}`;
+      const facts = [moments[k] && moments[k].stalled ? "× blocked" : "", nCells ? share(moments[k].nCells / nCells) : ""].filter(Boolean);
+      const text = [`${part.trial.letter} ${part.trial.title}`, ...facts].join(" · ");
       if (part.words.textContent !== text) part.words.textContent = text;
     });
   }

@@ -1,7 +1,7 @@
 """Limits on what is parsed. Every reader of a file or a message goes through this module.
 
-A parser that meets a hostile or a broken file must fail at once, with one message. Python's parsers do not: a key of
-50,000 parts takes `tomllib` minutes, and nested brackets end in a `RecursionError`. So the text is scanned first.
+A parser must fail immediately on a hostile or a broken file, with one message. Python's parsers do not: a key of 50,000
+parts takes `tomllib` minutes, and nested brackets end in a `RecursionError`. So the text is scanned first.
 """
 
 from __future__ import annotations

@@ -146,9 +146,8 @@ def _place(model: type[BaseModel], loc: tuple[int | str, ...]) -> tuple[str, str
     """A problem's place as text, the last name in it, and the model that this belongs to.
 
     Tables in a list are counted from 0, as in the names of their numbers: range.0.cone. Numbers by name have theirs:
-    draws.drive.track[2]. What else follows a setting
-    that is no table itself is an entry of a list, or one of the types that the setting may have, which is no part of
-    the place.
+    draws.drive.track[2]. Any other part after a setting that is no table is an entry of a list, or one of the possible
+    types of the setting, which is no part of the place.
     """
     names: list[str] = []
     owner = model

@@ -58,7 +58,7 @@ def fit_contact(
 
     Args:
         trials: Recorded trials with poses.
-        simulate: Carries out trials in the arena, such as `SimEnsemble(...).replay`.
+        simulate: Simulator of trials in the arena, such as `SimEnsemble(...).replay`.
         robot: Robot with the numbers that are not fitted.
         arena: Arena of the trials.
         motion: Numbers of the drive by dotted name, such as those of `fit_motion`; the robot's own when not given.

@@ -23,8 +23,8 @@ def contact_plans(
 ) -> list[TrialPlan]:
     """Trials to fit contact to: pushes head on and slantwise, scrapes to both sides, with either end.
 
-    What an encounter comes to is not known beforehand, so angles are left to chance: each trial begins at another
-    heading, and after each push the robot backs off and turns by another angle.
+    The result of an encounter is not known beforehand, so angles are random. Each trial begins at another heading, and
+    after each push the robot backs off and turns by another angle.
 
     Args:
         arena: Arena. Trials begin at the place with the most room.

@@ -87,7 +87,7 @@ def fit_motion(
 
     Args:
         trials: Recorded trials with poses, with the distance of the wheels, or with both.
-        simulate: Carries out trials in the arena, such as `SimEnsemble(...).replay`.
+        simulate: Simulator of trials in the arena, such as `SimEnsemble(...).replay`.
         robot: Robot with the numbers that are not fitted.
         arena: Arena of the trials.
         observe: Use no more than this of the trials.

@@ -52,7 +52,7 @@ PARTS = {"drive.delay_jitter": 0.05, "drive.heading_noise_per_m": 0.05,
 def is_motion(name: str) -> bool:
     """Return whether a parameter determines the mean motion of a robot and can be distinguished from the others.
 
-    Slip cannot: what it takes from a wheel's way is as well taken from its gain.
+    Slip cannot, because it reduces a wheel's distance in the same way as a lower gain.
     """
     return not name.startswith(("range.", "stall.")) and name not in (*NOISE, SLIP)
 

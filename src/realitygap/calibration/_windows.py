@@ -155,8 +155,8 @@ def differences(
 ) -> Floats:
     """Return observed minus simulated values, by `CHANNELS`, (m, w, 5); nan if not observed.
 
-    Of the middle of the axle, which is where wheels put it whatever the heading does; half of an error of the turn is
-    taken out of the direction of the way, as that much of it is expected.
+    Differences are those of the axle's middle, whose place depends on the wheels but not on the heading. Half of an
+    error of the turn is subtracted from the direction of motion, because that part of it is expected.
     """
     before, after, way = windows.seen
     axle = values.get("drive.axle", np.full(len(simulated.after), plain_numbers(robot)["drive.axle"]))

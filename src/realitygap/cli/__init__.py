@@ -88,7 +88,7 @@ def main() -> None:
 def _safe_path_for_children() -> Iterator[None]:
     """Keep child processes from looking for modules in the current folder, which may hold anybody's files.
 
-    Whoever calls `main` in a process of their own gets their environment back.
+    A program that calls `main` in its own process gets its environment back.
     """
     before = os.environ.get("PYTHONSAFEPATH")
     os.environ["PYTHONSAFEPATH"] = before or "1"

@@ -240,7 +240,7 @@ def _refuse_other_files(out: Path) -> None:
     """Raise an error if a file is not a calibration, which may be overwritten.
 
     Raises:
-        StudyError: It is something else, or a calibration that somebody changed and that cannot be read.
+        StudyError: It is another file, or a calibration that was changed and cannot be read.
     """
     from realitygap.world import read_calibration
 

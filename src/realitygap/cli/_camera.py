@@ -33,7 +33,7 @@ def under_camera(
         observer: Observer without a camera; None if no person has to place the robot.
 
     Raises:
-        StudyError: The camera's options cannot be, or nobody stands beside the robot.
+        StudyError: The camera's options are wrong, or the robot has no operator.
         VisionError: There is no such camera.
     """
     if spec is None:

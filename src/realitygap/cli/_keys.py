@@ -22,8 +22,8 @@ _REST_S = 0.05
 def read_line() -> str:
     """Return a typed line, without blanks around it.
 
-    Ctrl-C ends it at once: a plain `input` goes on reading, because polars has signals restart what they interrupt,
-    while `select` is never restarted.
+    Ctrl-C ends it immediately. A plain `input` would continue to read, because polars has interrupted calls restarted,
+    but `select` is never restarted.
 
     Raises:
         KeyboardInterrupt: Ctrl-C, or the terminal is gone.

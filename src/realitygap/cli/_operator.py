@@ -77,8 +77,8 @@ def choose_operator(
         witness: HOST:PORT of an emulator's witness.
         answers: Answers that were given in advance.
         folder: Folder of the results, whose ledger stores notes.
-        quiet: Whether standard output is for something else: a person is spoken to on standard error, and a witness's
-            trials are not told of.
+        quiet: True if standard output has another purpose. Then questions go to standard error, and a witness's trials
+            are not reported.
     """
     from realitygap.records import LEDGER_NAME, Ledger
     from realitygap.robots import is_in_this_program

@@ -1,8 +1,8 @@
 """The Fluke's camera: pictures of the arena drawn by casting rays, in the camera's own format.
 
 In each group of four bytes of a row, byte 0 is V, 1 is Y, 2 is U and 3 is Y. The floor is light with the grid's cells
-marked in gray, tape on it is dark, the walls are of wood and end at a height of 9 cm, above them is the room. Where the
-camera sits, how wide it sees and all colors are chosen.
+in gray, and tape on it is dark. The walls are of wood, 9 cm high, and the room is above them. The camera's position and
+field of view and all colors are chosen.
 """
 
 from __future__ import annotations

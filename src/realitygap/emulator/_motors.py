@@ -257,7 +257,7 @@ class S2Motors:
     def statistics(self, now: int) -> bytes:
         """The answer to GET_MOTOR_STATS.
 
-        How each byte is scaled is known for the first three; the idler's speed is taken as half the counts.
+        The scale of a byte is known for the first three. The idler's speed is assumed to be half the counts.
         """
         fresh = [entry for entry in self._recent if entry[0] > now - STATISTICS_NS]
         left, right = (sum(entry[wheel] for entry in fresh) for wheel in (1, 2))

@@ -1,7 +1,7 @@
 """The S2's commands by distance: the motions of its wheels, and the robot's estimate of the pose.
 
-Positions are dead reckoning of the commands: they take the target's value at once. Lengths are in the S2's unit of
-half a millimeter, angles in its unit of 955 a full circle, counter-clockwise positive.
+Positions are dead reckoning of the commands: they change to the target's value immediately. Lengths are in the S2's
+unit of half a millimeter, angles in its unit of 955 a full circle, counter-clockwise positive.
 
 Source: ipre_s2_port.spin of Myro's repository, and what is known of s2.spin. How an arc to a point begins, with a turn
 on the spot to its tangent, is inferred.

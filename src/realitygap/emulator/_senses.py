@@ -1,7 +1,7 @@
 """The readings of the Scribbler's and the Fluke's sensors at the robot's pose, with noise.
 
-Mounts are forward, left [m] and direction [rad] in the Scribbler's frame; the Fluke looks to the other end. Where a
-number is not known from a source it is said so.
+Mounts are forward, left [m] and direction [rad] in the Scribbler's frame; the Fluke looks to the other end. A comment
+marks each number without a source.
 """
 
 from __future__ import annotations

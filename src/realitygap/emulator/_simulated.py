@@ -18,7 +18,7 @@ SCRIBBLER_BODY = Body(((0.089, 0.0795), (0.089, -0.0795), (-0.089, -0.0795), (-0
 class SimulatedRobot(Protocol):
     """A robot on two wheels in its own world.
 
-    One that has an `identity`, a text that no other robot has, is told by it from others; else its class is.
+    If it has an `identity`, a unique text, that identifies it; otherwise its class does.
 
     Attributes:
         pose: Pose of the point midway between its wheels; the heading is that of the Scribbler's end without the

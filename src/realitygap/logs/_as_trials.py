@@ -66,7 +66,7 @@ def trials_of(log: Log, log_map: LogMap, first: int = 0) -> Iterator[TrialRecord
         first: Number of the first stretch.
 
     Raises:
-        LogError: A wheel is told to be faster than the robot can be, or nothing is known of any stretch.
+        LogError: A command exceeds the robot's speed, or no part of the log has observations.
     """
     left, right = log.commands.T
     fastest = float(np.abs(log.commands).max(initial=0.0))
@@ -130,7 +130,7 @@ def _known(log: Log, poses: Floats) -> list[tuple[int, int]]:
 def path_headings(xy: Floats, forward: Floats) -> Floats:
     """Return (n + 1,) headings of a robot that moves along its heading, from its path [rad].
 
-    Where it hardly moves the heading is interpolated.
+    The heading is interpolated in parts with little motion.
 
     Args:
         xy: (n + 1, 2) positions [m]; nan if unknown.

@@ -22,7 +22,7 @@ class GraphWin:
     Args:
         title: Title of the window. It replaces a window of the same title.
         width, height: [pixels].
-        autoflush: Taken and ignored: each change is shown at once.
+        autoflush: Ignored, because each change is shown immediately.
     """
 
     def __init__(

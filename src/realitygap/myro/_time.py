@@ -48,7 +48,8 @@ def timer(seconds: float = 0) -> Iterator[float]:
 def timeRemaining(seconds: float = 0) -> bool:
     """Return whether time remains, for loops: `while timeRemaining(5):` runs for 5 seconds.
 
-    Each line of a program has a timer of its own, which begins when the line is reached first and anew after it ended.
+    Each line of a program has its own timer, which starts when the program first reaches the line, and again after it
+    has ended.
 
     Args:
         seconds: Duration [s]; 0 for ever.
@@ -56,8 +57,8 @@ def timeRemaining(seconds: float = 0) -> bool:
     Raises:
         MyroError: It is not a number of at least 0.
 
-    Differs: In a function that was left before the time was over, the next call begins anew; Myro went on with what
-    remained.
+    Differs: If a function returned before the time was over, the next call restarts the timer. Myro continued with the
+    remaining time.
     """
     duration = number("timeRemaining: the seconds", seconds, 0)
     if not duration:

@@ -53,10 +53,10 @@ class Page(Protocol):
 class WatchedRobot:
     """A robot with a view below the notebook's cell: its pose, its readings, and its visited cells.
 
-    It meets the contract of robots and passes everything on. Where the robot is comes from the robot itself where it
-    knows (a simulated one), from the witness of an emulator, or from `pose`; a robot of which nobody knows is shown
-    alone with its rays. A robot that needs no time for a command is held back, so that one can see it; a real one
-    never. When it is stopped, the trial can be played again.
+    It meets the contract of robots and passes everything on. The robot's pose comes from the robot itself (a simulated
+    one), from the witness of an emulator, or from `pose`. A robot without a known pose is shown alone with its rays. A
+    robot whose commands take no time is slowed down for the viewer, but a real one never is. When it is stopped, the
+    trial can be replayed.
 
     Args:
         robot: any robot under the contract.

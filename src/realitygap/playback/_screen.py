@@ -90,7 +90,7 @@ def plain_style() -> Iterator[None]:
 class Screen:
     """Draws moments of trials as pictures of one size; use under `plain_style`.
 
-    What stands still is drawn once, and what moves over it.
+    Fixed parts are drawn once, and moving parts are drawn over them.
 
     Args:
         trials: at most eight, in one arena.

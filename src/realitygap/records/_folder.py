@@ -149,7 +149,7 @@ class ResultsFolder(PublishedResults):
     def accept(self, inbox: Path, deliveries: Sequence[Delivery]) -> None:
         """Publish chunks out of an inbox of this folder; once this returns, they survive a crash.
 
-        Both ends of a file are looked at here, and all of it whenever it is read.
+        Both ends of a file are checked here, and the whole file whenever it is read.
 
         Raises:
             RecordError: a file is not there or not whole, replicates are published already, a
@@ -184,7 +184,7 @@ class ResultsFolder(PublishedResults):
     def append_log(self, event: Mapping[str, Any]) -> bool:
         """Append an event to the log, with its `time` (UTC) and `host`; whether it was written.
 
-        A failure never stops a run, since no result depends on the log; it is told by a `RecordWarning`.
+        A failure never stops a run, because no result depends on the log. It gives a `RecordWarning`.
         """
         return append_line(self._path / LOG_NAME, event)
 

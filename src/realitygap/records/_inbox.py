@@ -1,8 +1,7 @@
 """An inbox, in which processes without a folder's lock leave chunks for the process that has it.
 
-Only the holder of the lock publishes, by renaming out of its own inbox. What a worker of an earlier sitting still
-computes goes to an inbox that is gone, so that it can neither overlap with what was planned since nor come back
-after `--fresh`.
+Only the holder of the lock publishes, by renaming out of its own inbox. Results of a worker of an earlier program go to
+an inbox that no longer exists. So they can neither overlap with later plans nor reappear after `--fresh`.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Functions that write inside a folder of any origin, but never through a link, a pipe, or a device.
 
 The user names the folder, so the folder itself may be a link. Whoever made the folder chose the names in it: a link
-there would let them have any file of the user overwritten. A folder that others change at the same moment is not
-covered.
+there would let them have any file of the user overwritten. The functions do not protect from others who change the
+folder at the same moment.
 """
 
 from __future__ import annotations

@@ -205,7 +205,7 @@ def connect(path: Path, *, writable: bool) -> sqlite3.Connection:
 
     Raises:
         LedgerError: it is missing, torn, foreign or locked.
-        RecordError: it, or a file of SQLite's beside it, is a link, a pipe or a device.
+        RecordError: It, or one of SQLite's files next to it, is a link, a pipe or a device.
         RecordVersionError: it has another format.
     """
     if not path.exists():

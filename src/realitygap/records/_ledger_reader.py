@@ -149,7 +149,7 @@ class LedgerReader(ClosedOnExit):
     def record(self, number: int) -> TrialRecord:
         """Return a trial as it was driven and observed.
 
-        It has poses if somebody saw the driven path, and a last look if the robot had one. `step_s` is the median of
+        It has poses if the driven path was recorded, and a last look if the robot had one. `step_s` is the median of
         the times between commands. A trial that was not driven has no commands.
         """
         trial, score = self.trial(number), self.counted_score(number)

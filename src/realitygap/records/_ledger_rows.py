@@ -38,9 +38,9 @@ def complete_runs(ledger: Ledger, condition: str) -> list[int]:
 def ledger_frame(ledger: Ledger, condition: str) -> pl.DataFrame:
     """Return a row for each individual of a condition's complete runs, with the columns of records, in key order.
 
-    Cells and coverage are those of the last correction, where there is one; `fitness` and `novelty` stay what selection
-    used. `coverage_ends` is null where nobody saw in which cells steps end, and `coverage_line` where nobody counted
-    cells. Of another task than coverage, `task_fitness` is what the trial is worth by it.
+    Cells and coverage are those of the last correction, if there is one. `fitness` and `novelty` are the values that
+    selection used. `coverage_ends` is null if the cells in which steps end are unknown, and `coverage_line` if cells
+    were not counted. For another task than coverage, `task_fitness` is the score of the trial.
     """
     runs = complete_runs(ledger, condition)
     settings = ledger._one("SELECT settings FROM conditions WHERE name = ?", condition)

@@ -163,8 +163,8 @@ def _table(name: str, values: Mapping[str, Any]) -> NDArray[np.float64]:
 class ObservationsFile(ClosedOnExit):
     """A file to which trials are added as they end.
 
-    One that is there is taken up where it ends: a torn last line is cut off, and what it was is told in `problem`. A
-    target whose identity is known on both sides may have another name, such as another port.
+    An existing file is extended. An incomplete last line is cut off and described in `problem`. A target whose identity
+    is known on both sides may have another name, such as another port.
 
     Args:
         path: Path of the file. It is made if it does not exist.

@@ -15,7 +15,7 @@ from realitygap.errors import RecordError
 def write_frames(path: Path, frames: Iterable[pl.DataFrame], schema: pl.Schema) -> int:
     """Write frames of one schema to a file. An existing file is replaced once the new one is complete.
 
-    They are written to files of their own first, which polars then joins as a stream.
+    They are first written to separate files, which polars then joins as a stream.
 
     Returns:
         The number of rows.

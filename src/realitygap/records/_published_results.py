@@ -44,7 +44,7 @@ from realitygap.records._version import RESULTS_VERSION, RecordWarning
 class PublishedResults:
     """Published results of a folder: `study.json`, `trials/*.parquet`, `log.jsonl`, `ledger.sqlite`.
 
-    The rows of conditions that a robot drove come out of the ledger, those of complete runs, beside the others'.
+    For conditions that a robot drove, the ledger gives the rows of complete runs.
     """
 
     def __init__(self, path: Path, description: Description) -> None:

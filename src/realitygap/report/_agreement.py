@@ -23,7 +23,7 @@ class Agreement:
 
     Attributes:
         n_trials: counted by two.
-        n_cells: judged in all, every reachable cell of each trial.
+        n_cells: Total number of judged cells: every reachable cell of each trial.
         same: share of these that both judge alike [0..1].
         kappa: Cohen's kappa: 1 for perfect agreement, 0 for agreement by chance; None if all cells are alike.
         low: lower bound of its 95 % interval; None below 10 trials.

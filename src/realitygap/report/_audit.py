@@ -178,7 +178,7 @@ class AuditProgress:
 
     Attributes:
         n_done: pairs of conditions compared.
-        n_pairs: pairs in all.
+        n_pairs: Total number of pairs.
         n_runs: lines of the table; thousands take minutes.
     """
 
@@ -206,8 +206,7 @@ def audit_results(table: str | Path, *, denominator: int | None = None, tell: Te
         The audit.
 
     Raises:
-        TableError: the file cannot be read, or its columns or rows are not as expected; all rows that are
-            wrong are named at once.
+        TableError: The file cannot be read, or its columns or rows are wrong. The message names all wrong rows.
         TypeError, ValueError: `denominator` is not a whole number, or below 1.
     """
     if denominator is not None:

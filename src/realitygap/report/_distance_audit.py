@@ -145,10 +145,10 @@ def audit_distance(
 ) -> DistanceAudit:
     """Measure the weight of each cell in a distance of behaviors, and the influence of the number of cells.
 
-    A random walk starts in any of the paper's 12 x 6 cells and makes 1 to 87 steps to one of the four next cells, going
-    on as it went in six of ten. A cell's leverage is the mean distance from a walk to the same walk without the cell,
-    or with it where the walk leaves it out: it then comes right after the first visit of the cell nearest to it. Of a
-    metric that is the most by which the cell can change the distance to any behavior.
+    A random walk starts in any of the paper's 12 x 6 cells and makes 1 to 87 steps to one of the four next cells. It
+    keeps its direction in six of ten steps. A cell's leverage is the mean distance from a walk to the same walk without
+    the cell. If the walk lacks the cell, it is compared with the walk that visits it right after the nearest cell. For
+    a metric, this is the largest change of the distance to any behavior by the cell.
 
     Args:
         name: Name of the distance.

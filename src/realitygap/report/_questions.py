@@ -186,7 +186,7 @@ class Variety:
 def measure_variety(folder: Results) -> list[Variety]:
     """Mean distance between the behaviors of a run, for up to 100 runs a condition.
 
-    A behavior is the set of cells along the line driven. Of a run with more than 40, as many are drawn with a
+    A behavior is the set of cells along the line driven. From a run with more than 40 behaviors, 40 are drawn with a
     fixed seed.
 
     Args:

@@ -96,7 +96,7 @@ def task_named(task: str | Task, *, allow_code: bool = False) -> Task:
 def check_files(study: Study, folder: Path) -> None:
     """Raise an error unless the Python files of a study are in a folder, with the texts that the study has.
 
-    A folder of results keeps the text for the record. What runs is a file that the user has.
+    A folder of results keeps the text for the record. The code that runs is a file of the user.
 
     Raises:
         StudyError: A file is missing, or has another text.

@@ -66,7 +66,7 @@ def sample_controllers(
 
     Raises:
         ValueError: n is out of range.
-        StudyError: There is no such study, it has no condition of use, or there are not so many champions.
+        StudyError: There is no such study, it has no usable condition, or there are too few champions.
         RecordError: There are no such results.
         TaskError: The Python file of a task is not allowed.
     """

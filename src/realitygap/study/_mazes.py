@@ -43,7 +43,7 @@ def measure_maze(
         seeds: Number of runs of each reward, 1 to 2**32.
         seed: Seed of the random numbers of all runs, 0 to 2**63 - 1.
         changes: Settings by name that replace those of the set and the task.
-        threads: Runs at once; as many as there are processors when not given.
+        threads: Number of runs in parallel. Default: the number of processors.
         tell: Called with the progress after each run.
 
     Returns:

@@ -61,7 +61,7 @@ def carry_out_order(order: dict[str, Any]) -> None:
     """Compute a chunk and deliver it; called by a worker. Return the error, or nothing.
 
     Raises:
-        ClusterError: this is another version, or the folder is not seen here or cannot be written.
+        ClusterError: This is another version, or the folder does not exist here or cannot be written.
     """
     if order["software"] != software():
         raise _refusal(_other_software(order["software"], software()))

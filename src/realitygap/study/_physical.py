@@ -87,7 +87,7 @@ class PhysicalStudy:
             The action that is required before the study can continue; empty if the study is complete.
 
         Raises:
-            RobotError: The robot failed; what became of the trial in flight is asked when the study goes on.
+            RobotError: The robot failed. When the study resumes, the operator is asked about the running trial.
             LedgerError: The ledger cannot be written or trusted.
             StudyError: The operator did not accept the pre-flight, or nobody sees what a task is scored by.
             TrialInterrupted: The program is being stopped.

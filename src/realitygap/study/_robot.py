@@ -33,7 +33,7 @@ def default_operator(port: str) -> Operator:
     """The witness of an emulator in this program.
 
     Raises:
-        StudyError: Some other port: somebody has to place that robot and look at what it drew.
+        StudyError: Another port, whose robot needs a person who places it and scores its trials.
     """
     if is_in_this_program(port):
         return Operator(WitnessObserver())

@@ -95,7 +95,7 @@ def refuse_lost(n: int, name: str, kept: str = "") -> None:
     """Raise an error if a trial was lost for good, unless lost trials are skipped.
 
     Raises:
-        RobotError: So many were.
+        RobotError: A trial was lost. The message has the number of lost trials.
     """
     if n:
         lost = f"{n} trials on {name} were" if n > 1 else f"A trial on {name} was"

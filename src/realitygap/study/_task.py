@@ -42,7 +42,7 @@ def measure_task(
         seeds: Number of runs, 1 to 2**32.
         seed: Seed of the random numbers of all runs, 0 to 2**63 - 1.
         changes: Settings by name that replace those of the set and the task.
-        threads: Runs at once; as many as there are processors when not given.
+        threads: Number of runs in parallel. Default: the number of processors.
         tell: Called with the progress after each run.
 
     Returns:
@@ -164,7 +164,7 @@ def run_in_threads(
     Args:
         run: Computes the run of a number.
         n_runs: Number of runs.
-        threads: Runs at once.
+        threads: Number of runs in parallel.
         tell: Called with the progress.
         begin: Called before the time is taken, such as to compile the kernels.
         stop: Called when an error or Ctrl-C ends the others.

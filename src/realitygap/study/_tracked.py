@@ -143,7 +143,7 @@ def place_trial(
 
     Raises:
         VisionError: It cannot be found.
-        StudyError: The robot was not seen from its beginning to its end.
+        StudyError: The track does not include the whole trial.
     """
     if begins_s is None:
         begun = find_beginning(track, wanted.times, wanted.trial.commands, wanted.trial.stalled)

@@ -171,7 +171,7 @@ def _tell_driven(tell: Tell | None, k: int, _: int, trial: TrialRecord) -> None:
 class ResumableTarget(WrappedTarget):
     """A target that saves each trial and does not repeat those in its file.
 
-    Of trials of one plan the last one counts.
+    If a plan has several trials, the last one counts.
     """
 
     def __init__(self, target: Target, file: ObservationsFile) -> None:

@@ -26,8 +26,8 @@ class PlatformContractError(RealityGapError):
 def check_platform(platform: Platform, arena: Arena | None = None) -> None:
     """Raise an error unless a platform keeps the contract of `realitygap.platforms.Platform`.
 
-    A simulated platform is opened in each way that studies, targets, environments and live views open it. Of a physical
-    platform only the settings are checked: `check_robot` tries out its robot.
+    A simulated platform is opened in each way that studies, targets, environments and live views open it. For a
+    physical platform, only the settings are checked. `check_robot` checks its robot.
 
     Args:
         platform: Platform with settings for short trials.

@@ -229,7 +229,7 @@ class Tried(NamedTuple):
 class PlatformTrials(Protocol):
     """A platform set up in an arena, ready to try networks of one kind.
 
-    One of these serves one thread. What it hands out may be written over by the next call.
+    Use one of these per thread. The next call may overwrite the arrays that it returned.
 
     Attributes:
         arena: Arena with the numbers that the platform's settings give. A drawn number has its center.

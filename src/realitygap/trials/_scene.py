@@ -117,8 +117,8 @@ def simulate_file(case: str | Path, out: str | Path) -> tuple[Case, SceneTrack]:
     """Run the case in the JSON file `case` and write its track to `out`, a CSV file.
 
     Raises:
-        CaseError: The case cannot be carried out as written, or `out` ends in something else than .csv, cannot
-            be written, or belongs to a study's results.
+        CaseError: The case cannot be run as written, or `out` does not end in .csv, cannot be written, or belongs to a
+            study's results.
     """
     case, out = Path(case), Path(out)
     if case.exists() and out.exists() and case.samefile(out):

@@ -143,7 +143,7 @@ def _tag_corners(gray: NDArray[np.uint8]) -> dict[int, Floats]:
     """Return the corners of the four tags, upper left, upper right, lower right, lower left, (4, 2) [px] each.
 
     Raises:
-        SheetError: One of them is not seen.
+        SheetError: One of them is not found.
     """
     cv2 = from_extra("cv2", "vision")
     settings = cv2.aruco.DetectorParameters()

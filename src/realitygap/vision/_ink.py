@@ -43,8 +43,8 @@ def ink_density(picture: NDArray[np.uint8], layout: SheetLayout, px_per_m: float
 def _paper(light: Floats, px_per_m: float) -> Floats:
     """Return the light of bare paper, (h, w, 3), without lines but with the edges of shadows.
 
-    Where lines lie so close that no paper is seen between them, it is taken from further away. A shadow is nearly
-    gray and never black; what is colored or black is ink.
+    If lines are so close that no paper is visible between them, paper farther away is used. A shadow is nearly gray and
+    never black, so colored or black pixels are ink.
     """
     cv2 = from_extra("cv2", "vision")
     smooth = cv2.GaussianBlur(light, (0, 0), 0.0006 * px_per_m)  # or noise would lift it

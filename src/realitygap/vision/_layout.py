@@ -69,7 +69,8 @@ Box = tuple[float, float, float, float]
 class SheetLayout:
     """The sheet of an arena: its walls' rectangle with the grid, four tags, the start, and a box to try each pen in.
 
-    Where the outer ring of cells is wide enough tags and boxes lie in it, where no pen comes; else around the walls.
+    If the outer ring of cells, which pens do not reach, is wide enough, tags and boxes are in it; otherwise, they are
+    around the walls.
 
     Attributes:
         walls: Left, lower, right and upper end of what the walls enclose [m].

@@ -189,9 +189,9 @@ def _closing(
 ) -> tuple[list[NDArray[np.int64]], NDArray[np.int64]]:
     """Links between ends of a trace that lead to each other under other ink, and the ends left; each has one at most.
 
-    The trace's own points cost at least what a crossing does, or each link would go back along the trace. Where no
-    line of its own begins at the start, one that lies under others may: then the start is an end like others, which
-    can be left in any direction.
+    The trace's own points cost at least as much as a crossing; otherwise, each link would go back along the trace. If
+    no visible line of the trace begins at the start, a hidden one may. Then the start is an end like others, from which
+    a link may leave in any direction.
     """
     ends, outward = _ends(own | links)
     if start is not None:

@@ -79,7 +79,7 @@ class Mixtures:
     def presence_along(self, passing: Floats, of_itself: Floats) -> Floats:
         """Return the probability of each ink, (n, p), given the probabilities that other pens' traces pass.
 
-        What is known of a pen's own trace counts little for it: what others explain is not evidence of it.
+        A pen's own trace has little weight, because ink that other pens explain is no evidence of it.
 
         Args:
             passing: (n, p) between 0 and 1.

@@ -131,7 +131,7 @@ def arena_of_map(
     """Return the arena around the free space of a map that a start belongs to.
 
     Each border of this space becomes walls: straight lines that end at corners of pixels, and that are nowhere further
-    from it than the tolerance and half a pixel. What cannot be reached from the start is left out.
+    from it than the tolerance and half a pixel. Parts that cannot be reached from the start are left out.
 
     Args:
         source: The map, or its YAML file.

@@ -78,8 +78,8 @@ def corner_tags(
 ) -> Mapping[int, Floats]:
     """The corners of the four tags at an arena's corners, upright for who looks with +y up.
 
-    As `realitygap print-sheet` has them, unless something else is said: in the ring around the reachable cells where
-    that is wide enough, else just outside the walls.
+    By default, they are as on the sheet of `realitygap print-sheet`: in the ring around the reachable cells if that is
+    wide enough, otherwise just outside the walls.
 
     Args:
         arena: Arena whose walls span a rectangle.

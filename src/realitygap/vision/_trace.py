@@ -68,8 +68,8 @@ class Trace:
 def follow_traces(maps: PenMaps, start: tuple[float, float]) -> list[Trace]:
     """Follow the traces of all pens, first separately, and then several times given the others.
 
-    Where lines lie on each other their mixture may look like another pen's ink; it is not where two lines that
-    explain it go on at either end. What is found of one trace so tells of the next, and again.
+    The mixture of two crossing lines may look like another pen's ink. It is not, if both lines continue on either side.
+    So each trace gives information about the next, and the pass is repeated.
 
     Args:
         maps: Maps of `separate_pens`.
@@ -144,7 +144,7 @@ def _is_near(ends: NDArray[np.int64], shape: tuple[int, ...]) -> NDArray[np.bool
 def _pooled(maps: PenMaps, pen: int) -> tuple[Floats, Floats, Floats, Floats]:
     """Return presence, links, likelihood of hidden ink, and strength of ink, at points a millimeter apart.
 
-    A pixel at the edge of a line has a color of its own; those in the middle of the line tell.
+    A pixel at the edge of a line has a mixed color, so those in the middle of the line count.
     """
     cv2 = from_extra("cv2", "vision")
     pool = max(1, round(maps.px_per_m * STEP))

@@ -118,7 +118,7 @@ class Arena:
         """Return all walls and the sides of obstacles as straight walls, the only ones in Jyro, (w, 4) [m].
 
         Raises:
-            ValueError: An obstacle is round, or a number is drawn anew.
+            ValueError: An obstacle is round, or a number is a distribution.
         """
         round_ones = [str(k) for k, obstacle in enumerate(self.obstacles) if obstacle.radius]
         if round_ones:
@@ -178,7 +178,7 @@ class Arena:
         """Return the file that keeps it; `load_arena` reads it.
 
         Raises:
-            ValueError: It has a picture on its floor, which is a file of its own, or numbers that are drawn.
+            ValueError: It has a picture on its floor, which is a separate file, or numbers that are drawn.
         """
         return self._file().to_toml()
 

@@ -256,7 +256,7 @@ class ArenaFile(Described):
         """Return the file that keeps it; `load_arena` reads it.
 
         Raises:
-            ValueError: It has a picture on its floor, which is a file of its own, or numbers that are drawn.
+            ValueError: It has a picture on its floor, which is a separate file, or numbers that are drawn.
         """
         if self.floor.image is not None or self.vary:
             what = "numbers that are drawn" if self.vary else "a picture on its floor"

@@ -26,7 +26,8 @@ TOP = 1.0 - 2.0**-32
 def check_drawn_starts(arena: Arena, robot: Body | RobotModel) -> None:
     """Refuse an arena in which the robot would not fit at the start for some of what is drawn.
 
-    Looked at are the ends of what is drawn of the start, and some draws of all that moves it, obstacles or walls.
+    It checks the ends of the distributions of the start, and some draws of all numbers that move the start, obstacles,
+    or walls.
 
     Raises:
         ValueError: As `check_start`, with what was drawn.

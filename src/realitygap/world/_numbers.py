@@ -70,8 +70,8 @@ class Limits:
 class Described(Settings):
     """A description with numbers that have names, each a plain number or a distribution.
 
-    A field's value is a plain float; `vary` says which of them are drawn, and how. Where a distribution is given in
-    place of a number, as files do, its center becomes the field's value and it goes to `vary`.
+    A field's value is a plain float, and `vary` has the distributions of those that are drawn. If a distribution is
+    given instead of a number, as in files, its center becomes the field's value and it goes to `vary`.
     """
 
     vary: dict[str, Distribution] = Field(

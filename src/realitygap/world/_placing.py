@@ -47,7 +47,7 @@ def roomiest_starts(arena: Arena, n: int) -> tuple[Pose, ...]:
     """Return n starts for further robots, each at the place with the most room, with the heading of the arena's start.
 
     Each is the center of the reachable cell whose distance to walls and obstacles, or half of whose distance to the
-    starts before it, whichever is less, is largest. Of several alike it is the first.
+    starts before it, whichever is less, is largest. If several are equal, it is the first.
     """
     grid, starts = arena.grid, [arena.start]
     centers = [

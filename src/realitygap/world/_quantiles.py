@@ -1,7 +1,7 @@
 """Logarithm, exponential and the normal distribution's quantile in plain arithmetic: the same bits on every machine.
 
-What a study draws is in its records, so no function of a mathematical library is used here, whose last bit differs
-from machine to machine.
+Records contain the numbers that a study draws. So this module uses no function of a mathematical library, whose last
+bit differs between machines.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """An arena drawn in SVG, as the values of an arena file.
 
-Shapes that are not filled, and lines, are walls; filled ones are obstacles. What else a shape is says its `data-kind`,
-its class or the letters of its id: start, goal, light, tape, wall, obstacle or ignore.
+Shapes that are not filled, and lines, are walls; filled ones are obstacles. Its `data-kind`, its class, or the letters
+of its id give any other kind of a shape: start, goal, light, tape, wall, obstacle or ignore.
 """
 
 from __future__ import annotations

@@ -50,9 +50,9 @@ class Independence:
 def independence(placements: list[Placement], rng: np.random.Generator) -> Independence:
     """Test whether consecutive readings, and those of one placement, are more alike than others.
 
-    Both tests shuffle readings. Where they find something, the number of readings is reduced: by (1 - r) / (1 + r) for
-    the correlation r of consecutive ones, and by 1 + (n - 1) i for n effective readings a placement of which a share i
-    of the variance lies between placements.
+    Both tests shuffle readings. If they detect a dependence, the number of readings is reduced: by the factor (1 - r) /
+    (1 + r) for the correlation r of consecutive ones, and by the divisor 1 + (n - 1) i for n effective readings per
+    placement with a share i of the variance between placements.
     """
     rows = [np.asarray(placement.readings, np.float64) for placement in placements]
     n = sum(map(len, rows))

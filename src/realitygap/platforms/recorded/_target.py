@@ -84,7 +84,7 @@ class RecordedTarget(RepeatableTarget):
         """See `Target.carry_out`. Start, duration, and number of a trial are those of the record.
 
         Raises:
-            RecordError: There are not so many trials of a controller.
+            RecordError: There are too few trials of a controller.
         """
         check_plans(plans, observe, self, MOST_NUMBER)
         taken: Counter[str] = Counter()

@@ -42,7 +42,7 @@ Finely = tuple[int, int]
 class Rehearsal:
     """Robots (m) in k trials of t commands, in single precision; row 0 is the start.
 
-    What was not to be kept has no steps.
+    Values that are not stored have no steps.
 
     Attributes:
         poses: (m, k, t + 1, 3) x [m], y [m], heading [rad, -pi to pi]; before the robot was put back to an anchor.

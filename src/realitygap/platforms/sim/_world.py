@@ -100,7 +100,7 @@ class SimWorld:
             noise_key: Key of the random numbers. Default: one from the world's seed and the robot's number.
 
         Raises:
-            RobotError: The world has begun, the name is taken, or it stands in a wall or another robot.
+            RobotError: The world has begun, the name is taken, or the start is in a wall or another robot.
             ValueError: There is no such robot or color.
         """
         if self.n_steps:
@@ -260,7 +260,7 @@ class SimWorldRobot(ProgramRobot):
         """The command of this and all further steps, each part -1..1.
 
         Raises:
-            ValueError: A part is not within -1..1. The robot goes on as before.
+            ValueError: A part is not within -1..1. The robot keeps its last command.
         """
         self.command = check_command(Command(move, turn))
 

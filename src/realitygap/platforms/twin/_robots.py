@@ -54,7 +54,7 @@ class TwinRobots(TakenRobots):
     def begin(self, key: NoiseKey) -> None:
         """Put all robots at the start; robot k draws the numbers of individual `key.individual` + k.
 
-        A twin that was closed is opened again: some checkers of environments close one and go on with it.
+        A closed twin is opened again, because some checkers of environments close one and continue to use it.
         """
         if self._pool.is_closed:
             self._pool = TwinPool(self._pool.file, self._arena, 1)

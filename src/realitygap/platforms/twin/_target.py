@@ -18,7 +18,7 @@ from ._pool import TwinPool
 class TwinTarget(RepeatableTarget):
     """A twin, whose file this process never opens.
 
-    Trial `number` is the same whenever it is carried out, by whichever process.
+    Trial `number` is the same in any process and at any time.
 
     Args:
         file: File of the twin.

@@ -28,8 +28,8 @@ AT_REST = 1e-4  # speed of a wheel that has come to rest [m/s]
 class TwinBody:
     """A twin that the emulator moves, in the Scribbler's frame: the end without the caster is ahead.
 
-    It meets `realitygap.emulator.SimulatedRobot` and what a body may have of its own: infrared, battery, noise. Steps
-    of speed are the firmware's, and so are `motors.stepped` and `step_s` of no effect.
+    It has the interface of `realitygap.emulator.SimulatedRobot` and the optional parts of a body: infrared, battery,
+    noise. The firmware sets the steps of speed, so `motors.stepped` and `step_s` have no effect.
 
     Args:
         model: The twin.
@@ -43,7 +43,7 @@ class TwinBody:
 
     Raises:
         MissingExtraError: MuJoCo is not installed.
-        ValueError: The twin's engine is sim, which has no body of its own.
+        ValueError: The twin's engine is sim, which has no separate body.
     """
 
     def __init__(self, model: TwinModel, arena: Arena) -> None:

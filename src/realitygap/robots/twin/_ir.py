@@ -24,8 +24,8 @@ class IrSensors:
     """The infrared sensors of one twin in one trial.
 
     The light of a ray that meets a wall after d comes back as gain * (half / d)^2 * cos(angle)^incidence, weighted by a
-    lobe with half its strength at the edge of the cone, and so much of the pulses is seen as a logistic curve in the
-    light's logarithm says. Each sensor asks anew, so that three that ask one emitter differ.
+    lobe with half its strength at the edge of the cone. The detected share of the pulses is a logistic function of the
+    light's logarithm. Each sensor counts its own pulses, so that three sensors with the same emitter differ.
 
     Args:
         model: The twin.

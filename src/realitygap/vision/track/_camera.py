@@ -164,8 +164,8 @@ def _fit_from(
 ) -> tuple[float, Camera]:
     """Return the error of the best fit that starts from a guess, and that fit.
 
-    Of the robot's tag in each view, where it is follows from the camera: only the camera's own numbers are fitted, and
-    by how much the corners of all tags are found too far inside (a blurred corner is round).
+    The place of the robot's tag in each view follows from the camera. So only the camera's own numbers are fitted, and
+    the distance by which the corners of all tags are found too far inside (a blurred corner is round).
     """
     from scipy.optimize import least_squares
 

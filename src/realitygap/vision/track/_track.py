@@ -98,9 +98,8 @@ def track_of(found: Sightings, camera: Camera, tag: RobotTag) -> Track:
     """Return the poses of a robot from its tag.
 
     The tag's corners are put down on the plane of its height, so its parallax is taken out; the heading is that of the
-    square in this plane. Sightings of a wrong size or shape, and leaps, count as not seen. Gaps are filled with cubic
-    curves that leave and arrive at the speed before and after; what was not seen before the first sighting and after
-    the last has no poses.
+    square in this plane. Sightings of a wrong size or shape, and leaps, are ignored. Gaps are filled with cubic curves
+    that have the speed before and after at their ends. There are no poses before the first sighting and after the last.
 
     Raises:
         VisionError: It was hardly seen.

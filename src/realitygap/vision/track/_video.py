@@ -62,7 +62,7 @@ class Marks:
         """Compute the track and the camera from sightings.
 
         Raises:
-            VisionError: The robot's tag or too many corner tags were not seen, or they are not where they should be.
+            VisionError: The robot's tag or too many corner tags were not found, or they are at wrong places.
             ValueError: The corner tags do not fit into the arena.
         """
         refuse_unseen(found, self.tag)

@@ -23,8 +23,8 @@ class IntervalRanks:
     """Ranks of the ordered values that bound the interval of the median.
 
     Attributes:
-        lower: rank of the lower bound, counted from 1.
-        upper: rank of the upper bound, n + 1 - lower.
+        lower: Rank of the lower bound, counted from 1.
+        upper: Rank of the upper bound, n + 1 - lower.
         coverage: Probability that such an interval contains the median of a continuous distribution [0..1]; a lower
             bound for a discrete one.
     """
@@ -39,8 +39,8 @@ class Interval:
     """Bounds of an effect or of a median.
 
     Attributes:
-        low: lower bound, in the unit of what it bounds, included.
-        high: upper bound.
+        low: Lower bound, in the unit of what it bounds, included.
+        high: Upper bound.
         method: `BCa`, a bootstrap; `ranks`, two observed values; `Newcombe` and `t`, by formula.
     """
 
@@ -67,7 +67,7 @@ def interval_ranks(n: int, confidence: float = CONFIDENCE) -> IntervalRanks | No
 
     Args:
         n: Number of values, at least 0.
-        confidence: between 0 and 1.
+        confidence: Between 0 and 1.
 
     Returns:
         The ranks, or None if n is too small: then not even the range contains the median with this probability.

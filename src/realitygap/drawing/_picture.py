@@ -26,9 +26,9 @@ class Line:
         points: (n, 2) in the picture's unit, y upwards.
         color: Color of the line; None for none.
         width: Width of the line [pt].
-        dash: lengths of strokes and gaps [pt]; empty for an unbroken line.
+        dash: Lengths of strokes and gaps [pt]; empty for an unbroken line.
         closed: True to join the last point to the first.
-        fill: color of the area, None for none.
+        fill: Color of the area, None for none.
     """
 
     points: tuple[Point, ...]
@@ -44,10 +44,10 @@ class Disc:
     """A filled circle whose size does not follow the picture's unit.
 
     Attributes:
-        x, y: center, in the picture's unit.
+        x, y: Center, in the picture's unit.
         radius: [pt].
         color: Color of the rim; None for none.
-        fill: color of the area.
+        fill: Color of the area.
         width: Width of the rim [pt].
     """
 
@@ -68,7 +68,7 @@ class Text:
         text: Text to show.
         size: [pt].
         anchor: Part of the text that is at x.
-        shift: further to the right and up [pt].
+        shift: Offset to the right and up [pt].
         color: Color of the letters.
         bold: True for bold letters.
         halo: True for a rim in the background's color, which separates the letters from lines.

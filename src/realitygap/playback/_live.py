@@ -59,7 +59,7 @@ class WatchedRobot:
     trial can be replayed.
 
     Args:
-        robot: any robot under the contract.
+        robot: Any robot with the contract of robots.
         arena: Arena of the robot. Default: that of the robot or of its witness.
         shape: Shape to draw. Default: that of the robot's platform.
         pose: Function that returns the robot's pose. It may be called from another thread.

@@ -62,7 +62,7 @@ class RobotShape:
     """The drawn shape of a robot.
 
     Attributes:
-        outlines: its parts, each a polygon.
+        outlines: Parts of the robot, each a polygon.
         mounts: (s, 3) mount of each range sensor: forward [m], left [m] and direction [rad, positive to the left].
         reach: (s,) reach of each of them [m].
     """
@@ -104,7 +104,7 @@ class MovingTrial:
         stalled: (t + 1,) True if the step was blocked.
         cells: (n,) cells visited in order of first visit, columns * row + column.
         visited_at: (n,) the row by which each has been visited.
-        parts: rows a step; t = parts * the number of steps.
+        parts: Number of rows per step; t = parts * the number of steps.
     """
 
     title: str
@@ -186,12 +186,12 @@ class Moment:
     """One moment of a trial.
 
     Attributes:
-        row: the last row of the trial that is over.
-        step: steps that are over.
+        row: Last row of the finished part of the trial.
+        step: Number of finished steps.
         pose: x [m], y [m], heading [rad].
         rays: (s,) lengths [m].
         stalled: True if the last step was blocked.
-        n_cells: cells visited so far.
+        n_cells: Number of cells visited so far.
     """
 
     row: int
@@ -213,9 +213,9 @@ def in_motion(
     """A trial made ready to be shown.
 
     Args:
-        trajectory: the trial step by step.
+        trajectory: Trial with every step.
         arena: Arena of the trial.
-        robot: whose outline and rays are drawn.
+        robot: Robot whose outline and rays are drawn.
         title: Title of the trial.
         label: SIM, TWIN, EMULATED or REAL.
 

@@ -26,9 +26,9 @@ def play(trials: MovingTrial | Iterable[MovingTrial], *, title: str = "", speed:
     """A widget that plays trials in a notebook: rays, trails, cells, a slider and the choice of a speed.
 
     Args:
-        trials: one, or up to eight in one arena.
+        trials: One trial, or up to eight in one arena.
         title: Title in the head.
-        speed: one of 0.25, 0.5, 1, 2, 4 and 8 to begin with.
+        speed: Speed at the start: 0.25, 0.5, 1, 2, 4 or 8.
 
     Raises:
         RealityGapError: anywidget is not there.

@@ -93,7 +93,7 @@ class Screen:
     Fixed parts are drawn once, and moving parts are drawn over them.
 
     Args:
-        trials: at most eight, in one arena.
+        trials: At most eight trials in one arena.
         width: Width of the pictures [px].
         title: Title in the head. Default: that of the trial, if there is one trial.
     """

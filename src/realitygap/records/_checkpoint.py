@@ -36,7 +36,7 @@ def write_checkpoint(
     """Write a checkpoint, a NumPy .npz file. An existing one is replaced once the new one is complete.
 
     Args:
-        path: the file.
+        path: File to write.
         kind: Kind of the content, such as "population".
         about: JSON values.
         arrays: Arrays by name. They must not have objects.

@@ -60,14 +60,14 @@ class Chunk:
     """A published chunk whose bytes are as they were written.
 
     Attributes:
-        path: its file.
-        condition: name of the condition.
-        first: first replicate.
-        last: last replicate, inclusive.
-        condition_hash: hash of the condition as resolved, as given by who published.
+        path: File of the chunk.
+        condition: Name of the condition.
+        first: First replicate.
+        last: Last replicate, inclusive.
+        condition_hash: Hash of the condition as resolved, as given by the publisher.
         results_version: Results version that computed the numbers.
-        n_rows: number of rows.
-        rows_digest: digest of the rows' values, hexadecimal sha256.
+        n_rows: Number of rows.
+        rows_digest: Digest of the rows' values, hexadecimal sha256.
     """
 
     path: Path

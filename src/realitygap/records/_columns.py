@@ -169,7 +169,7 @@ def check_rows(frame: pl.DataFrame, condition: str, first: int) -> int:
     """The last replicate of a frame that is fit to be published.
 
     Args:
-        frame: columns as in `SCHEMA`, and any of `EXTRA`, in any order.
+        frame: Columns as in `SCHEMA`, and any of `EXTRA`, in any order.
         condition: Condition that every row must have.
         first: Replicate of the first row. The following replicates must have no gap.
 

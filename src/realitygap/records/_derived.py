@@ -24,8 +24,8 @@ class Derived:
 
     Attributes:
         row: Meaning of a row.
-        columns: its columns.
-        needs: the columns of the rows that it is derived from.
+        columns: Columns of the frame.
+        needs: Columns of the rows that it is derived from.
         of: Function of the rows of whole runs, in key order, that returns the frame.
     """
 

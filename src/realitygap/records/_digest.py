@@ -55,7 +55,7 @@ def study_digest(results_version: int, conditions: dict[str, tuple[str, str]]) -
 
     Args:
         results_version: Results version that computed the numbers.
-        conditions: name: (hash of the condition, digest of its rows); their order does not matter.
+        conditions: Tuples (hash of the condition, digest of its rows) by name. Their order does not matter.
     """
     return _hash_json({"results_version": results_version, "conditions": conditions})
 

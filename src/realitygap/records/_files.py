@@ -22,8 +22,8 @@ def write_durably(path: Path, data: bytes, *, replace: bool) -> None:
     """Write `data` to a temporary file, sync it, rename it to `path`, and sync the folder.
 
     Args:
-        path: the file to make; its folder must exist.
-        data: all of its bytes.
+        path: File to make. Its folder must exist.
+        data: Content of the file.
         replace: True to replace an existing file.
 
     Raises:
@@ -41,8 +41,8 @@ def written_beside(path: Path, parts: Iterable[bytes]) -> Iterator[Path]:
     """Write a file next to another one and sync it; it is deleted at the end if it was not renamed.
 
     Args:
-        path: the file whose place the new one may take.
-        parts: all bytes.
+        path: File that the new one may replace.
+        parts: Content of the file, in parts.
     """
     # nobody can guess the name and put a link there, and processes on several machines choose others
     temporary = path.with_name(f".{path.name}.{secrets.randbits(63)}.tmp")

@@ -56,9 +56,9 @@ class ResultsFolder(PublishedResults):
         """Begin a study in a folder that is new or empty.
 
         Args:
-            path: the folder; it and those above it are made.
-            description: the study as resolved: JSON values, with `conditions` a list of names, or of tables
-                that have a `name`.
+            path: Folder, which is made with all folders above it.
+            description: Study as resolved: JSON values, with `conditions` a list of names, or of tables that have a
+                `name`.
 
         Raises:
             RecordError: the folder holds something, cannot be made, or another process writes to it.
@@ -104,11 +104,11 @@ class ResultsFolder(PublishedResults):
         """Add the rows of one or more whole replicates; once this returns, they survive a crash.
 
         Args:
-            condition: one of `conditions`.
-            first: the first replicate in `frame`.
-            frame: columns as in `SCHEMA`, and any of `EXTRA`; rows sorted by replicate, generation and individual,
+            condition: One of `conditions`.
+            first: The first replicate in `frame`.
+            frame: Columns as in `SCHEMA`, and any of `EXTRA`; rows sorted by replicate, generation and individual,
                 without a gap.
-            condition_hash: hash of the condition as resolved; the same for all chunks of a condition.
+            condition_hash: Hash of the condition as resolved; the same for all chunks of a condition.
 
         Raises:
             RecordError: replicates are published already, the condition's hash is another, the disk is full,
@@ -196,8 +196,8 @@ class ResultsFolder(PublishedResults):
         Everything else in the folder stays. A folder with a ledger of physical trials is never cleared.
 
         Args:
-            also: names of further files in this folder that belong to the results, such as a report; those
-                that are not there are passed over.
+            also: Names of further files in this folder that belong to the results, such as a report. Missing ones are
+                ignored.
 
         Raises:
             RecordError: there is a ledger, a foreign file in `trials/`, or another process writes to the

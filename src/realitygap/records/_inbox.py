@@ -27,10 +27,10 @@ class Delivery:
     """A chunk that was left in an inbox.
 
     Attributes:
-        condition: name of the condition.
-        first: first replicate.
-        n_runs: replicates in it.
-        condition_hash: hash of the condition as resolved.
+        condition: Name of the condition.
+        first: First replicate.
+        n_runs: Number of replicates in it.
+        condition_hash: Hash of the condition as resolved.
     """
 
     condition: str
@@ -55,10 +55,10 @@ def deliver(inbox: Path, condition: str, first: int, frame: pl.DataFrame, condit
 
     Args:
         inbox: Inbox of the folder of results; see `ResultsFolder.inbox`.
-        condition: its name.
-        first: the first replicate in `frame`.
-        frame: columns as in `SCHEMA`, rows sorted by replicate, generation and individual, without a gap.
-        condition_hash: hash of the condition as resolved.
+        condition: Name.
+        first: The first replicate in `frame`.
+        frame: Columns as in `SCHEMA`, rows sorted by replicate, generation and individual, without a gap.
+        condition_hash: Hash of the condition as resolved.
 
     Raises:
         MissingInboxError: there is no such inbox, or no longer.

@@ -17,11 +17,11 @@ class Individual:
     """One planned individual of a generation.
 
     Attributes:
-        individual: its number in the generation.
-        species: its species.
-        parents: individuals of the generation before.
+        individual: Number in the generation.
+        species: Species.
+        parents: Parents in the generation before.
         nodes: Nodes of its genome.
-        genome: the fields of the records' genome, as lists.
+        genome: Fields of the records' genome, as lists.
         key: Key of the random numbers.
     """
 
@@ -106,10 +106,10 @@ class PhotoCount:
     """The photograph from which cells were read, for an operator to confirm.
 
     Attributes:
-        file: its name.
+        file: Name.
         sha256: Hash of the file, as hexadecimal digits.
-        proposed: cells as they were read from it; those of the score are what was confirmed.
-        doubtful: cells less than 90 % sure, crossed or not.
+        proposed: Cells as they were read from it. The score has the confirmed cells.
+        doubtful: Cells less than 90 % sure, crossed or not.
         is_confirmed: True if a person confirmed the cells.
     """
 
@@ -132,8 +132,8 @@ class Score:
     """Cells as an operator entered them, or as an emulator's witness recorded them.
 
     Attributes:
-        cells: crossed by the line, columns * row + column; none if `who` is `ROBOT`.
-        who: entered them.
+        cells: Cells that the line crosses, columns * row + column; none if `who` is `ROBOT`.
+        who: Person who entered them.
         n_ends: Number of cells in which steps end; None if unknown.
         path: (4 t + 1, 3) x [m], y [m], heading [rad] at each quarter of its t steps; None if unknown.
         photo: Photograph from which they were read; None if a person counted on paper. The ledger has it in the event

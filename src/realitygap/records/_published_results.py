@@ -231,8 +231,8 @@ class PublishedResults:
         """The rows chunk by chunk, in key order, so that memory holds one chunk at a time.
 
         Args:
-            condition: only this one; without it, all, in the description's order.
-            columns: only these.
+            condition: Condition. Default: all, in the description's order.
+            columns: Columns. Default: all.
 
         Raises:
             RecordError: as `chunks`.
@@ -252,9 +252,9 @@ class PublishedResults:
         """Rows in key order: conditions as in the description, then replicate, generation and individual.
 
         Args:
-            condition: only this one.
-            replicates: only these; those that are not there are left out.
-            columns: only these, in this order.
+            condition: Condition. Default: all.
+            replicates: Replicates, of which missing ones are left out. Default: all.
+            columns: Columns, in this order. Default: all.
 
         Raises:
             RecordError: as `chunks`.
@@ -281,8 +281,8 @@ class PublishedResults:
         Args:
             what: species (a row is one species in one generation), innovations (one innovation number in one run), or
                 lineage (one individual); `derived_table` has their columns.
-            condition: only this one.
-            replicates: only these; those that are not there are left out.
+            condition: Condition. Default: all.
+            replicates: Replicates, of which missing ones are left out. Default: all.
 
         Raises:
             RecordError: as `chunks`.

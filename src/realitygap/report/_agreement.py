@@ -22,12 +22,12 @@ class Agreement:
     """The agreement of two people on the cells that lines cross.
 
     Attributes:
-        n_trials: counted by two.
+        n_trials: Number of trials counted by two people.
         n_cells: Total number of judged cells: every reachable cell of each trial.
-        same: share of these that both judge alike [0..1].
+        same: Share of cells that both judge alike [0..1].
         kappa: Cohen's kappa: 1 for perfect agreement, 0 for agreement by chance; None if all cells are alike.
-        low: lower bound of its 95 % interval; None below 10 trials.
-        high: upper bound.
+        low: Lower bound of its 95 % interval; None below 10 trials.
+        high: Upper bound of its 95 % interval.
     """
 
     n_trials: int

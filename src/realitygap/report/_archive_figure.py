@@ -48,7 +48,7 @@ def draw_archive(folder: Results, condition: str | None = None, replicate: int |
     """Draw the behaviors in the novelty archive at the end of one run, and the novelty of generations in all runs.
 
     Args:
-        folder: the results of a study, or the path to them. The trials that are shown are recomputed.
+        folder: Results of a study, or the path to them. The trials that are shown are recomputed.
         condition: Condition. Default: the first that selects by novelty.
         replicate: Run. Default: the typical one, as in `draw_paths`.
 

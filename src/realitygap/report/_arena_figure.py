@@ -19,7 +19,7 @@ def draw_arena_and_robot(tally: Tally, condition: str, *, name: str) -> Drawing:
     """The arena of a condition with the robot at its start, and the robot by itself, as the paper's Figure 2.
 
     Args:
-        tally: the study.
+        tally: Tally of the study.
         condition: Condition to draw.
         name: First part of the ids.
 

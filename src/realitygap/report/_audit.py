@@ -47,12 +47,12 @@ class DoubtfulValue:
 
     Attributes:
         line: Line in the file, where the header is line 1; 0 without a file.
-        condition: its condition.
-        run: its run, as written.
-        text: the value as written.
+        condition: Its condition.
+        run: Its run, as written.
+        text: Value as written.
         problem: `impossible`: no k/N is near; `cut`: k/N with digits cut off instead of rounded; `raised`: k/N rounded
             up instead of down.
-        nearest: the nearest k, out of N.
+        nearest: Nearest k, out of N.
     """
 
     line: int
@@ -68,12 +68,12 @@ class AuditedCondition:
     """A condition of the table.
 
     Attributes:
-        condition: its name.
-        n: runs.
+        condition: Name of the condition.
+        n: Number of runs.
         mean: Mean of its values.
         median: Median of its values.
-        deviation: standard deviation; None with one run.
-        median_low, median_high: the 95 % interval of the median; None below 6 runs, which cannot give one.
+        deviation: Standard deviation; None with one run.
+        median_low, median_high: The 95 % interval of the median; None below 6 runs, which cannot give one.
     """
 
     condition: str
@@ -90,19 +90,19 @@ class AuditedPair:
     """Two conditions of the table, of independent runs.
 
     Attributes:
-        one: a condition, and
-        other: another.
-        n: runs of `one`.
-        n_other: runs of `other`.
-        difference: mean of `one` less mean of `other`.
+        one: First condition.
+        other: Second condition.
+        n: Number of runs of `one`.
+        n_other: Number of runs of `other`.
+        difference: Mean of `one` minus mean of `other`.
         difference_interval: BCa; None below 10 runs.
         a12: Probability that a run of `one` is above a run of `other`; ties count half.
         a12_interval: BCa interval; Newcombe's below 10 runs; None if not even p < 0.05 is possible.
-        p: two-sided, of a permutation test of the difference of means.
-        p_holm: corrected for all pairs of the table.
+        p: Two-sided p of a permutation test of the difference of means.
+        p_holm: P value corrected for all pairs of the table.
         smallest_p: Smallest p that this number of runs can give.
         can_claim: True if the corrected p can be below 0.05 at all.
-        runs_for_a_claim: the fewest runs a condition with which it can.
+        runs_for_a_claim: Smallest number of runs per condition with which it can.
         detectable: Smallest difference that this number of runs detects in 80 of 100 studies [standard deviations].
         detectable_a12: This difference as A12.
     """
@@ -141,9 +141,9 @@ class Audit:
     Attributes:
         conditions: Conditions in the order of the file.
         denominator: Denominator against which values were checked; None if they were not.
-        doubtful: values that are no k/N, or not rounded.
-        pairs: each two conditions.
-        runs_needed: runs a condition that find a small, medium and large effect in 80 of 100 studies.
+        doubtful: Values that are no k/N, or not rounded.
+        pairs: Pairs of conditions.
+        runs_needed: Numbers of runs per condition that detect a small, medium and large effect in 80 of 100 studies.
     """
 
     conditions: list[AuditedCondition]
@@ -177,9 +177,9 @@ class AuditProgress:
     """The progress of an audit.
 
     Attributes:
-        n_done: pairs of conditions compared.
+        n_done: Number of compared pairs of conditions.
         n_pairs: Total number of pairs.
-        n_runs: lines of the table; thousands take minutes.
+        n_runs: Number of lines of the table; thousands take minutes.
     """
 
     n_done: int
@@ -200,7 +200,7 @@ def audit_results(table: str | Path, *, denominator: int | None = None, tell: Te
     Args:
         table: CSV file with the columns condition, run and value. Other columns are ignored.
         denominator: N, if values must be k/N, such as a share of N cells.
-        tell: called with the progress before each two conditions are compared.
+        tell: Function that gets the progress before each comparison.
 
     Returns:
         The audit.
@@ -296,7 +296,7 @@ def doubt(text: str, denominator: int) -> tuple[str, int] | None:
     """Return the fault of a value that should be k/N, and the nearest k; None if there is no fault.
 
     Args:
-        text: the value as written; its digits after the point decide how exact it claims to be.
+        text: Value as written. The number of its decimals is its claimed precision.
         denominator: N.
     """
     written = Decimal(text)

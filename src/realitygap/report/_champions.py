@@ -30,7 +30,7 @@ class Champions:
     """The best networks of the runs of a condition, as recorded and on fresh noise.
 
     Attributes:
-        condition: its name.
+        condition: Name of the condition.
         label: SIM, TWIN, EMULATED or REAL.
         reported: (n,) coverage of each champion in its run, the best of all its trials [0..1].
         fresh: (n, 20) coverage of the same networks on fresh noise.
@@ -76,7 +76,7 @@ def retry_champions(folder: Results) -> list[Champions]:
     what was evolved.
 
     Args:
-        folder: the results of a study, or the path to them.
+        folder: Results of a study, or the path to them.
 
     Returns:
         One for each condition with runs. If trials cannot be recomputed, `problem` gives the reason.

@@ -34,14 +34,14 @@ class Choice:
     """A condition with its median, compared with its baseline.
 
     Attributes:
-        condition: its name.
-        baseline: the name of the condition that it is compared with; its own for a baseline.
+        condition: Name of the condition.
+        baseline: Name of the condition with which it is compared; its own for a baseline.
         change: Difference from the baseline, in the study's words.
         label: SIM, TWIN, EMULATED or REAL.
-        n: number of runs.
+        n: Number of runs.
         median: Median of the best coverage of each run [0..1]; NaN without runs.
         interval: Interval of the median; None if n is too small.
-        effect: median less the baseline's median [0..1].
+        effect: Median minus the baseline's median [0..1].
         other_median: Median with the other way to count cells, if selection counts them so; otherwise None.
         published: Published best coverages, one for each published run [0..1].
     """
@@ -115,7 +115,7 @@ def draw_choices(folder: Results) -> Drawing:
     """Draw the effect of each changed choice on the median best coverage, sorted, with intervals.
 
     Args:
-        folder: the results of a study whose conditions name a baseline, or the path to them.
+        folder: Results of a study whose conditions name a baseline, or the path to them.
 
     Raises:
         RecordError: there is no such folder, a file in it is damaged, or it holds no trials yet.

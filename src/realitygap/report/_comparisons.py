@@ -52,26 +52,26 @@ class Comparison:
     """Two conditions on the best coverage of a run.
 
     Attributes:
-        one: a condition, and
-        other: the one it is compared with.
-        reason: why these two.
+        one: First condition.
+        other: Condition with which it is compared.
+        reason: Reason for the comparison.
         label: SIM, TWIN, EMULATED or REAL; both if they differ.
-        n: runs of `one`; `paired`: pairs.
-        n_other: runs of `other`.
+        n: Number of runs of `one`, or of pairs if `paired`.
+        n_other: Number of runs of `other`.
         paired: True if the two draw the same random numbers run by run, so that runs are compared in pairs.
-        difference: mean of `one` less mean of `other` [share of the reachable cells].
+        difference: Mean of `one` minus mean of `other` [share of the reachable cells].
         difference_interval: BCa interval of the difference; None if n is too small.
         a12: Probability that a run of `one` is above a run of `other` [0..1].
         a12_interval: BCa interval, or Newcombe's if n is too small for it; None if n cannot give p < 0.05.
-        p: two-sided, of a permutation test of the difference.
-        p_holm: corrected for all comparisons of the study.
+        p: Two-sided p of a permutation test of the difference.
+        p_holm: P value corrected for all comparisons of the study.
         best_p: Smallest possible `p_holm` with this number of runs.
-        runs_for_a_claim: the fewest runs with which `p_holm` can be below 0.05.
-        detectable: the smallest difference that n runs find in 80 of 100 studies, at 5 % divided by the number
-            of comparisons; None without spread.
-        runs_for_difference: runs with which the observed difference would be found so often; None above a
+        runs_for_a_claim: Smallest number of runs with which `p_holm` can be below 0.05.
+        detectable: Smallest difference that n runs detect in 80 of 100 studies, at 5 % divided by the number of
+            comparisons; None without spread.
+        runs_for_difference: Number of runs that detect the observed difference in 80 of 100 studies; None above a
             million.
-        equivalence_interval: its 90 % interval by t, which lies within `MARGIN` if the conditions are equivalent (two
+        equivalence_interval: Its 90 % interval by t, which lies within `MARGIN` if the conditions are equivalent (two
             one-sided tests at 5 %); None with fewer than 10 runs.
     """
 
@@ -159,7 +159,7 @@ def compare_conditions(folder: Results) -> list[Comparison]:
     distribution and any n, and tests the very difference that is shown with it.
 
     Args:
-        folder: the results of a study, or the path to them.
+        folder: Results of a study, or the path to them.
 
     Returns:
         The comparisons: across noise, across selections, against baselines. Empty if there is nothing to compare.

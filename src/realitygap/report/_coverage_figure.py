@@ -43,10 +43,10 @@ class Axis:
     """The common vertical axis of all panels.
 
     Attributes:
-        label: name of the score, with its unit.
-        low: lower end.
-        high: upper end.
-        ticks: values with a line and a number.
+        label: Name of the score, with its unit.
+        low: Lower end.
+        high: Upper end.
+        ticks: Values with a line and a number.
         decimals: Number of decimals of these numbers.
     """
 
@@ -62,10 +62,10 @@ class Panel:
     """The runs of one condition.
 
     Attributes:
-        title: the condition's name.
-        note: label and number of runs.
+        title: Name of the condition.
+        note: Label and number of runs.
         values: (n, g) score of each run by generation, NaN after a run's last generation.
-        n_drawn: number of runs, from the first, of which lines are drawn.
+        n_drawn: Number of runs, from the first, whose lines are drawn.
         run_bests: (n,) best score of each run.
         published: Published best scores, one for each published run.
         replicates: (n,) number of each run; a page shows them on hover.
@@ -84,7 +84,7 @@ def draw_coverage(folder: Results, *, points: Points | None = None) -> Drawing:
     """Best coverage by generation, as the paper's Figure 4, with every condition and every run.
 
     Args:
-        folder: the results of a study, or the path to them.
+        folder: Results of a study, or the path to them.
         points: Value of a run's line at each generation: the best of that generation, or the best so far. Default: the
             study's own choice.
 

@@ -47,8 +47,8 @@ class Confound:
     Attributes:
         of: `random walks`, or the condition whose trials were compared.
         label: SIM, TWIN, EMULATED or REAL; empty for random walks.
-        n_pairs: pairs, no behavior in two of them.
-        mean_cells: cells of a behavior, on average.
+        n_pairs: Number of pairs, which share no behavior.
+        mean_cells: Mean number of cells of a behavior.
         contained: Share of the cells of the shorter behavior that the longer one visited too, on average [0..1].
         correlation: Spearman's, of the distance with the difference of the numbers of cells; refused if either is the
             same for all pairs. Interval: Bonett & Wright (2000).
@@ -78,15 +78,15 @@ class DistanceAudit:
 
     Attributes:
         distance: Distance of the audit.
-        columns, rows: size of the grid; `sort`: how the paper's distance sorts cells.
+        columns, rows: Size of the grid; `sort`: how the paper's distance sorts cells.
         seed: Seed of the random walks; `straight`: probability that they keep their direction.
-        n_walks: to which each cell was added, or from which it was taken.
+        n_walks: Number of walks to which each cell was added, or from which it was removed.
         leverage: (rows, columns) mean distance from a walk to the walk with, or without, the cell, in the unit of the
             distance; `leverage_low`, `leverage_high`: its 95 % interval.
-        front_over_back: mean leverage of the first quarter of cells, as the paper sorts them, over the last quarter's.
+        front_over_back: Mean leverage of the first quarter of cells, as the paper sorts them, over the last quarter's.
         order_correlation: Spearman's, of leverage with the place of the cell in that order.
         highest_over_lowest: Highest leverage of a cell divided by the lowest; infinite if the lowest is 0.
-        confounds: with length: on random walks first, then on each condition of a study.
+        confounds: Relations with length: on random walks first, then on each condition of a study.
     """
 
     distance: BehaviorDistance
@@ -152,11 +152,11 @@ def audit_distance(
 
     Args:
         name: Name of the distance.
-        folder: the results of a study, or the path to them, for the relation with length there; trials of different
-            runs are compared.
+        folder: Results of a study, or the path to them, for the relation with length there; trials of different runs
+            are compared.
         seed: Seed of walks and pairs.
         straight: Probability that a random walk keeps its direction, 0 to 1.
-        n_walks: for the leverage, at least 10.
+        n_walks: Number of walks for the leverage, at least 10.
         n_pairs: Number of pairs of behaviors for the relation with length, at least 10.
         sort: Order of cells in the paper's distance.
 

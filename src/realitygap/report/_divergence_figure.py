@@ -87,15 +87,15 @@ def save_divergence(
     """Draw one network's trials next to its trials elsewhere, and their divergence, into a file.
 
     Args:
-        results: the results of a study, or the path to them.
+        results: Results of a study, or the path to them.
         path: Path that ends in .svg, .pdf or .png. An existing file is replaced.
         against: Platform to compare with the network's own condition: another condition of the study, or a platform
             with its defaults (jyro, sim, sim:FILE, twin:FILE), or two of them with a comma in between.
-        condition: whose network it is; the first one when not given.
+        condition: Condition of the network. Default: the first one.
         replicate: Run. Default: the typical one.
         generation: Generation of the run. Default: that of its best trial.
         individual: Individual of the generation. Default: the best one by the task.
-        repeats: trials on each side, each on fresh noise, 2 to 1000.
+        repeats: Number of trials on each side, each with fresh noise, 2 to 1000.
 
     Returns:
         The path.

@@ -81,14 +81,14 @@ class Drawing:
     """A figure with its caption and its description.
 
     Attributes:
-        svg: the picture as one `svg` element; nothing in it is fetched from elsewhere.
+        svg: Picture as one `svg` element; nothing in it is fetched from elsewhere.
         caption: Content of the figure, number of runs, and interval.
         alt: Text for readers who cannot see the figure, in a sentence; `svg` includes it.
         figure: Source figure, for other formats.
         draw: Function that draws the figure with a width [in]; None if it has one width only.
         name: First part of the ids in `svg`.
         mark: Function that returns the values that a page shows on hover, for a width [in]; None if there are none.
-        marks: these values.
+        marks: Values that a page shows on hover.
         frames: Frames of these in `svg`, one for each panel of `marks`.
     """
 
@@ -128,11 +128,11 @@ def draw_wide(
     """A figure in the width of a desktop's page, which `Drawing.in_width` draws in another one.
 
     Args:
-        draw: makes the figure of a width [in].
+        draw: Function that makes the figure of a width [in].
         name: First part of the ids in the drawing.
         caption, alt: Caption and text of `Drawing`.
-        marks: values that a page shows on hover, or what makes them of a width [in] if places depend on it.
-        width: on a desktop's page [in].
+        marks: Values that a page shows on hover, or a function that makes them for a width [in] if places depend on it.
+        width: Width on a desktop's page [in].
     """
     mark = marks if callable(marks) else lambda _: marks
     return _drawn(Drawing("", caption, alt, draw=draw, name=name, mark=mark), draw, width, 0)
@@ -268,7 +268,7 @@ def to_svg(figure: Figure, name: str, alt: str) -> str:
     """The figure as one `svg` element; call under `house_style`.
 
     Args:
-        figure: drawn in the colors of `Ink`.
+        figure: Figure in the colors of `Ink`.
         name: First part of the ids inside, which must differ from that of every other drawing on a page.
         alt: Text of `aria-label`.
     """

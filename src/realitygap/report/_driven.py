@@ -22,11 +22,11 @@ class Driven:
 
     Attributes:
         label: EMULATED or REAL; None before its first trial.
-        n_driven: trials that count, those of unfinished runs among them.
-        n_void: trials that were driven, or begun, and do not count.
-        unfinished: replicate of each run that is begun and not complete, and how many of its generations are closed.
+        n_driven: Number of trials that count, including those of unfinished runs.
+        n_void: Number of trials that were begun or driven and do not count.
+        unfinished: Replicate of each unfinished run, and the number of its closed generations.
         n_generations: Number of generations of a whole run.
-        n_corrected: trials whose cells were corrected after they had bred a generation.
+        n_corrected: Number of trials whose cells were corrected after their generation was closed.
     """
 
     label: str | None

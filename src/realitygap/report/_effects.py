@@ -258,7 +258,7 @@ def newcombe_interval(share: float, n: int, m: int) -> Interval:
 
     Args:
         share: A12 as observed [0..1].
-        n: runs of one condition.
+        n: Number of runs of one condition.
         m: Number of runs of the other.
 
     Source: Newcombe (2006), Statistics in Medicine 25(4), 559-573, method 5.
@@ -280,9 +280,9 @@ def runs_needed(effect: float, *, paired: bool, alpha: float = ALPHA) -> int | N
     """Runs a condition with which a t test finds a difference of `effect` standard deviations so often.
 
     Args:
-        effect: difference of means over the standard deviation of a run (`paired`: of a difference).
+        effect: Difference of means over the standard deviation of a run (`paired`: of a difference).
         paired: True if runs come in pairs.
-        alpha: two-sided level.
+        alpha: Two-sided level.
 
     Returns:
         The number, at least 2; None above a million.

@@ -32,9 +32,9 @@ class Exported:
 
     Attributes:
         folder: Folder of the export.
-        figures: names without ending; each is there as SVG and as PDF.
-        tables: names of the CSV files that hold the page's tables as shown; numbered ones are there as .tex, too.
-        data: names of those that hold numbers behind figures, in full precision.
+        figures: Names of the figures without ending. Each is written as SVG and as PDF.
+        tables: Names of the CSV files with the page's tables as shown. Numbered ones are also written as .tex.
+        data: Names of the CSV files with the numbers of figures, in full precision.
     """
 
     folder: Path
@@ -50,7 +50,7 @@ def export_page(folder: Path, tally: Tally, content: Mapping[str, Any], page: st
 
     Args:
         folder: Folder, which is made if it does not exist. Files of other names in it stay.
-        tally: the study.
+        tally: Tally of the study.
         content: Content of the page.
         page: Page as HTML. Its tables are written as shown.
 

@@ -53,7 +53,7 @@ def save_drawing(drawing: Drawing, path: str | Path, *, title: str = "realitygap
 
     Args:
         drawing: Drawing of one of the `draw_...` functions.
-        path: ends in .svg, .pdf or .png.
+        path: Path that ends in .svg, .pdf or .png.
         title: Title of the document.
 
     Returns:

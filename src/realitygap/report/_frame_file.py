@@ -23,8 +23,8 @@ def export_frame(
         what: species (a row is one species in one generation), innovations (one innovation number in one run) or
             lineage (one individual).
         out: File, ending in .parquet. An existing one is replaced once the new one is complete.
-        condition: only this one.
-        replicate: only this run of each condition.
+        condition: Condition. Default: all.
+        replicate: Replicate of each condition. Default: all.
 
     Returns:
         The path of the file.

@@ -22,7 +22,7 @@ def content(tally: Tally) -> dict[str, Any]:
     """Return the figures of the page, or the reason why one is missing.
 
     Args:
-        tally: the study.
+        tally: Tally of the study.
     """
 
     def draw(what: str, condition: str, figure: Callable[..., Drawing], counterpart: str = "") -> Any:

@@ -61,7 +61,7 @@ def draw_individuals(
     """All individuals of each generation of one run, a pen each, as the paper's Figures 5 and 8.
 
     Args:
-        folder: the results of a study, or the path to them. The trials that are shown are recomputed.
+        folder: Results of a study, or the path to them. The trials that are shown are recomputed.
         condition: Condition. Default: the first one.
         replicate: Run. Default: the typical one, as in `draw_paths`.
         name: First part of the ids in the drawing.
@@ -110,7 +110,7 @@ def draw_better(
     """The individuals of highest coverage of one run, as the paper's Figure 9.
 
     Args:
-        tally: the study. The trials that are shown are recomputed.
+        tally: Tally of the study. The trials that are shown are recomputed.
         condition: Condition to draw.
         replicate: Run. Default: the typical one, as in `draw_paths`.
         name: First part of the ids.

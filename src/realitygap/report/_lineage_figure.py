@@ -50,10 +50,10 @@ class Ancestor:
 
     Attributes:
         generation, individual, species: Identity of the ancestor.
-        parents: individuals of the generation before.
+        parents: Parents in the generation before.
         origin: first, copy, mutation or crossover.
         coverage: Coverage of its trial [0..1].
-        brought: the structure that no parent has, in words.
+        brought: Structure that no parent has, in words.
     """
 
     generation: int
@@ -77,7 +77,7 @@ def draw_lineage(
     """The ancestors of an individual, from the first generation on, and their coverage.
 
     Args:
-        folder: the results of a study, or the path to them.
+        folder: Results of a study, or the path to them.
         condition: Condition. Default: the first one.
         replicate: Run. Default: the typical one.
         generation: Generation of the run. Default: that of its best trial, the champion.

@@ -61,10 +61,10 @@ def write_movie(
     """Write trials in motion as GIF or MP4: rays, trails in the pens' colors, and the cells that they visit.
 
     Args:
-        results: the results of a study, or the path to them; or several, of each of which one trial is shown, or
-            trials that `realitygap.playback.in_motion` made.
+        results: Results of a study, or the path to them; or several, of each of which one trial is shown, or trials
+            that `realitygap.playback.in_motion` made.
         path: Path that ends in .gif or .mp4. An existing file is replaced once the new one is complete.
-        each: show several trials: each individual of a generation (the first eight), the best one of each generation,
+        each: Show several trials: each individual of a generation (the first eight), the best one of each generation,
             or of each condition. Not given: one trial of each results.
         condition: Condition. Default: the first one.
         replicate: Run. Default: the typical one, whose best trial is the median.
@@ -236,9 +236,9 @@ def watch(
     """Show trials, or a robot while it is used, below a notebook's cell.
 
     Args:
-        what: results or trials, as in `write_movie`; or a robot, which is shown while the program drives it.
+        what: Results or trials, as in `write_movie`; or a robot, which is shown while the program drives it.
         each, condition, replicate, generation, individual: Selection of trials of results; see `write_movie`.
-        speed: to begin with: 0.25, 0.5, 1, 2, 4 or 8.
+        speed: Speed at the start: 0.25, 0.5, 1, 2, 4 or 8.
 
     Returns:
         A widget; for a robot a `realitygap.playback.WatchedRobot`, which is used instead of the robot.

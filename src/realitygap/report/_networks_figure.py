@@ -40,7 +40,7 @@ def draw_networks(
     """Networks of the last generation: the first objective run's best, and the most common structures.
 
     Args:
-        folder: the results of a study, or the path to them.
+        folder: Results of a study, or the path to them.
         structures: Result of `count_structures`. Default: computed.
         name: First part of the ids in the drawing.
 
@@ -75,7 +75,7 @@ def draw_network(condition: Condition, row: Mapping[str, Any], measure: str) -> 
     Args:
         condition: Condition as resolved.
         row: Row of its results, with the genome.
-        measure: the column of coverage that is shown.
+        measure: Column of coverage that is shown.
 
     Raises:
         ValueError: the genome is not one of this version.

@@ -71,11 +71,10 @@ def write_report(
     """Write the page of a study: one HTML file that needs no other file and no network.
 
     Args:
-        folder: the results of a study, or the path to them. They are only read; trials that are drawn are
-            recomputed.
+        folder: Results of a study, or the path to them. They are only read; trials that are drawn are recomputed.
         out: File to write, ending in .html. Default: `report.html` in the folder. An existing file is replaced once the
             new one is complete.
-        figures: a folder for every figure as SVG and PDF and every table as CSV; it is made when it is not there.
+        figures: A folder for every figure as SVG and PDF and every table as CSV; it is made when it is not there.
             Nothing but the page is written when not given.
 
     Returns:

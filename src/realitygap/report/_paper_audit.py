@@ -55,7 +55,7 @@ class Finding:
         section: Place in the paper.
         printed: Statement of the paper.
         found: Computed result.
-        bearing: why that matters.
+        bearing: Reason why it matters.
     """
 
     section: str

@@ -23,8 +23,8 @@ class Parameter:
 
     Attributes:
         name: Name in the paper's words.
-        paper: the paper's value.
-        ours: the value of most conditions.
+        paper: Paper's value.
+        ours: Value of most conditions.
         others: Conditions with another value, such as "4 in novelty-10"; empty if there are none.
     """
 
@@ -39,10 +39,10 @@ class SettingsTables:
     """All resolved settings of a study.
 
     Attributes:
-        differing: names of the settings that are not the same in all conditions, such as `neat.activation`.
-        rows: for each condition its name, the first digits of its hash, and for each of `differing` the value
-            and whether it is another than the condition's baseline has (the first condition's without one).
-        common: name and value of the settings that are the same everywhere.
+        differing: Names of the settings that are not the same in all conditions, such as `neat.activation`.
+        rows: For each condition its name, the first digits of its hash, and for each of `differing` the value and
+            whether it is another than the condition's baseline has (the first condition's without one).
+        common: Name and value of the settings that are the same everywhere.
     """
 
     differing: tuple[str, ...]

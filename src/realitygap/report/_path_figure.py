@@ -50,11 +50,11 @@ class TracedPath:
 
     Attributes:
         generation, individual: Identity of the trial.
-        coverage: its coverage [0..1], by the tally's measure.
-        cells: cells along its line, columns * row + column.
+        coverage: Coverage [0..1], by the tally's measure.
+        cells: Cells along the line, columns * row + column.
         poses: (t + 1, 3) x, y [m], heading [rad]; None if the trial cannot be recomputed.
         stalled: (t + 1,) True if the step was blocked; None if the trial cannot be recomputed.
-        others: poses and blocked steps of the other robots of the trial.
+        others: Poses and blocked steps of the other robots of the trial.
     """
 
     generation: int
@@ -83,7 +83,7 @@ def draw_paths(
     """The best path of each generation of one run, as the paper's Figure 6.
 
     Args:
-        folder: the results of a study, or the path to them. The trials that are shown are recomputed.
+        folder: Results of a study, or the path to them. The trials that are shown are recomputed.
         condition: Condition. Default: the first one.
         replicate: Run. Default: the typical one, whose best trial by the task is the median of its condition (the lower
             of the two middle ones, and the first of several equal ones).

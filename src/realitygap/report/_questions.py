@@ -90,11 +90,11 @@ class Spread:
     """The spread of the runs of a condition, compared with another condition.
 
     Attributes:
-        condition: its name.
-        n: runs.
-        deviation: standard deviation [share of the reachable cells]; NaN with one run.
-        robust: mean distance from the median, in standard deviations of a normal distribution with as much;
-            a few extreme runs move it less.
+        condition: Name of the condition.
+        n: Number of runs.
+        deviation: Standard deviation [share of the reachable cells]; NaN with one run.
+        robust: Mean distance from the median, in standard deviations of a normal distribution with as much; a few
+            extreme runs move it less.
         reference: Condition with which it is compared; its own name if there is none.
         ratio: `deviation` divided by that of the reference; NaN if that is 0.
         ratio_interval: BCa interval; None if n is too small.
@@ -165,11 +165,11 @@ class Variety:
     """The difference between the behaviors of a run, averaged over runs.
 
     Attributes:
-        condition: its name.
+        condition: Name of the condition.
         sorted_cells: (n,) mean distance of two behaviors of a run, the paper's [cells].
         jaccard: (n,) mean Jaccard distance of two behaviors: the share of cells visited by one of them
             alone, of those visited by either [0..1].
-        n_behaviors: behaviors of a run that were compared, at most.
+        n_behaviors: Behaviors of a run that were compared, at most.
     """
 
     condition: str
@@ -190,7 +190,7 @@ def measure_variety(folder: Results) -> list[Variety]:
     fixed seed.
 
     Args:
-        folder: the results of a study, or the path to them.
+        folder: Results of a study, or the path to them.
 
     Returns:
         One for each condition with runs.
@@ -255,7 +255,7 @@ def mean_sorted_distance(visited: npt.NDArray[np.bool_], points: Values, padding
     Args:
         visited: (n, c) cells that each behavior visits, in the order in which cells are sorted.
         points: (c, 2) positions of the cells [cells].
-        padding: distance for each cell without a counterpart.
+        padding: Distance for each cell without a counterpart.
     """
     lengths = visited.sum(axis=1)
     width = max(int(lengths.max()), 1)
@@ -288,8 +288,8 @@ class Chance:
     """The chance of each of several conditions to have the highest mean of a few runs.
 
     Attributes:
-        conditions: names, one for each level.
-        n_runs: runs of each that are drawn.
+        conditions: Names of the conditions, one for each level.
+        n_runs: Number of runs of each that are drawn.
         best: (k,) share of draws from the observed runs in which each level is the best [0..1].
         best_if_equal: The same share if all levels have one distribution, that of all their runs together.
     """
@@ -305,7 +305,7 @@ def chance_of_best(samples: Sequence[Values], n_runs: int) -> Values:
 
     Args:
         samples: k arrays of values that are multiples of one unit, as coverages are.
-        n_runs: values drawn from each, >= 1.
+        n_runs: Values drawn from each, >= 1.
 
     Returns:
         (k,) adding up to 1; those with equal means share. Exact: distributions of sums are computed, and

@@ -47,7 +47,7 @@ class _Run:
         data: Data for the script; None if no trial could be embedded.
         n_embedded, n_trials: Number of embedded trials and of all trials of the run.
         note: Note on what is missing and why; empty if nothing is.
-        best: index of the best embedded trial by the task, the first of several alike.
+        best: Index of the best embedded trial by the task, the first of several alike.
         link: Address of that trial at the first step; empty if no trial could be embedded.
     """
 

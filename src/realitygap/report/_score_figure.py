@@ -36,7 +36,7 @@ def draw_scores(folder: ResultsFolder | str | Path) -> list[Drawing]:
     """Best score by generation, for conditions of other tasks than coverage.
 
     Args:
-        folder: the results of a study, or the path to them.
+        folder: Results of a study, or the path to them.
 
     Returns:
         One figure for each score; none if all conditions are of coverage, or have no runs.

@@ -41,7 +41,7 @@ def save_view(
     """Draw something of a study's results into a file, recomputed from its rows.
 
     Args:
-        folder: the results of a study, or the path to them.
+        folder: Results of a study, or the path to them.
         out: Path that ends in .svg, .pdf, .png or, for one trial, .gif or .mp4. An existing file is replaced.
         subject: run, the best path of each generation, or with `generation` or `individual` (or a .gif) one trial;
             network, that of one individual; species, their shares in one run and their number in all; lineage, the

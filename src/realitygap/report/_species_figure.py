@@ -98,7 +98,7 @@ def draw_species(
     """The shares of the species in a run over its generations, and how many species all runs have.
 
     Args:
-        folder: the results of a study, or the path to them.
+        folder: Results of a study, or the path to them.
         condition: Condition. Default: the first one with a selection.
         replicate: Run. Default: the one with most species, the first of several equal ones.
         species: Result of `count_species`. Default: computed.

@@ -28,10 +28,10 @@ class Structure:
     """Networks that have the same enabled links, whatever their weights and node numbers.
 
     Attributes:
-        inputs: names of the inputs.
-        outputs: names of the outputs.
-        links: enabled links, in order.
-        n_hidden: hidden nodes that a link reaches.
+        inputs: Names of the inputs.
+        outputs: Names of the outputs.
+        links: Enabled links, in order.
+        n_hidden: Hidden nodes that a link reaches.
         by_condition: Number of networks of the last generation with it, by condition.
         example: Network of highest coverage with it: condition, replicate, generation, individual.
     """
@@ -69,10 +69,10 @@ class Structures:
 
     Attributes:
         selection: Rule that selected parents.
-        inputs: names of the inputs.
-        conditions: with that selection and these inputs.
+        inputs: Names of the inputs.
+        conditions: Conditions with that selection and these inputs.
         n_networks: Number of networks in their last generations.
-        found: all structures.
+        found: Found structures.
     """
 
     selection: str

@@ -41,7 +41,7 @@ def summarize(folder: Results) -> pl.DataFrame:
     """Return one row per condition, on the best coverage of each run (the highest of all its individuals).
 
     Args:
-        folder: the results of a study, or the path to them. They are read chunk by chunk.
+        folder: Results of a study, or the path to them. They are read chunk by chunk.
 
     Returns:
         Columns `condition`; `label`, such as SIM; `n`, the number of runs. Then for coverage along the line (`line_`)

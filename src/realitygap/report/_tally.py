@@ -36,9 +36,9 @@ class Tally:
 
     Attributes:
         folder: Folder from which it was read.
-        description: the study as resolved.
-        best: one row per condition, replicate and generation, in key order: `trials`, how many individuals;
-            `line` and `ends`, the highest coverage among them [0..1].
+        description: Study as resolved.
+        best: One row per condition, replicate and generation, in key order: `trials`, how many individuals; `line` and
+            `ends`, the highest coverage among them [0..1].
         driven: State of each condition that a robot drove, from the ledger.
         uncounted: Names of the conditions that are left out, because their cells were not counted.
     """
@@ -150,7 +150,7 @@ def read_tally(folder: Results, *, with_uncounted: bool = False) -> Tally:
     """Read a study chunk by chunk; memory holds one chunk, and one row for each generation of each run.
 
     Args:
-        folder: the results of a study, or the path to them. A tally is returned as it is.
+        folder: Results of a study, or the path to them. A tally is returned as it is.
         with_uncounted: True to include conditions whose cells were not counted; their coverage is NaN.
 
     Raises:

@@ -28,7 +28,7 @@ def summarize_tasks(folder: ResultsFolder | str | Path) -> pl.DataFrame:
     """Return one row per condition of another task than coverage, on the best fitness of each run.
 
     Args:
-        folder: the results of a study, or the path to them. They are read chunk by chunk.
+        folder: Results of a study, or the path to them. They are read chunk by chunk.
 
     Returns:
         Columns `condition`; `label`, such as SIM; `task`, its kind; `n`, the number of runs; `first` and `last`, the

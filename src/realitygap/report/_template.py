@@ -13,7 +13,7 @@ def render_page(name: str, content: Mapping[str, Any], **filters: Callable[..., 
     Args:
         name: Name of the template.
         content: Content of the page, to which the style sheet is added as `css`.
-        filters: functions that the template uses.
+        filters: Functions that the template uses.
     """
     from jinja2 import Environment, PackageLoader, StrictUndefined
 

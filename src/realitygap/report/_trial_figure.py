@@ -48,8 +48,8 @@ class ChosenTrial:
     Attributes:
         condition: Condition as resolved.
         label: SIM, TWIN, EMULATED or REAL.
-        row: the row.
-        measure: the column of coverage that figures show.
+        row: Row of the results.
+        measure: Column of coverage that figures show.
     """
 
     condition: Condition
@@ -79,7 +79,7 @@ def choose_trial(
     """A trial by its numbers; of what is not given, the first condition, the typical run, its best trial.
 
     Args:
-        tally: the study.
+        tally: Tally of the study.
         condition: Condition to choose from.
         replicate: Run to choose from.
         generation: Generation of the run. Default: the one with the run's best trial.
@@ -129,7 +129,7 @@ def draw_trial(
     """Draw one trial, recomputed from its row: path, readings and commands.
 
     Args:
-        folder: the results of a study, or the path to them.
+        folder: Results of a study, or the path to them.
         condition: Condition. Default: the first one.
         replicate: Run. Default: the typical one, as in `draw_paths`.
         generation: Generation of the run. Default: that of its best trial.

@@ -21,9 +21,9 @@ class Asked:
     """An individual that is to be tried.
 
     Attributes:
-        genome: its genes.
-        species: the species it belongs to.
-        parents: individuals of the generation before from which it descends.
+        genome: Genome of the individual.
+        species: Species of the individual.
+        parents: Its parents in the generation before.
     """
 
     genome: Genome

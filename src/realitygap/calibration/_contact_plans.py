@@ -12,7 +12,7 @@ from realitygap.world import Arena, Pose, RobotModel
 from ._motion_plans import STEPS, roomiest_place
 
 N_PLANS = 10
-PUSH = 6  # commands into a wall: some to get there, some to see what comes of it
+PUSH = 6  # commands into a wall: some to reach it, the others to observe the motion along it
 AROUND = (0.35, 0.6, 0.9)  # turns between two walls, as commands
 
 Commands = list[tuple[float, float]]

@@ -11,7 +11,7 @@ from realitygap.trials import TrialPlan
 from realitygap.world import Arena, Pose, distance_to_segment
 
 CLEAR = 0.015  # between a robot at its start and what is nearest [m]
-LONGEST = 8  # steps that one command goes on
+LONGEST = 8  # steps of one command
 TRIES = 10_000
 
 

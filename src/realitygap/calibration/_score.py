@@ -20,8 +20,8 @@ from ._evidence import Vectors
 Floats = NDArray[np.float64]
 
 MOST_OFF = 4.0
-SHRINK = 4.0  # slopes of up to so many squared standard errors are taken for none
-COLUMNS = 4096  # of vectors, at once
+SHRINK = 4.0  # slopes of up to this many squared standard errors count as 0
+COLUMNS = 4096  # of vectors, in one block
 
 
 @dataclass(frozen=True)

@@ -333,7 +333,7 @@ def _measured(
     try:
         sheet = sheet_observer(asks_for_start=False) if is_led else None
         operator = CalibrationOperator(where, model) if is_led else None
-        on_lost: OnLost = "stop" if is_led else "retry"  # again only from where somebody has put it
+        on_lost: OnLost = "stop" if is_led else "retry"  # a retry needs a person who puts it back
         with (
             under_camera(camera, where, sheet) as observer,
             open_target(

@@ -43,7 +43,7 @@ try:
 except (ImportError, AttributeError):
     pass
 
-# whoever else has a sitecustomize gets it as before
+# another sitecustomize is loaded as before
 _here = os.path.dirname(os.path.abspath(__file__))
 sys.path[:] = [_place for _place in sys.path if os.path.abspath(_place) != _here]
 _this = sys.modules.pop("sitecustomize", None)

@@ -87,7 +87,7 @@ class Memory:
         if self._file is None:
             return
         try:
-            # nobody can guess the name and put a link there
+            # a random name, so that no other user can put a link there
             beside = self._file.with_name(f".{self._file.name}.{secrets.randbits(63)}.tmp")
             try:
                 with beside.open("x", encoding="utf-8") as file:

@@ -169,7 +169,7 @@ class Scribbler:
     def _take_next(self, now: int) -> None:
         """Execute the waiting packets one after another until one of them takes time."""
         if self._is_taking:
-            return  # called from within the loop below, which goes on
+            return  # called from within the loop below, which continues
         self._is_taking = True
         try:
             while self._packets and not self._busy:

@@ -24,7 +24,7 @@ PIECE = 1 << 16
 LONGEST_REQUEST = 1 << 16  # bytes of a line that a witness may send
 SILENT_S = 0.002  # for so long a client says nothing that waits for more of an answer
 ANSWER_S = 5.0  # within which an answer comes, by the emulator's time
-LONGEST_S = 0.05  # of real time that physics may take at once
+LONGEST_S = 0.05  # of real time that the physics may take in one piece
 PASSED_AT_ONCE_NS = SECOND // 4  # of the emulator's time, before it is looked whether they took so long
 IDLE_S = 0.5  # while the wheels turn, physics are computed at least so often
 

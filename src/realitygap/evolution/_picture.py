@@ -208,7 +208,7 @@ def _label_place(curve: list[Point], taken: Sequence[Point]) -> Point:
     for k in range(14):
         part = 0.2 + 0.03 * k
         x, y = _along(curve, part)
-        # letters are broader than high: what is beside needs more room than what is above
+        # letters are wider than high, so labels need more room at the sides than above
         clear = min(math.hypot((x - ox) / 2.2, y - oy) for ox, oy in taken)
         merit = min(clear, 0.3) - 0.12 * part
         if merit > most:

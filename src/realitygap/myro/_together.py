@@ -65,7 +65,7 @@ def doTogether(*functions: Callable[[], Any]) -> list[Any] | None:
             part.start()
         for part in parts:
             part.join()
-    except BaseException:  # Ctrl-C: nobody waits for functions that may never end
+    except BaseException:  # Ctrl-C: do not wait for functions that may never end
         for part in parts:
             part.is_over = True
         for part in parts:

@@ -43,7 +43,7 @@ def load_platform(spec: str) -> type[Platform]:
     sys.modules[where.name] = module  # the classes of the file look their annotations up there
     try:
         where.loader.exec_module(module)
-    except (Exception, SystemExit) as error:  # whatever a file of somebody's own does
+    except (Exception, SystemExit) as error:  # a user's file may raise anything
         raise StudyError(f"{file} cannot be run: {type(error).__name__}: {error}.") from error
     found = getattr(module, name, None)
     if not (isinstance(found, type) and issubclass(found, Platform) and found is not Platform):

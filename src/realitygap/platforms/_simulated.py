@@ -35,7 +35,7 @@ from realitygap.world import Arena, Pose
 from ._platform import Opening, Platform
 from ._try import try_all
 
-# Trials in a call: so many that the call costs little beside them, so few that what is kept of each step stays small.
+# Trials in a call: enough that the overhead of the call is small, but few enough that stored steps need little memory.
 TOGETHER = 256
 
 

@@ -44,7 +44,7 @@ def written_beside(path: Path, parts: Iterable[bytes]) -> Iterator[Path]:
         path: File that the new one may replace.
         parts: Content of the file, in parts.
     """
-    # nobody can guess the name and put a link there, and processes on several machines choose others
+    # a random name, so that no other user can put a link there, and processes on several machines differ
     temporary = path.with_name(f".{path.name}.{secrets.randbits(63)}.tmp")
     try:
         with temporary.open("xb") as file:

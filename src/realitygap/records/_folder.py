@@ -188,7 +188,7 @@ class ResultsFolder(PublishedResults):
         """
         return append_line(self._path / LOG_NAME, event)
 
-    # starting anew
+    # restart
 
     def clear(self, *, also: Iterable[str] = ()) -> None:
         """Delete the results: chunks, log, the files named by the caller, and last `study.json`.

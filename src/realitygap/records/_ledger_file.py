@@ -210,7 +210,7 @@ def connect(path: Path, *, writable: bool) -> sqlite3.Connection:
     """
     if not path.exists():
         raise LedgerError(f"There is no ledger at {path}. A study begins one when it first drives a robot.")
-    # SQLite follows links, also for the files beside the ledger, which it writes even when it only reads
+    # SQLite follows links, also for the files next to the ledger, which it writes even when it only reads
     refuse_links(path.parent, *(path.with_name(path.name + ending) for ending in _ENDINGS))
     if writable:
         refuse_other_names(path, path.stat())

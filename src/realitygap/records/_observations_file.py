@@ -216,7 +216,7 @@ class ObservationsFile(ClosedOnExit):
         of_no_matter = not_compared(there, wanted)
         other = [name for name in wanted if name != of_no_matter and there[name] != wanted[name]]
         if other and not found.trials and not found.under_way:
-            return 0  # nobody's yet
+            return 0  # it has no trials, so it may be rewritten
         if other:
             what = "; ".join(f"{name} {_short(there[name])} and not {_short(wanted[name])}" for name in other)
             raise RecordError(

@@ -171,7 +171,7 @@ class _Table:
         head = [
             ": ".join(dict.fromkeys(filter(None, parts))) for parts in zip(*lines[: self.n_head], strict=True)
         ]
-        # several columns of one name, such as interval, belong to the one before that has a name of its own
+        # several columns of one name, such as interval, belong to the column before them with a unique name
         own = [text for text in head if head.count(text) == 1]
         named, last = [], ""
         for text in head:

@@ -87,7 +87,7 @@ def _runs_by_condition(folder: Results) -> Iterator[tuple[Mapping[str, Any], pl.
 
 
 def _describe(values: npt.NDArray[np.float64]) -> dict[str, float | None]:
-    if np.isnan(values).any():  # nobody counted a robot's cells, or saw where its steps end
+    if np.isnan(values).any():  # a robot's cells were not counted, or the ends of its steps are unknown
         return dict.fromkeys(_STATISTICS)
     middle = quartiles(values)
     interval = median_interval(values)

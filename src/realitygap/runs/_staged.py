@@ -21,7 +21,7 @@ from realitygap.platforms import open_trials, scores_of, traced_at_once
 from ._condition import Condition
 from ._teams import draw_teams, mean_of_teams
 
-# Trials of a block: so many that calls from Python cost little beside them, so few that a block stays near.
+# Trials of a block: enough that the overhead of calls from Python is small, but few enough to fit into the cache.
 BLOCK_TRIALS = 4096
 LEAST_RUNS = 32
 

@@ -181,7 +181,7 @@ def _run_work(condition: Condition) -> Callable[[int], int]:
 
 
 def _recorded_work(condition: Condition, folder: ResultsFolder) -> Callable[[int], int]:
-    # Both measurements, on one thread and on all, publish into one folder: each call needs runs of its own.
+    # Both measurements, on one thread and on all, publish into one folder: each call needs its own runs.
     next_first = iter(range(0, 2**31, RUNS_PER_CALL))
 
     def work(call: int) -> int:

@@ -29,7 +29,7 @@ from ._order import CARRY_OUT, make_order
 # How long a scheduler named by its address may take to answer, and be gone in the middle of the work [s].
 CONNECT_S = 10.0
 GONE_S = 60.0
-# Chunks under way for each thread of a worker: one computed, the others waiting beside it.
+# Chunks in progress for each thread of a worker: one is computed, and the others wait.
 CHUNKS_PER_THREAD = 3
 # Sent before the first worker is there, so that a job queue knows that there is work.
 FIRST_CHUNKS = 4

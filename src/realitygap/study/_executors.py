@@ -90,7 +90,7 @@ class Threads:
             except BaseException:
                 for future in under_way:
                     future.cancel()
-                close_twins()  # else a chunk would be carried out to its end
+                close_twins()  # otherwise a chunk would be computed to its end
                 raise
             finally:
                 release_twins()

@@ -319,7 +319,7 @@ def _check_arena_numbers(platform: str, merged: dict[str, Any], place: str, prob
         arena = ArenaSettings(**merged["arena"]).arena()
         numbers, _ = as_numbers(given if isinstance(given, dict) else {})
     except ValueError:
-        return  # the arena has mistakes of its own
+        return  # the arena's own mistakes are reported
     try:
         arena.with_numbers({name: value for name, value in numbers.items() if name.startswith(ARENA)})
     except ValueError as error:

@@ -94,7 +94,7 @@ class JobQueue:
         while len(cluster.worker_spec) < self._n_jobs:
             cluster.worker_spec.update(cluster.new_worker_spec())
         try:
-            # `scale` would do the same and tell nobody that a job was refused
+            # `scale` would do the same without an error if a job is refused
             cluster.sync(cluster._correct_state)
         except (RuntimeError, OSError) as error:
             raise StudyError(

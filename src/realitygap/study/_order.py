@@ -52,7 +52,7 @@ def make_order(task: ChunkTask, inbox: Path) -> dict[str, Any]:
         "hash": condition.hash(),
         "first": task.first,
         "n_runs": task.n_runs,
-        # The worker has nobody to ask: whoever gave the order has the permission.
+        # A worker cannot ask: the process that sent the order has the permission.
         "may_run_code": isinstance(condition.task, PythonTask) and condition.task.may_run,
     }
 

@@ -27,7 +27,7 @@ from ._study import Study, same_file
 # A chunk is as many runs as take about this many robot-steps: some tenths of a second of one core.
 CHUNK_STEPS = 7_000_000
 LARGEST_CHUNK = 2000
-# At least so many chunks a condition, so that progress shows and little is lost in a crash.
+# Minimum number of chunks per condition, so that progress is visible and little is lost in a crash.
 CHUNKS_PER_CONDITION = 4
 
 
@@ -333,7 +333,7 @@ def _refuse_other_settings(folder: ResultsFolder, study: Study) -> None:
                 "give it another name"
             )
     if there:
-        # conditions that this study lacks may stay in a folder of its own, but not in that of another
+        # conditions that this study lacks may stay in its own folder, but not in that of another study
         differences = [
             f"the study's {key} is {old.get(key)!r} there, {new[key]!r} here"
             for key in ("name", "seed", "pair")

@@ -135,7 +135,7 @@ class OperatedTarget(WrappedTarget):
                 raise StoppedByPerson
             if answer == "redo":
                 k = max(k - 1, 0)
-                if k in trials and tell is not None:  # should somebody stop before it is driven again
+                if k in trials and tell is not None:  # in case of a stop before it is driven again
                     tell(k, taken_back(trials.pop(k)))
                 continue
             (trial,) = self.target.carry_out([plans[k]], observe, functools.partial(_tell_driven, tell, k))

@@ -170,7 +170,7 @@ class PythonTask(Settings):
                 function(trajectories.arrays, trajectories.step_s, told)
             else:
                 told = np.asarray(function(trajectories), np.float64)
-        except Exception as error:  # whatever a function of somebody's own does
+        except Exception as error:  # a user's function may raise anything
             raise TaskError(_failed(self, error)) from error
         if told.shape != (n,):
             raise TaskError(
@@ -230,7 +230,7 @@ def _load(source: str, file: str, name: str) -> Callable[..., Any]:
     space: dict[str, Any] = {"__name__": f"realitygap_task_{digest}", "__file__": shown_as}
     try:
         exec(compile(source, shown_as, "exec"), space)
-    except Exception as error:  # whatever a file of somebody's own does
+    except Exception as error:  # a user's file may raise anything
         raise TaskError(f"{file} cannot be run: {_line_of(error, shown_as)}{_said(error)}") from error
     function = space.get(name)
     if not callable(function):

@@ -18,7 +18,7 @@ BY_HAND = (
     0.002,
     0.002,
     0.03,
-)  # how well somebody puts a robot at its start: deviation of x, y [m] and heading [rad]
+)  # accuracy of a person who places a robot: standard deviation of x, y [m] and heading [rad]
 
 
 def driven_paths(

@@ -94,7 +94,7 @@ def carry_out_on_robot(
         return _with_what_is_seen(trial, observe, observer)
     except RobotError as error:
         return replace(trial, end=str(EndReason.LOST), problem=trial.problem or str(error))
-    except (KeyboardInterrupt, SystemExit) as error:  # while somebody is asked for cells
+    except (KeyboardInterrupt, SystemExit) as error:  # while a person is asked for cells
         end = EndReason.INTERRUPTED if keep is None else EndReason.DRIVEN
         raise TrialInterrupted(replace(trial, end=str(end))) from error
 

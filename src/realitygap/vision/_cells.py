@@ -16,7 +16,7 @@ from ._trace import Trace
 Floats = NDArray[np.float64]
 
 DEEP = 0.008  # a line that comes so far into a cell crosses it for certain [m]
-HALF_LINE = 0.001  # color no deeper in a cell than this may be that of a line beside it [m]
+HALF_LINE = 0.001  # color no deeper in a cell than this may belong to a line in the next cell [m]
 FAR = 0.006  # a line that keeps so far away from a cell does not [m]
 FEATURES = (
     "one", "own", "own_shallow", "own_depth", "own_length", "link", "link_depth", "link_length", "link_doubt",

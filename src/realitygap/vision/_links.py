@@ -22,8 +22,8 @@ END_RADIUS = 7  # points around an end, all on one side of it
 END_OFFSET = 0.38  # of that radius: how far off their middle lies; half of it at the end of a line, 0 within
 CROSSING = 0.8  # what a link pays for crossing its own trace, a millimeter
 LEAVING = 10  # points after which a link's direction is taken
-LEAST_COSINE = 0.6  # of the angle between it and the line that it goes on from
-BARE = 0.008  # of its own color at the start, and a line lies under others there [m]
+LEAST_COSINE = 0.6  # of the angle between it and the line that it continues
+BARE = 0.008  # length of its own color at the start below which its line is under others there [m]
 START_RADIUS = 10  # points around the start, where a line ends by right
 
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 Point = tuple[float, float]
 
 SAME_DIGITS = (
-    7  # ends of walls that are the same to so many digits [m] are one corner: rounding of coordinates
+    7  # digits to which ends of walls must be equal to be one corner, because coordinates are rounded [m]
 )
 TOUCHING = 1e-9  # outlines that overlap by less [m] touch, which is allowed at the start
 

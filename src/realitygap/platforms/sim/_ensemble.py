@@ -26,7 +26,7 @@ from ._platform import SimPlatform
 from ._scene import IN_PARTS, SimScene, largest, own_half, parts_of_step, sim_scene
 from ._trials import sim_rules
 
-CHUNK_BYTES = 32_000_000  # of what a thread keeps at once
+CHUNK_BYTES = 32_000_000  # of the memory of one thread
 START = ("arena.start.x", "arena.start.y", "arena.start.heading")
 KEPT = ("poses", "readings", "stalled", "wheels", "commands")
 """Values that can be stored for every step."""

@@ -185,7 +185,7 @@ class TwinPool:
         try:
             while asked:
                 yield asked.popleft().result()
-        finally:  # also where nobody wants the rest
+        finally:  # also if the caller does not need the rest
             for future in asked:
                 future.cancel()
 

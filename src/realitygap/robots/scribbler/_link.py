@@ -563,7 +563,7 @@ class Link:
         """
         self.faults.hang_ups += 1
         for _ in range(REOPENINGS if self._recoveries > 1 else 1):
-            self._end_guardian()  # as long as it has the port open, nobody can open it anew
+            self._end_guardian()  # the port cannot be reopened while the guardian has it open
             with contextlib.suppress(*_HANG_UPS):
                 self.port.close()
             self.clock.sleep(1.0)

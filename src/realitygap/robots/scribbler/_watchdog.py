@@ -61,7 +61,7 @@ class Watchdog:
             try:
                 link.stop_motors()
             except RobotError:
-                pass  # whoever speaks next will meet it too
+                pass  # the next command raises it, too
             except RecordError as error:
                 self._unsaid = error
             finally:

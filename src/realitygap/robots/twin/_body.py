@@ -21,7 +21,7 @@ from ._shape import STEP_S
 from ._stall import Idler
 
 EMITTERS = ("left", "center", "right")
-JITTER_STEPS = 100  # of time for which a delay lasts before it is drawn anew: half a second
+JITTER_STEPS = 100  # time until the next delay is drawn: half a second
 AT_REST = 1e-4  # speed of a wheel that has come to rest [m/s]
 
 

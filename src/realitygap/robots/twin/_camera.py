@@ -97,9 +97,7 @@ def _off_screen(width: int, height: int) -> Any:
     from importlib import import_module
 
     for driver in DRIVERS:
-        with contextlib.suppress(
-            Exception
-        ):  # each driver fails in ways of its own where its library is missing
+        with contextlib.suppress(Exception):  # each driver fails in its own way if its library is missing
             context = import_module(driver).GLContext(width, height)
             context.make_current()
             return context

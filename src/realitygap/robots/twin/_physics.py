@@ -88,7 +88,7 @@ class Physics:
         self._control[0] = left / self.radius
         self._control[1] = right / self.radius
         self._mujoco.mj_step(self.mj_model, self.mj_data, nstep=steps)
-        if any(warning.number for warning in self._lost):  # then it has begun anew, somewhere else
+        if any(warning.number for warning in self._lost):  # then MuJoCo has reset the state
             raise RobotError(
                 "The twin's physics diverged: its file needs steps of less than 5 ms. Use softer motors "
                 "(motors.stiffness, motors.torque) or a heavier body."

@@ -48,7 +48,7 @@ class LiveTrack(ClosedOnExit):
                     self._tracker.take(at, image)
                     self._last = at
                     self._has_come.notify_all()
-        except Exception as error:  # told to whoever waits for a picture
+        except Exception as error:  # reported to the thread that waits for a picture
             problem = f"{self._source.name} failed: {error}"
         with self._has_come:
             self._problem = problem

@@ -138,7 +138,7 @@ class Platform(PlatformSettings):
             from realitygap.emulator import connect_witness
 
             remote = connect_witness(how.witness)
-            remote.hold()  # before the first command: an earlier client may have left it driving at a high speed of time
+            remote.hold()  # before the first command, because it may be driving in fast time
             return WitnessObserver(remote)
         raise StudyError(
             f"No operator places the robot of {how.name} and reports its cells. Name the witness of an "

@@ -250,7 +250,10 @@ def test_numbers_are_read_as_on_a_ruler(text, value):
     ("arguments", "says"),
     [
         (("sensors", "-o", "x.toml"), "Expected either the robot to measure (--robot PLATFORM)"),
-        (("sensors", "--robot", "sim", "--from", "x", "-o", "x.toml"), "and not both"),
+        (
+            ("sensors", "--robot", "sim", "--from", "x", "-o", "x.toml"),
+            "Expected either the robot to measure",
+        ),
         (("sensors", "--robot", "sim"), "No file for the calibration. Name one"),
         (("sensors", "--robot", "sim", "-o", "x.txt"), "does not end in .toml"),
         (("sensors", "--robot", "sim", "-o", "no/x.toml"), "There is no folder no"),

@@ -167,7 +167,7 @@ class Ledger(LedgerReader):
             )
             if not changed:
                 raise LedgerError(
-                    f"Generation {generation} of {condition!r}, run {replicate}, is already closed."
+                    f"Generation {generation} of {condition!r}, run {replicate}, is closed, and cannot be closed again."
                 )
             for trial in trials:
                 self._run(
@@ -391,7 +391,7 @@ class Ledger(LedgerReader):
 
     def _void(self, number: int, reason: str) -> None:
         if not reason.strip():
-            raise LedgerError(f"Trial {number} needs a reason to be void. Give one.")
+            raise LedgerError(f"Trial {number} cannot be void without a reason. Give a reason.")
         trial = self.trial(number)
         self._run("UPDATE trials SET state = 'void', reason = ? WHERE id = ?", reason, number)
         self._note_event(number, "void", {"reason": reason, "was": trial.state})

@@ -99,9 +99,9 @@ def test_what_deviates_from_a_recording_is_said_with_the_step(tmp_path):
     for step in range(3):
         robot.observe()
         robot.drive(Command(step / 10, -0.25))
-    with pytest.raises(RobotError, match=r"After step 3, .* ends, not with 'observe'"):
+    with pytest.raises(RobotError, match=r"After step 3, .* ends, got 'observe'"):
         robot.observe()
-    with pytest.raises(RobotError, match="ends, not with 'reset'"):
+    with pytest.raises(RobotError, match="ends, got 'reset'"):
         robot.reset()
 
 

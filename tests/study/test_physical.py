@@ -88,7 +88,7 @@ def test_emulated_and_real_trials_are_not_mixed(tmp_path):
     drive(small_study(), tmp_path / "r")
     real = FakeRobot()
     real.label = "REAL"
-    with pytest.raises(LedgerError, match="are EMULATED, and this robot's would be REAL"):
+    with pytest.raises(LedgerError, match="are EMULATED, but this robot's would be REAL"):
         drive(small_study(replicates="2"), tmp_path / "r", robot=real, operator=Anybody())
     assert not real.is_open
 

@@ -287,7 +287,7 @@ def test_pooled_fall_is_of_mean_squares_and_its_interval_covers_the_truth():
 
 def test_plan_of_other_platforms_has_sittings_and_leaves_out_what_cannot_be_seen():
     plan, small = PLANS["thymio"]
-    assert [str(name) for name in plan.names[:4]] == ["enki-1", "playground-1", "enki-2", "enki-3"]
+    assert [str(name) for name in plan.names[:4]] == ["enki-21", "playground-21", "enki-22", "enki-23"]
     assert len(plan.names) == 9
     units = {name.family: list(plan.units(name)) for name in plan.names}
     assert "gap-encoders-20" in units["enki"]

@@ -12,7 +12,7 @@ from realitygap.study import STRATEGIES, choose_condition, transfer
 from realitygap.study._transfer.calibrated import Calibrating, fitted_condition
 from realitygap.study._transfer.result import Transferred, estimate_mean, summarize_transfer
 from realitygap.study._transfer.simulated import evolve_champions
-from realitygap.study._transfer.strategies import TransferPlan, _Work
+from realitygap.study._transfer.strategies import CALIBRATE, TransferPlan, _Work
 from realitygap.study._transfer.transferability import distances, nsga2_order
 from realitygap.world import Calibration, load_calibration, load_robot, paper_arena
 
@@ -74,7 +74,7 @@ def test_every_strategy_spends_exactly_its_budget(result):
 def test_only_trials_of_budget_and_fresh_ones_are_carried_out(result):
     found, target, _ = result
     # a calibration that was made before costs no trial here, and counts as 6 of the 8
-    paid = sum(each.spent for each in found.champions) - 2 * 6
+    paid = sum(each.spent for each in found.champions) - len(CALIBRATE) * 6
     assert target.n == paid + len(found.champions) * SMALL["fresh_trials"]
 
 
@@ -176,6 +176,30 @@ def test_a_fit_on_the_budget_builds_on_the_robot_of_the_study(calibration, tmp_p
     assert fitted.on.robot.drive.speed == 0.2
     assert fitted.on.robot.drive.gain_left == OTHER["drive.gain_left"]
     assert fitted.on.draws["drive.delay"] == (0.25, 0.25)
+
+
+@pytest.mark.parametrize(
+    ("recommended", "randomize"),
+    [
+        ("fitted", "no"),
+        ("draws of the posterior", "posterior"),
+        ("nominal numbers", "no"),
+        ("", "posterior"),  # nothing was held out
+    ],
+)
+def test_the_strategy_recommended_simulates_what_the_calibration_recommends(
+    recommended, randomize, calibration
+):
+    made = load_calibration(calibration)
+    made = made.model_copy(update={"evidence": {"held_out": {"recommended": recommended}}})
+    condition = choose_condition("sim-paper", None, 1)
+    nominal = condition.on.robot.numbers()["drive.gain_left"]
+    fitted = fitted_condition(condition, made, "recommended")
+    assert fitted.on.robot.drive.gain_left == (
+        nominal if recommended == "nominal numbers" else OTHER["drive.gain_left"]
+    )
+    assert fitted.on.randomize == randomize
+    assert fitted.name == "recommended"
 
 
 def test_a_calibration_that_cost_more_than_the_budget_is_refused(calibration, tmp_path):

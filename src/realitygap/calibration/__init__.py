@@ -1,6 +1,7 @@
 """Fits of a simulator to what was observed of a robot: arrays in, values out; no platform is run here."""
 
 from ._abc import Effort, Posterior, fit_all, mixed
+from ._all_from_commands import fit_from_commands
 from ._all_from_poses import fit_from_poses
 from ._contact import fit_contact
 from ._contact_plans import contact_plans
@@ -60,6 +61,7 @@ __all__ = [
     "excitation",
     "fit_all",
     "fit_contact",
+    "fit_from_commands",
     "fit_from_poses",
     "fit_motion",
     "fit_motion_log",

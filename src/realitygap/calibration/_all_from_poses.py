@@ -19,7 +19,7 @@ from ._abc import Posterior
 from ._prior import Floats, Parameter, standard_of
 from ._rays import rays_of
 from ._shots import Shooter, Shots, shots_of
-from ._single_commands import BLOCK, SLIP, MotionOfCommands, is_motion, place_of, values_at
+from ._single_commands import BLOCK, SLIP, MotionOfCommands, place_of, values_at
 from ._tempering import sample_posterior
 from .infrared._mixture import MixtureReadings
 from .infrared._pulses import PulseReadings
@@ -64,12 +64,12 @@ def fit_from_poses(
     shots = shots_of(trials, robot, arena)
     shooter = Shooter(shots, ensemble, prior, robot)
     motion = MotionOfCommands(shooter, rng)
-    values = motion.fit(_own_places(prior, robot), N_DRAWS)
+    values = motion.fit(own_places(robot, motion.mean), N_DRAWS)
     say(f"motion: {shots.known.sum()} commands, {shots.touching[shots.known].mean():.0%} near walls")
     n_simulated = motion.n_simulated
     sensors = [parameter for parameter in prior if parameter.name.startswith("range.")]
     if sensors:
-        values |= _sensors(shots, sensors, robot, arena, rng)
+        values |= sensors_of(shots, sensors, robot, arena, rng)
         say(f"readings: {', '.join(parameter.name for parameter in sensors)}")
     for parameter in prior:
         if parameter.name == SLIP:
@@ -84,8 +84,8 @@ def fit_from_poses(
     return Posterior(places, values, np.zeros(len(prior)), n_simulated)
 
 
-def _own_places(prior: Sequence[Parameter], robot: RobotModel) -> Floats:
-    """Return the places of the robot's own numbers, for parameters of its motion, (p,)."""
+def own_places(robot: RobotModel, parameters: Sequence[Parameter]) -> Floats:
+    """Return the places of the robot's own numbers for parameters, (p,); the middle if it has none."""
     numbers = {
         name: value.center if isinstance(value, Distribution) else value
         for name, value in robot.numbers().items()
@@ -96,13 +96,20 @@ def _own_places(prior: Sequence[Parameter], robot: RobotModel) -> Floats:
         "body.length": 1.0,
         "body.width": 1.0,
     }
-    return np.array([place_of(p, (own | numbers)[p.name]) for p in prior if is_motion(p.name)])
+    own |= {p.name: numbers[p.expand[0].number] for p in parameters if p.name.startswith("range.")}
+    own |= numbers
+    return np.array([place_of(p, own[p.name]) if p.name in own else 0.5 for p in parameters])
 
 
-def _sensors(
-    shots: Shots, parameters: Sequence[Parameter], robot: RobotModel, arena: Arena, rng: np.random.Generator
+def sensors_of(
+    shots: Shots,
+    parameters: Sequence[Parameter],
+    robot: RobotModel,
+    arena: Arena,
+    rng: np.random.Generator,
+    n_readings: int = N_READINGS,
 ) -> dict[str, Floats]:
-    """Return draws of each parameter that range sensors share, (N_DRAWS,)."""
+    """Return draws of each parameter that range sensors share, (N_DRAWS,), by at most `n_readings` of the readings."""
     first = next(sensor for sensor in robot.range if sensor.response in ("ir", "pulses"))
     placements: list[Placement] = []
     poses = shots.poses[:, :-1][shots.known]
@@ -114,7 +121,7 @@ def _sensors(
                 Placement(*each, cosines=c)  # type: ignore[misc]
                 for *each, c in zip(distances, read[:, None], cosines, strict=True)
             ]
-    some = rng.permutation(len(placements))[:N_READINGS]
+    some = rng.permutation(len(placements))[:n_readings]
     chosen = [placements[k] for k in some]
     model = (
         PulseReadings(chosen, first.reach, first.pulses)

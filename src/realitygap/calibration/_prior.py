@@ -170,7 +170,7 @@ def scribbler_prior(robot: RobotModel) -> tuple[Parameter, ...]:
         *_plain("drive", DRIVE, numbers),
         Parameter("contact.friction", _even(0.0, 1.0), "", (Effect("contact.friction"),), "walls met at slant angles"),
         Parameter("contact.lat", _ratio(0.05, 5.0), "", (Effect("contact.lat"),), "walls scraped along"),
-        Parameter("contact.ang", _ratio(ang / 8, ang * 8), "1/m2", (Effect("contact.ang"),), "walls met head on"),
+        Parameter("contact.ang", _ratio(ang / 64, ang * 8), "1/m2", (Effect("contact.ang"),), "walls met head on"),
         Parameter(
             "contact.saturation", _ratio(2.0, 200.0), "s/m", (Effect("contact.saturation"),),
             "walls pressed against with wheels that turn unequally",

@@ -36,8 +36,8 @@ def transfer(
     strategy: Annotated[
         list[str] | None,
         typer.Option(
-            help="plain, select, halving, noise, randomized, calibrated, posterior, transferability, direct or all. "
-            "Repeatable. [default: all]"
+            help="plain, select, halving, noise, randomized, calibrated, posterior, recommended, transferability, "
+            "direct or all. Repeatable. [default: all]"
         ),
     ] = None,
     condition: Annotated[
@@ -99,8 +99,9 @@ def transfer(
     Strategy plain takes the best champion in simulation. Strategy select tries the N best champions once each, and
     halving tries them in rounds. Strategy noise evolves under the paper's three noise levels, and randomized with
     numbers sampled from ranges set by hand. Strategy calibrated evolves in the fitted simulator, and posterior with a
-    robot sampled from the calibration in each trial. Strategy transferability is that of Koos, Mouret & Doncieux
-    (2013). Strategy direct evolves on the target.
+    robot sampled from the calibration in each trial. Strategy recommended takes the one of these that predicted
+    held-out trials best, or the robot file's numbers if they did. Strategy transferability is that of Koos, Mouret &
+    Doncieux (2013). Strategy direct evolves on the target.
 
     Example: realitygap transfer sim-paper --to twin:worn-1.toml --budget 20
 

@@ -22,6 +22,7 @@ from realitygap.calibration import (
     evidence_of,
     excitation,
     fit_all,
+    fit_from_commands,
     fit_from_poses,
     information_of,
     misfits,
@@ -48,7 +49,9 @@ from .parts import SOFTWARE, Parts
 METHOD = (
     "Whole trials carried out anew in `sim`: approximate Bayesian computation in rounds (Deistler, Goncalves & Macke "
     "2022) with score summaries (Alsing & Wandelt 2018) and regression adjustment (Beaumont, Zhang & Balding 2002). "
-    "With poses, three of four draws are from likelihoods of single commands (multiple shooting, Bock 1983)."
+    "With poses, three of four draws are from likelihoods of single commands (multiple shooting, Bock 1983). Without "
+    "poses, they are from fits to whole trials with the same commands (covariance matrix adaptation, Hansen 2016; "
+    "weighted likelihood bootstrap, Newton & Raftery 1994)."
 )
 ALL_TRIALS = 20  # if no budget is given
 LEAST_TO_CHOOSE = 10  # of the budget, for which the last trials are chosen
@@ -56,9 +59,7 @@ STEPS = 100  # of a trial
 IDENTIFIED = 0.5  # of the prior's spread, below which the observations tell a parameter from its prior
 N_CANDIDATES = 12  # of which the next trials are chosen
 N_ASKED = 400  # robots of the posterior that are asked what a trial would tell
-OF_COMMANDS = (
-    3  # draws of single commands for each of whole trials, with poses: predicted more than 1 did, on twins
-)
+OF_COMMANDS = 3  # draws of given commands for each of whole trials: predicted more than 1 did, on twins
 BEFORE_CHOICE = 0.6  # of the budget is carried out before trials are chosen
 
 
@@ -196,17 +197,33 @@ class _Fit:
     def posterior(self, trials: Sequence[TrialRecord], effort: Effort) -> Posterior:
         """Return the part of the prior that remains.
 
-        With poses it is three parts that of single commands and one part that of whole trials as seen without poses:
-        where `sim` cannot make both, the first knows how the robot moves and the second what comes of it.
+        It is three parts of a fit whose minimum is sharp, and one part that of whole trials by simulation alone: where
+        `sim` cannot make both, the first knows how the robot moves and the second what comes of it. With poses, the
+        first is that of single commands. Without poses, it is that of whole trials with the same commands.
         """
         told = [trial for trial in trials if len(trial.commands) >= LEAST_STEPS]
-        if not told or any(trial.observe != "track" for trial in told):
+        if not told:
             return self._posterior_of_trials(trials, effort)
-        of_commands = fit_from_poses(
-            told, self.ensemble, self.prior, self.robot, self.arena, seed=self.seed, tell=self.tell
-        )
-        blind = [replace(trial, poses=np.empty((0, 3)), wheels=np.empty((0, 2))) for trial in told]
-        return mixed(of_commands, self._posterior_of_trials(blind, effort), self.prior, share=OF_COMMANDS)
+        if all(trial.observe == "track" for trial in told):
+            sharp = fit_from_poses(
+                told, self.ensemble, self.prior, self.robot, self.arena, seed=self.seed, tell=self.tell
+            )
+            blind = [replace(trial, poses=np.empty((0, 3)), wheels=np.empty((0, 2))) for trial in told]
+            whole = self._posterior_of_trials(blind, effort)
+        else:
+            whole = self._posterior_of_trials(trials, effort)
+            sharp = fit_from_commands(
+                told,
+                self.ensemble,
+                self.prior,
+                self.robot,
+                self.arena,
+                whole,
+                seed=self.seed,
+                effort=effort,
+            )
+            self.tell(f"commands: {sum(len(trial.commands) for trial in told)}, given again")
+        return mixed(sharp, whole, self.prior, share=OF_COMMANDS)
 
     def _posterior_of_trials(self, trials: Sequence[TrialRecord], effort: Effort) -> Posterior:
         return fit_all(

@@ -59,6 +59,7 @@ class ClosingPlan:
         runs: Evolutions in simulation of each replicate.
         repeats: Trials of each individual in simulation.
         effort: How much is simulated for a calibration.
+        numbers: The numbers of a calibration by which it is judged.
         seed: Of all random numbers.
         controllers_seed: Seed of the held-out controllers.
         has_own_controllers: Whether each twin has held-out controllers of its own. Otherwise all twins share them.
@@ -79,6 +80,7 @@ class ClosingPlan:
     runs: int = 100
     repeats: int = 8
     effort: Literal["small", "full"] = "small"
+    numbers: Literal["posterior", "recommended"] = "posterior"
     seed: int = 1
     platforms: dict[str, str] = field(default_factory=dict)
     unseen: tuple[tuple[str, Observe], ...] = ()
@@ -150,10 +152,11 @@ THYMIO = ClosingPlan(
     unseen=(("playground", "encoders"),),
     fewer={"playground": 1},  # it runs at most eight times as fast as a robot
     twins=8,
-    first_seed=1,
+    first_seed=21,
     observations=("track", "encoders"),
     trials=10,
-    controllers_seed=2026112600,
+    numbers="recommended",
+    controllers_seed=2026112700,
     has_own_controllers=True,
     transfers=False,
 )
@@ -172,10 +175,17 @@ EXTENDED = ("families", "twins", "budgets")
 _PARTS = ("twins", "units", "calibrations", "transfers")
 """Folders in that of the study."""
 
-_OF_PLATFORMS = (
-    *("study", "platforms", "unseen", "fewer", "controllers_seed", "has_own_controllers", "transfers"),
+_LATER = (
+    "study",
+    "platforms",
+    "unseen",
+    "fewer",
+    "controllers_seed",
+    "has_own_controllers",
+    "transfers",
+    "numbers",
 )
-"""Fields that are missing from folders of twins made before there were plans for other platforms."""
+"""Fields that are missing from folders written before there were such fields."""
 
 
 def adopt_plan(folder: Path, plan: ClosingPlan) -> None:
@@ -223,4 +233,4 @@ def read_plan(folder: Path) -> ClosingPlan:
 def _stored(path: Path) -> dict[str, Any]:
     """Return the plan of a folder as plain values."""
     usual = TWINS.to_dict()
-    return {name: usual[name] for name in _OF_PLATFORMS} | read_object(path)
+    return {name: usual[name] for name in _LATER} | read_object(path)

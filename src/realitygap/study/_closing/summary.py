@@ -134,6 +134,8 @@ def _calibrated(unit: Row, before: Row) -> Row:
         "budget": unit["budget"],
         "rms": after,
         "rms_point": unit["point"],
+        "rms_draws": unit.get("draws"),
+        "recommended": unit.get("recommended", ""),
         "fall": 1 - after["estimate"] / before["estimate"] if known else None,
         "gap": _measures(unit),
         "means": unit["means"],

@@ -20,7 +20,7 @@ from realitygap.trials import NoiseKey, Target
 from realitygap.world import Calibration, load_calibration
 
 from .._transfer.attempt import plans_of
-from .._transfer.calibrated import SELECTING, fitted_condition
+from .._transfer.calibrated import SELECTING, Numbers, fitted_condition
 from .._transfer.noise import needs_sim
 from .._transfer.simulated import crossed_cells, evolve_champions, try_repeatedly
 from .._transfer.strategies import choose_condition, transfer
@@ -29,6 +29,9 @@ from .plan import ClosingPlan, TwinName
 
 JUDGING, CALIBRATING = 10_000_000, 5_000_000
 """Numbers of the first trials for it, so that no two parts of the study draw the same noise."""
+
+OTHERS: dict[str, Numbers] = {"point": "calibrated", "draws": "posterior"}
+"""Gaps that are also stored, by their name in the file."""
 
 STRATEGIES = ("plain", "select", "direct")
 """Compared with `posterior`; what they do does not depend on what calibrating sees."""
@@ -128,9 +131,13 @@ class ClosingTwin:
         if not budget:
             return self._measured(self.condition, None)
         calibration = self._calibration(target, cast("Observe", observe), budget)
-        found = self._measured(fitted_condition(self.condition, calibration, "posterior"), calibration)
-        point = self._measured(fitted_condition(self.condition, calibration, "no"), calibration)
-        return {**found, "observe": observe, "budget": budget, "point": point["gap"]["rms"]}
+        found = self._measured(fitted_condition(self.condition, calibration, self.plan.numbers), calibration)
+        others = {
+            name: self._measured(fitted_condition(self.condition, calibration, numbers), calibration)
+            for name, numbers in OTHERS.items()
+        }
+        rms = {name: other["gap"]["rms"] for name, other in others.items()}
+        return {**found, **rms, "observe": observe, "budget": budget, "recommended": calibration.recommended}
 
     def _measured(self, condition: Condition, calibration: Calibration | None) -> dict[str, Any]:
         source, target = self._in_simulation(condition), self._on_twin()

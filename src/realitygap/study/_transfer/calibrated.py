@@ -1,4 +1,4 @@
-"""Strategies that make the simulator agree with the target first: calibrated and posterior."""
+"""Strategies that make the simulator agree with the target first: calibrated, posterior, and recommended."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from realitygap.runs import Condition
 from realitygap.trials import Target
 from realitygap.world import Calibration, RobotModel, load_calibration, load_robot
 
+from .._calibrate.hold_out import FITTED, NOMINAL, POSTERIOR
 from .._calibrate.one import refuse_other_sensors
 from .._calibrate.whole import calibrate_all
 from .attempt import Attempt
@@ -26,10 +27,16 @@ SELECTING = 2
 """One trial in so many is kept for choosing among champions where calibrating is on the budget: a fit that is a little
 wrong costs less where its champions are tried, and one by half of the trials is hardly worse."""
 
+Numbers = Literal["calibrated", "posterior", "recommended"]
+"""The numbers of a calibration with which a simulator runs."""
+
+_RECOMMENDED = {FITTED: "calibrated", POSTERIOR: "posterior", NOMINAL: "nominal", "": "posterior"}
+"""What runs, by `Calibration.recommended`."""
+
 
 def calibrated(attempt: Attempt) -> Champion:
     """Evolved in the simulator with the numbers that were fitted; trials that are left choose as in select."""
-    return best_on_target(attempt, attempt.champions(_fitted(attempt, "no")))
+    return best_on_target(attempt, attempt.champions(_fitted(attempt, "calibrated")))
 
 
 def posterior(attempt: Attempt) -> Champion:
@@ -37,40 +44,49 @@ def posterior(attempt: Attempt) -> Champion:
     return best_on_target(attempt, attempt.champions(_fitted(attempt, "posterior")))
 
 
-def _fitted(attempt: Attempt, randomize: Literal["no", "posterior"]) -> Condition:
-    needs_sim(attempt.condition, "calibrated" if randomize == "no" else "posterior")
+def recommended(attempt: Attempt) -> Champion:
+    """Evolved with the numbers that the calibration recommends; trials that are left choose as in select."""
+    return best_on_target(attempt, attempt.champions(_fitted(attempt, "recommended")))
+
+
+def _fitted(attempt: Attempt, numbers: Numbers) -> Condition:
+    needs_sim(attempt.condition, numbers)
     calibration, base = attempt.calibration(attempt.condition, attempt.left)
     attempt.target.spent += calibration.trials
-    return fitted_condition(attempt.condition, calibration, randomize, base)
+    return fitted_condition(attempt.condition, calibration, numbers, base)
 
 
 def fitted_condition(
-    condition: Condition,
-    calibration: Calibration,
-    randomize: Literal["no", "posterior"],
-    base: RobotModel | None = None,
+    condition: Condition, calibration: Calibration, numbers: Numbers, base: RobotModel | None = None
 ) -> Condition:
-    """The condition on a simulator that was calibrated.
+    """Return the condition on a simulator that was calibrated.
 
     Args:
-        condition: On platform `sim`; what it sets itself of the robot's numbers stays.
+        condition: A condition on platform `sim`; the robot's numbers that it sets itself stay.
         calibration: The fit.
-        randomize: `no`: the estimate; `posterior`: a draw for each trial.
-        base: The robot on whose numbers the fit builds; as the calibration names it when not given.
+        numbers: `calibrated`: the estimate. `posterior`: a draw for each trial. `recommended`: the one of these that
+            predicted held-out trials best, or the numbers that the fit started from if they did; draws of the
+            posterior if no trial was held out.
+        base: The robot on whose numbers the fit builds; as the calibration names it if not given.
     """
     keep = ("steps", "step_s", "contact", "noise", "noisy_reading", "precision", "set")
-    platform = needs_sim(condition, "calibrated")
+    platform = needs_sim(condition, numbers)
     old = {name: getattr(platform, name) for name in keep}
-    robot = (base or load_robot(calibration.robot)).with_numbers(calibration.numbers)
-    fitted = {"robot": robot.model_copy(update=calibration.step), "draws": dict(calibration.draws)}
-    sim = SimPlatform(**{**old, **fitted, "randomize": randomize})
-    name = "calibrated" if randomize == "no" else "posterior"
-    return condition.model_copy(update={"on": sim, "name": name})
+    kind = numbers if numbers != "recommended" else _RECOMMENDED[calibration.recommended]
+    robot = base or load_robot(calibration.robot)
+    if kind != "nominal":
+        robot = robot.with_numbers(calibration.numbers)
+    fitted = {
+        "robot": robot.model_copy(update=calibration.step),
+        "draws": {} if kind == "nominal" else dict(calibration.draws),
+        "randomize": "posterior" if kind == "posterior" else "no",
+    }
+    return condition.model_copy(update={"on": SimPlatform(**{**old, **fitted}), "name": numbers})
 
 
 @dataclass(frozen=True)
 class Calibrating:
-    """Reads the calibration that was given, or makes one on the budget; `calibrated` and `posterior` share it.
+    """Reads the calibration that was given, or makes one on the budget; all strategies that calibrate share it.
 
     Attributes:
         target: What is observed.

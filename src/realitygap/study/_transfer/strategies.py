@@ -34,7 +34,7 @@ from .._file import load_study
 from .._study import Study
 from .._targets import check_task, refuse_more_than_is_seen, refuse_too_little
 from .attempt import Attempt, Simulation, plans_of
-from .calibrated import Calibrating, calibrated, posterior
+from .calibrated import Calibrating, calibrated, posterior, recommended
 from .direct import direct
 from .noise import needs_sim, noise, randomized
 from .result import Transferred, TransferResult, summarize_transfer
@@ -51,12 +51,13 @@ STRATEGIES: Mapping[str, Callable[[Attempt], Champion]] = {
     "randomized": randomized,
     "calibrated": calibrated,
     "posterior": posterior,
+    "recommended": recommended,
     "transferability": transferability,
     "direct": direct,
 }
 """What each does is in the docstring of the function."""
 
-CALIBRATE = ("calibrated", "posterior")
+CALIBRATE = ("calibrated", "posterior", "recommended")
 """Strategies that share calibrations."""
 
 NEED_SIM = ("randomized", *CALIBRATE)

@@ -1,0 +1,353 @@
+"""The mean of a robot's motion and readings, from whole trials without poses.
+
+`sim` repeats each trial from its start with the commands that were given, and the readings, stalls, and wheels of each
+step are compared. A small error of a parameter soon puts the simulated robot elsewhere, so a fit to whole trials has
+many local minima. Therefore the fit begins with the first steps of the trials, whose minimum is wide, and adds steps
+from round to round.
+
+Sources: the covariance matrix adaptation evolution strategy, Hansen, The CMA Evolution Strategy: A Tutorial (2016);
+t-distributed differences, Lange, Little & Taylor, JASA 84 (1989); draws by the weighted likelihood bootstrap, Newton &
+Raftery, JRSS B 56 (1994), each with a draw from the prior (randomize then optimize, Bardsley et al. 2014). Differs: few
+reweighted fits are made, and draws are from the t distribution with their covariance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TypeVar
+
+import numpy as np
+from cmaes import CMA
+from numpy.typing import NDArray
+
+from realitygap.platforms import Play, Rehearsal, SimEnsemble
+from realitygap.records import TrialRecord
+from realitygap.world import Arena, RobotModel
+
+from ._abc import Effort, Posterior
+from ._all_from_poses import own_places, sensors_of
+from ._prior import Floats, Parameter, numbers_of, standard_of
+from ._shots import shots_of
+from ._single_commands import MOST_OFF, NOISE, PARTS, SLIP, values_at
+from ._tempering import sample_posterior
+
+F = TypeVar("F", bound=np.floating)
+
+SCATTER = (*NOISE, "range.burst", "range.noise_gain", "range.outlier_most")
+"""Parameters that scatter observations and hardly move their mean."""
+
+HORIZONS = (0.1, 0.2, 0.4, 0.7, 1.0)
+"""Shares of the steps that the rounds see."""
+
+GENERATIONS, SIZE = 40, 32  # of each round
+WIDE, NARROW = 0.2, 0.08  # first standard deviations of places: of the fit, and of reweighted fits
+N_REFITS = {"least": 6, "small": 10, "full": 16}
+REFIT_GENERATIONS = 25
+PREDICTED = 0.4  # share of the steps whose poses are predicted well enough for the sensors
+N_READINGS = 500  # few, as an error of a pose makes the readings of many steps wrong alike
+SPREAD = 1.4  # times that of reweighted fits: with it, about nine of ten intervals hold the numbers of robots of `sim`
+ALIKE = 30  # differences that noise makes alike, as it moves the robot for all later steps
+N_DRAWS = 500
+N_SHAPE = 400  # places that show the shape of the minimum
+N_NOISY = 40  # robots that show the scatter of observations
+N_NOISE = 200  # draws of noise
+FREEDOM = 4.0  # degrees, of the t distribution
+PRIOR = 12.0  # precision of a place that is even in 0..1
+FINEST = {"readings": 0.03, "stall": 0.3, "wheels": 2e-3}
+"""Differences that are taken for none: of readings and stalls, and of the way of a wheel in a step [m]."""
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """What was seen of k trials, padded to t steps.
+
+    Attributes:
+        starts: (k, 3) poses.
+        commands: (k, t, 2).
+        values: (k, t, d) what is seen in each step: readings, stall, and ways of the wheels if they are observed.
+        finest: (d,) differences that are taken for none.
+        weights: (k, t, d) 0 where nothing was seen, and together 1 for all sensors of a step.
+    """
+
+    starts: Floats
+    commands: Floats
+    values: NDArray[np.float32]
+    finest: NDArray[np.float32]
+    weights: NDArray[np.float32]
+
+    @property
+    def has_wheels(self) -> bool:
+        """Whether wheels are observed."""
+        return bool(self.finest[-1] == np.float32(FINEST["wheels"]))
+
+
+def fit_from_commands(
+    trials: Sequence[TrialRecord],
+    ensemble: SimEnsemble,
+    prior: Sequence[Parameter],
+    robot: RobotModel,
+    arena: Arena,
+    whole: Posterior,
+    *,
+    seed: int,
+    effort: Effort = "full",
+) -> Posterior:
+    """Return the posterior of all parameters.
+
+    Args:
+        trials: Trials whose starts are known; commands that controllers gave are given again.
+        ensemble: Simulates the trials.
+        prior: Prior of the parameters.
+        robot: Robot whose numbers they change.
+        arena: Arena of the trials.
+        whole: Posterior of whole trials by simulation: the sensors' noise is as in its draws while the mean is fitted.
+        seed: Seed of all random numbers.
+        effort: How many fits the draws are made of.
+    """
+    fit = _Fit(_seen(trials), ensemble, prior, robot, whole, seed)
+    center, shape = fit.grown()
+    values = {
+        **values_at(fit.free, fit.draws(center, shape, N_REFITS[effort])),
+        **_some_of(fit.noise, N_DRAWS, fit.rng),
+        **_sensors(fit, center, trials, arena),
+    }
+    values = {parameter.name: values[parameter.name] for parameter in prior}
+    return Posterior(standard_of(prior, values), values, np.zeros(len(prior)), fit.n_simulated)
+
+
+def _sensors(fit: _Fit, center: Floats, trials: Sequence[TrialRecord], arena: Arena) -> dict[str, Floats]:
+    """Return draws of the parameters of the sensors, (N_DRAWS,), by likelihoods at the poses that the fit predicts.
+
+    Only the first steps are used, whose poses are predicted well.
+    """
+    parameters = [parameter for parameter in fit.prior if parameter.name.startswith("range.")]
+    if not parameters:
+        return {}
+    poses = fit.poses(center)
+    n = max(1, round(PREDICTED * poses.shape[1]))
+    early = [
+        replace(
+            trial,
+            commands=trial.commands[:n],
+            readings=trial.readings[:n],
+            stalled=trial.stalled[:n],
+            wheels=trial.wheels[: n + 1],
+            poses=poses[k, : min(n, len(trial.commands)) + 1].astype(np.float64),
+        )
+        for k, trial in enumerate(trials)
+    ]
+    return sensors_of(shots_of(early, fit.robot, arena), parameters, fit.robot, arena, fit.rng, N_READINGS)
+
+
+def _some_of(draws: Mapping[str, Floats], n: int, rng: np.random.Generator) -> dict[str, Floats]:
+    """(n,) of the draws of each parameter; those of one length are joint draws."""
+    which = {k: rng.integers(k, size=n) for k in sorted({len(value) for value in draws.values()})}
+    return {name: value[which[len(value)]] for name, value in draws.items()}
+
+
+class _Fit:
+    """The fit of the parameters that move the mean; arguments as of `fit_from_commands`."""
+
+    def __init__(
+        self,
+        seen: _Seen,
+        ensemble: SimEnsemble,
+        prior: Sequence[Parameter],
+        robot: RobotModel,
+        whole: Posterior,
+        seed: int,
+    ) -> None:
+        scatter = SCATTER if seen.has_wheels else (*SCATTER, SLIP)
+        self.seen, self.ensemble, self.prior, self.robot, self.seed = seen, ensemble, prior, robot, seed
+        self.free = [p for p in prior if p.name not in scatter]
+        self.noise = {p.name: whole.values[p.name] for p in prior if p.name in scatter}
+        self.rng = np.random.default_rng([seed, 3])
+        self.n_simulated = 0
+
+    def grown(self) -> tuple[Floats, Floats]:
+        """(p,) places of the fit, from the robot's own numbers on, and (p, p) the shape of its minimum."""
+        center = own_places(self.robot, self.free)
+        p = len(center)
+        strategy = self._strategy(center, WIDE, np.eye(p))
+        weights, pull = np.ones(len(self.seen.starts)), np.full(p, 0.5)
+        for share in HORIZONS:
+            t = max(1, round(share * self.seen.commands.shape[1]))
+            # the noise is not known before the first round
+            is_first = share == HORIZONS[0]
+            scales = self.seen.finest if is_first else self._scales(np.clip(strategy.mean, 0.0, 1.0), t)
+            self._descend(strategy, t, scales, weights, GENERATIONS, pull)
+            self._note_noise(np.clip(strategy.mean, 0.0, 1.0), t)
+        return np.clip(strategy.mean, 0.0, 1.0), np.cov(
+            [strategy.ask() for _ in range(N_SHAPE)], rowvar=False
+        )
+
+    def draws(self, center: Floats, shape: Floats, n: int) -> Floats:
+        """(N_DRAWS, p) places around the fit, from n reweighted fits."""
+        t, k = self.seen.commands.shape[1], len(self.seen.starts)
+        scales = self._scales(center, t)
+        spread = NARROW / np.sqrt(np.diag(shape).mean())
+        refits = []
+        for _ in range(n):
+            strategy = self._strategy(center, spread, shape)
+            weights, pull = k * self.rng.dirichlet(np.ones(k)), self.rng.uniform(size=len(center))
+            self._descend(strategy, t, scales, weights, REFIT_GENERATIONS, pull)
+            # a fit may have left for a worse minimum
+            both = np.stack([np.clip(strategy.mean, 0.0, 1.0), center])
+            refits.append(both[np.argmin(self._costs(both, t, scales, weights, pull))])
+        off = SPREAD * (np.stack(refits) - np.mean(refits, axis=0)) / np.sqrt(n - 1)
+        normal = self.rng.standard_normal((N_DRAWS, n)) @ off
+        tails = np.sqrt((n - 1) / self.rng.chisquare(n - 1, N_DRAWS))
+        return np.asarray(np.clip(center + normal * tails[:, None], 0.0, 1.0))
+
+    def _strategy(self, center: Floats, spread: float, shape: Floats) -> CMA:
+        """Return a strategy that begins at places (p,), with a spread and a shape (p, p) of its steps."""
+        return CMA(
+            mean=np.clip(center, 1e-3, 1 - 1e-3), sigma=spread, cov=shape, population_size=SIZE,
+            bounds=np.tile([0.0, 1.0], (len(center), 1)), seed=int(self.rng.integers(2**31)),
+        )  # fmt: skip
+
+    def _descend(
+        self,
+        strategy: CMA,
+        t: int,
+        scales: NDArray[np.float32],
+        weights: Floats,
+        generations: int,
+        pull: Floats,
+    ) -> None:
+        """Move a strategy to places of less cost in the first t steps.
+
+        Args:
+            strategy: The strategy.
+            t: Steps.
+            scales: (k, t, d) of differences.
+            weights: (k,) of trials.
+            generations: Generations.
+            pull: (p,) places to which the prior pulls.
+        """
+        for _ in range(generations):
+            places = np.array([strategy.ask() for _ in range(SIZE)])
+            costs = self._costs(places, t, scales, weights, pull)
+            strategy.tell(list(zip(places, costs.tolist(), strict=True)))
+
+    def _costs(
+        self, places: Floats, t: int, scales: NDArray[np.float32], weights: Floats, pull: Floats
+    ) -> Floats:
+        """(m,) costs of robots at places (m, p) that have no noise; other arguments as of `_descend`."""
+        still = {name: np.zeros(len(places)) for name in self.noise}
+        seen, some = self.seen.values[:, :t], self.seen.weights[:, :t]
+
+        def of(made: NDArray[np.float32]) -> Floats:
+            squares = np.log1p(((made - seen) / scales) ** 2 / FREEDOM) * some
+            return np.asarray(squares.sum(axis=(2, 3), dtype=np.float64) @ weights)
+
+        logs = self._made({**values_at(self.free, places), **still}, t, of)
+        from_prior = ((places - pull) ** 2).sum(axis=1)
+        return np.asarray(0.5 * (FREEDOM + 1.0) * logs + 0.5 * PRIOR * from_prior)
+
+    def _scales(self, center: Floats, t: int) -> NDArray[np.float32]:
+        """(k, t, d) typical differences: those that are taken for none, and the scatter by noise."""
+        m = N_NOISY
+        noise = _some_of(self.noise, m, self.rng)
+        made = self._made(
+            {**values_at(self.free, np.tile(center, (m, 1))), **noise}, t, _as_it_is, same_noise=False
+        )
+        return np.asarray(np.sqrt(made.var(axis=0) + self.seen.finest**2))
+
+    def _note_noise(self, center: Floats, t: int) -> None:
+        """Fit the noise of the motion to the differences in the first t steps.
+
+        Variances of different kinds of noise add up; each kind is simulated alone.
+        """
+        parameters = [p for p in self.prior if p.name in NOISE]
+        if not parameters:
+            return
+        m = N_NOISY
+        values = values_at(self.free, np.tile(center, (m, 1)))
+        still = {name: np.zeros(m) for name in self.noise}
+        own = self._made({**values, **still}, t, _as_it_is)
+        parts = np.empty((len(parameters), own[0].size), np.float32)
+        for k, parameter in enumerate(parameters):
+            size = PARTS[parameter.name]
+            made = self._made(
+                {**values, **still, parameter.name: np.full(m, size)}, t, _as_it_is, same_noise=False
+            )
+            parts[k] = (((made - own) ** 2).mean(axis=0) / size**2).reshape(-1)
+        squares = ((own[0] - self.seen.values[:, :t]) ** 2).reshape(-1)
+        weights = (self.seen.weights[:, :t] / ALIKE).reshape(-1)
+        floor = np.broadcast_to(self.seen.finest**2, own[0].shape).reshape(-1)
+
+        def log_likelihood(places: Floats) -> Floats:
+            drawn = values_at(parameters, places)
+            sizes = np.stack([drawn[p.name] for p in parameters], axis=1)
+            variance = sizes**2 @ parts + floor
+            return np.asarray(
+                -0.5 * (np.log(variance) + np.minimum(squares / variance, MOST_OFF**2)) @ weights
+            )
+
+        self.noise |= values_at(
+            parameters, sample_posterior(log_likelihood, len(parameters), self.rng, N_NOISE)
+        )
+
+    def poses(self, center: Floats) -> NDArray[np.float32]:
+        """(k, t + 1, 3) poses of a robot without noise."""
+        still = {name: np.zeros(1) for name in self.noise}
+        numbers = numbers_of(self.prior, {**values_at(self.free, center[None]), **still}, self.robot)
+        seen = self.seen
+        played = self.ensemble.replay(seen.starts, seen.commands, numbers, self.seed, keep=("poses",))
+        return np.asarray(played.poses[0])
+
+    def _made(
+        self,
+        values: Mapping[str, Floats],
+        t: int,
+        of: Callable[[NDArray[np.float32]], NDArray[F]],
+        *,
+        same_noise: bool = True,
+    ) -> NDArray[F]:
+        """(m, ...) what `of` makes of what is seen of m robots in t steps."""
+        self.n_simulated += len(next(iter(values.values())))
+        seen = self.seen
+        play = Play(seen.starts, t, np.ascontiguousarray(seen.commands[:, :t]))
+        keep = ("readings", "stalled", "wheels") if seen.has_wheels else ("readings", "stalled")
+        return self.ensemble.summarize(
+            play,
+            numbers_of(self.prior, values, self.robot),
+            self.seed,
+            lambda rehearsal: of(_values(rehearsal, t, seen.has_wheels)),
+            keep=keep,
+            same_noise=same_noise,
+        )
+
+
+def _as_it_is(made: NDArray[np.float32]) -> NDArray[np.float32]:
+    return made
+
+
+def _values(rehearsal: Rehearsal, t: int, has_wheels: bool) -> NDArray[np.float32]:
+    """(m, k, t, d) what is seen of m robots."""
+    parts = [rehearsal.readings[:, :, :t], rehearsal.stalled[:, :, :t, None].astype(np.float32)]
+    if has_wheels:
+        parts.append(np.diff(rehearsal.wheels[:, :, : t + 1], axis=2))
+    return np.concatenate(parts, axis=-1)
+
+
+def _seen(trials: Sequence[TrialRecord]) -> _Seen:
+    """Return what was seen of trials, padded to the longest one."""
+    t = max(len(trial.commands) for trial in trials)
+    s = trials[0].readings.shape[1]
+    has_wheels = all(len(trial.wheels) for trial in trials)
+    d = s + 1 + 2 * has_wheels
+    commands = np.zeros((len(trials), t, 2))
+    values, weights = np.zeros((2, len(trials), t, d), np.float32)
+    for k, trial in enumerate(trials):
+        n = len(trial.commands)
+        commands[k, :n] = trial.commands
+        values[k, :n, :s], values[k, :n, s] = trial.readings[:n], trial.stalled[:n]
+        if has_wheels:
+            values[k, :n, s + 1 :] = np.diff(trial.wheels[: n + 1], axis=0)
+        weights[k, :n] = 1.0 / max(s, 1)
+    kinds = ["readings"] * s + ["stall"] + ["wheels", "wheels"] * has_wheels
+    finest = np.array([FINEST[kind] for kind in kinds], np.float32)
+    return _Seen(np.array([trial.start for trial in trials]), commands, values, finest, weights)

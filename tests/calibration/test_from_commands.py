@@ -1,0 +1,71 @@
+"""The fit to whole trials with the same commands, for robots of `sim` whose numbers are known."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from realitygap.calibration import (
+    Posterior,
+    fit_from_commands,
+    numbers_of,
+    ranges_of,
+    scribbler_prior,
+    values_of,
+)
+from realitygap.platforms import SimEnsemble, SimPlatform, SimTarget
+from realitygap.study._calibrate.whole import all_plans
+from realitygap.world import paper_arena
+
+ARENA = paper_arena()
+PLATFORM = SimPlatform(robot="thymio", step_s=0.5)
+TRUTH = {
+    "drive.gain_left": 0.8, "drive.gain_right": 0.84, "drive.track": 0.104, "drive.lag": 0.12, "drive.delay": 0.2,
+    "contact.friction": 0.3, "contact.lat": 0.5, "contact.ang": 150.0,
+    "drive.heading_noise_per_m": 0.005, "drive.heading_noise_per_s": 0.001, "drive.travel_noise_per_m": 0.001,
+    "drive.delay_jitter": 0.0,
+}  # fmt: skip
+
+
+def fitted(trials, seed=0):
+    prior = scribbler_prior(PLATFORM.robot)
+    ensemble = SimEnsemble(PLATFORM, ARENA, ranges=ranges_of(prior, PLATFORM.robot))
+    places = np.random.default_rng(0).normal(size=(500, len(prior)))
+    whole = Posterior(places, values_of(prior, places), np.zeros(len(prior)), 0)
+    found = fit_from_commands(
+        trials, ensemble, prior, PLATFORM.robot, ARENA, whole, seed=seed, effort="small"
+    )
+    return numbers_of(prior, found.values, PLATFORM.robot)
+
+
+@pytest.fixture(scope="module", params=["cells", "encoders"])
+def trials(request):
+    with SimTarget(SimPlatform(robot="thymio", step_s=0.5, set=TRUTH), ARENA, key=3) as target:
+        return target.carry_out(all_plans(ARENA, PLATFORM.robot, 10, 1), request.param)
+
+
+@pytest.mark.slow
+def test_a_robot_is_found_from_whole_trials_without_poses(trials):
+    numbers = fitted(trials)
+    middle = {name: np.median(value) for name, value in numbers.items()}
+    moved = (1 - middle["drive.slip"]) if len(trials[0].wheels) else 1.0  # of which slip takes a share
+    assert middle["drive.gain_left"] * moved == pytest.approx(0.8, rel=0.02)
+    assert middle["drive.gain_right"] * moved == pytest.approx(0.84, rel=0.02)
+    assert middle["drive.track"] == pytest.approx(0.104, rel=0.02)
+    assert middle["drive.lag"] + middle["drive.delay"] == pytest.approx(0.32, abs=0.05)
+    assert middle["contact.ang"] == pytest.approx(150.0, rel=0.5)
+
+
+@pytest.mark.slow
+def test_trials_of_different_lengths_are_fitted_together(trials):
+    cut = [
+        replace(
+            trial,
+            commands=trial.commands[:n],
+            readings=trial.readings[:n],
+            stalled=trial.stalled[:n],
+            wheels=trial.wheels[: n + 1],
+        )
+        for trial, n in zip(trials, (100, 30, 100, 100, 60, 100, 100, 100, 5, 100), strict=True)
+    ]
+    assert np.median(fitted(cut)["drive.track"]) == pytest.approx(0.104, rel=0.03)

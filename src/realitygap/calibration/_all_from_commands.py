@@ -60,12 +60,12 @@ FINEST = {"readings": 0.03, "stall": 0.3, "wheels": 2e-3}
 
 @dataclass(frozen=True)
 class _Seen:
-    """What was seen of k trials, padded to t steps.
+    """The observations of k trials, padded to t steps.
 
     Attributes:
         starts: (k, 3) poses.
         commands: (k, t, 2).
-        values: (k, t, d) what is seen in each step: readings, stall, and ways of the wheels if they are observed.
+        values: (k, t, d) observations in each step: readings, stall, and ways of the wheels if they are observed.
         finest: (d,) differences that are taken for none.
         weights: (k, t, d) 0 where nothing was seen, and together 1 for all sensors of a step.
     """
@@ -306,7 +306,7 @@ class _Fit:
         *,
         same_noise: bool = True,
     ) -> NDArray[F]:
-        """(m, ...) what `of` makes of what is seen of m robots in t steps."""
+        """Return the results of `of` for the observations of m robots in t steps, (m, ...)."""
         self.n_simulated += len(next(iter(values.values())))
         seen = self.seen
         play = Play(seen.starts, t, np.ascontiguousarray(seen.commands[:, :t]))
@@ -326,7 +326,7 @@ def _as_it_is(made: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 def _values(rehearsal: Rehearsal, t: int, has_wheels: bool) -> NDArray[np.float32]:
-    """(m, k, t, d) what is seen of m robots."""
+    """Return the observations of m robots, (m, k, t, d)."""
     parts = [rehearsal.readings[:, :, :t], rehearsal.stalled[:, :, :t, None].astype(np.float32)]
     if has_wheels:
         parts.append(np.diff(rehearsal.wheels[:, :, : t + 1], axis=2))
@@ -334,7 +334,7 @@ def _values(rehearsal: Rehearsal, t: int, has_wheels: bool) -> NDArray[np.float3
 
 
 def _seen(trials: Sequence[TrialRecord]) -> _Seen:
-    """Return what was seen of trials, padded to the longest one."""
+    """Return the observations of trials, padded to the longest one."""
     t = max(len(trial.commands) for trial in trials)
     s = trials[0].readings.shape[1]
     has_wheels = all(len(trial.wheels) for trial in trials)

@@ -34,6 +34,11 @@ _CUT = """() => [...document.querySelectorAll("body *:not(svg *)")].filter((it) 
   && it.scrollWidth > it.clientWidth + 1
   && (getComputedStyle(it).textOverflow === "ellipsis" || getComputedStyle(it).overflowX === "visible"))
   .map((it) => `cut: ${it.textContent}`)"""
+_SMALL = """() => [...document.querySelectorAll(
+  "button, [role=button], [role=tab], [role=radio], .q-field, .lab-trail a, .rg-bar label, select, input[type=range]")]
+  .filter((it) => it.checkVisibility()).map((it) => [it, it.getBoundingClientRect()])
+  .filter(([it, { width, height }]) => width > 1 && (Math.round(width) < 44 || Math.round(height) < 44))
+  .map(([it, { width, height }]) => `${Math.round(width)} x ${Math.round(height)} px: ${it.outerHTML.slice(0, 120)}`)"""
 _WATCH = """() => {
   window.tooManyStates = [];
   const look = () => {
@@ -91,6 +96,12 @@ def wide(page: Any) -> list[str]:
     """Return by how much the page is wider than the screen."""
     over = page.evaluate("() => document.documentElement.scrollWidth - window.innerWidth")
     return [f"{over} px wider than the screen"] if over > 0 else []
+
+
+def small(page: Any) -> list[str]:
+    """Return the buttons, fields, and tabs that are too small for fingers: below 44 px."""
+    found: list[str] = page.evaluate(_SMALL)
+    return found
 
 
 def watch_states(page: Any) -> None:
@@ -159,6 +170,8 @@ def faults(page: Any, root: Path) -> list[str]:
         page.set_viewport_size({"width": width, "height": height})
         page.wait_for_timeout(SETTLED_MS)
         problems = [*wide(page), *cut(page), *(axe(page, size) if size in AXE_SIZES else [])]
+        if (width, height) == PHONE:
+            problems += small(page)
         found += [f"{size}: {problem}" for problem in problems]
     return found
 

@@ -22,6 +22,7 @@ from ._time import MILLISECOND, SECOND, nanoseconds
 
 FlukeModel = Literal["1", "2"]
 Answer = Callable[[bytes, int, int], None]  # bytes, from when on, time of a byte
+Act = Callable[[bytes, int], bytes | None]  # arguments, time; its answer, if it has one
 
 VERSION = {"1": b"fluke:2.9.1", "2": b"fluke:3.0.5"}
 LINK_BYTE_NS = nanoseconds(10 / 460800)  # between the board and its Bluetooth chip
@@ -269,16 +270,15 @@ class Fluke:
     def _carry_out(self, op: Op, arguments: bytes, now: int) -> None:
         self._table.advance_to(now)
         act = self._acts.get(op)
-        data = act(arguments, now) if act is not None else b""
-        if data:
+        if act is not None and (data := act(arguments, now)):
             self._answer(data, now, self._link_byte_ns)
 
-    def _all_acts(self) -> dict[Op, Callable[[bytes, int], bytes]]:
+    def _all_acts(self) -> dict[Op, Act]:
         """Return the action of each command; an action returns the answer.
 
         Commands without an action have no effect and no answer.
         """
-        acts: dict[Op, Callable[[bytes, int], bytes]] = {
+        acts: dict[Op, Act] = {
             Op.GET_BATTERY: self._get_battery,
             Op.SET_FRONT_LED_ON: lambda _, __: self._set(front_led=True),
             Op.SET_FRONT_LED_OFF: lambda _, __: self._set(front_led=False),
@@ -311,16 +311,15 @@ class Fluke:
             acts[Op.SET_SERVO] = self._set_servo
         return acts | self._camera_acts()
 
-    def _set(self, **values: object) -> bytes:
+    def _set(self, **values: object) -> None:
         for name, value in values.items():
             setattr(self, name, value)
-        return b""
 
     def _get_battery(self, given: bytes, now: int) -> bytes:
         volts = self._battery.volts(self._table.motors.load)
         return min(0xFFFF, round(volts * VOLTS)).to_bytes(2, "big")
 
-    def _get_ir(self, op: Op) -> Callable[[bytes, int], bytes]:
+    def _get_ir(self, op: Op) -> Act:
         return lambda _, __: self._obstacle(EMITTERS[op]).to_bytes(2, "big")
 
     def _obstacle(self, emitter: str) -> int:
@@ -331,58 +330,49 @@ class Fluke:
         chosen = [name for bit, name in ((1, "right"), (2, "left"), (4, "center")) if given[2] & bit]
         return max((self._obstacle(name) for name in chosen), default=0).to_bytes(2, "big")
 
-    def _set_forwardness(self, given: bytes, now: int) -> bytes:
+    def _set_forwardness(self, given: bytes, now: int) -> None:
         self._memory.write_page(0, 0, 1 if given[0] else SCRIBBLER_AHEAD)
-        return b""
 
-    def _set_serial_memory(self, given: bytes, now: int) -> bytes:
+    def _set_serial_memory(self, given: bytes, now: int) -> None:
         page, offset = _words(given[:4])
         self._memory.write_page(page, offset, given[4])
-        return b""
 
-    def _erase(self, given: bytes, now: int) -> bytes:
+    def _erase(self, given: bytes, now: int) -> None:
         self._memory.erase_page(given[0] << 8 | given[1])
-        return b""
 
     def _identify(self, given: bytes, now: int) -> bytes:
         self._robot.reset(now)
         return ROBOT_IDS[self._robot.model]
 
-    def _reset_robot(self, given: bytes, now: int) -> bytes:
+    def _reset_robot(self, given: bytes, now: int) -> None:
         self._robot.reset(now)
-        return b""
 
-    def _restart(self, given: bytes, now: int) -> bytes:
+    def _restart(self, given: bytes, now: int) -> None:
         self._wake()
-        return b""
 
     def _get_message(self, given: bytes, now: int) -> bytes:
         heard, self.heard = self.heard, b""
         return len(heard).to_bytes(2, "big") + heard
 
-    def _send_message(self, given: bytes, now: int) -> bytes:
+    def _send_message(self, given: bytes, now: int) -> None:
         self.sent.append(given[1:])
-        return b""
 
-    def _set_passthrough(self, given: bytes, now: int) -> bytes:
+    def _set_passthrough(self, given: bytes, now: int) -> None:
         if given[0] == 1:
             self._passes_all = self._relays = True
-        return b""
 
-    def _pass_bytes(self, given: bytes, now: int) -> bytes:
+    def _pass_bytes(self, given: bytes, now: int) -> None:
         for byte in given:
             self._pass(byte, now)
-        return b""
 
-    def _set_servo(self, given: bytes, now: int) -> bytes:
+    def _set_servo(self, given: bytes, now: int) -> None:
         self.servos[given[0] & 3] = given[1]
-        return b""
 
     # pictures
 
-    def _camera_acts(self) -> dict[Op, Callable[[bytes, int], bytes]]:
+    def _camera_acts(self) -> dict[Op, Act]:
         camera = self._camera
-        acts: dict[Op, Callable[[bytes, int], bytes]] = {
+        acts: dict[Op, Act] = {
             Op.GET_IMAGE: lambda _, __: camera.raw().tobytes(),
             Op.SET_WINDOW: self._set_window,
             Op.GET_WINDOW: lambda given, _: camera.window(given[0]).tobytes(),
@@ -404,22 +394,19 @@ class Fluke:
             acts[Op.SET_PICTURE_SIZE] = self._set_size
         return acts
 
-    def _set_register(self, given: bytes) -> bytes:
+    def _set_register(self, given: bytes) -> None:
         self._camera.set_register(given[0], given[1])
-        return b""
 
-    def _set_colors(self, given: bytes, now: int) -> bytes:
+    def _set_colors(self, given: bytes, now: int) -> None:
         self._camera.set_colors(given[1], given[2:])
-        return b""
 
-    def _set_window(self, given: bytes, now: int) -> bytes:
+    def _set_window(self, given: bytes, now: int) -> None:
         if self.model == "1":
             number, x_low, y_low, x_high, y_high, x_step, y_step = given
         else:
             number, x_step, y_step = given[0], given[9], given[10]
             x_low, y_low, x_high, y_high = _words(given[1:9])
         self._camera.set_window(number, Window(x_low, y_low, x_high, y_high, x_step, y_step))
-        return b""
 
     def _get_runs(self, given: bytes, now: int) -> bytes:
         """Run lengths as words; of a Fluke 2, whose picture is larger, three bytes each."""
@@ -441,10 +428,9 @@ class Fluke:
         scan = self._camera.jpeg_scan(in_color=in_color, careful=bool(given[0]))
         return scan + b"".join((time & 0xFFFFFFFF).to_bytes(4, "little") for time in times)
 
-    def _set_size(self, given: bytes, now: int) -> bytes:
+    def _set_size(self, given: bytes, now: int) -> None:
         if given[0] in SIZES:
             self._camera.set_size(*SIZES[given[0]])
-        return b""
 
 
 def _words(given: bytes) -> list[int]:

@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 from collections import deque
 from dataclasses import dataclass
-from typing import Protocol
 
 from ._time import MILLISECOND, nanoseconds
 
@@ -26,36 +25,6 @@ S2_SPACING = CIRCLE * HALF_MM / math.pi  # 152 mm
 PATH_SPEED = 7  # until a client chooses another; Myro's default
 TOP_STEP = 15
 STATISTICS_NS = 100 * MILLISECOND
-
-
-class Motors(Protocol):
-    """The motors that turn the wheels."""
-
-    def drive(self, right: int, left: int) -> None:
-        """Take the two bytes of SET_MOTORS, 100 for standing still."""
-        ...
-
-    def stop(self) -> None:
-        """Stop immediately and drop all pending motions."""
-        ...
-
-    @property
-    def turning(self) -> bool:
-        """Whether a wheel is meant to turn."""
-        ...
-
-    def speeds(self) -> tuple[float, float]:
-        """Left and right for the next step of the simulation [m/s]."""
-        ...
-
-    def turned(self, now: int, left: float, right: float, *, slipping: bool) -> None:
-        """Learn how far the wheels turned in it [m], and whether in vain."""
-        ...
-
-    @property
-    def load(self) -> float:
-        """Load of the motors, 0 to 1."""
-        ...
 
 
 class S1Motors:
@@ -271,3 +240,7 @@ class S2Motors:
     def load(self) -> float:
         """Load of the motors, 0 to 1."""
         return min(1.0, self._step / 12)
+
+
+Motors = S1Motors | S2Motors
+"""The motors that turn the wheels."""

@@ -21,6 +21,7 @@ from ._time import MILLISECOND, SECOND, nanoseconds
 
 Model = Literal["s1", "s2"]
 Send = Callable[[bytes, int, bool], None]  # bytes, from when on, whether they are an echo
+Setter = Callable[[bytes, int], int | list[Segment] | None]  # packet, time; how long it takes, or motions
 
 INFO = {
     "s1": b"Robot-Version:2.6.2,Robot:Scribbler,Mode:Serial\n",
@@ -209,7 +210,7 @@ class Scribbler:
         if isinstance(work, list):
             self._hand_on(work, packet, self._motions, now)
         else:
-            self._finish_after(work + self._block_ns, packet, self._sensor_block, now)
+            self._finish_after((work or 0) + self._block_ns, packet, self._sensor_block, now)
 
     def drop_motions(self) -> None:
         """Forget motions that have not begun."""
@@ -353,13 +354,13 @@ class Scribbler:
 
     # setting
 
-    def _all_setters(self) -> dict[int, Callable[[bytes, int], int | list[Segment]]]:
+    def _all_setters(self) -> dict[int, Setter]:
         """Return the action of each setting command.
 
         An action returns its duration [ns], or motions for the motors.
         """
         memory = self._memory
-        setters: dict[int, Callable[[bytes, int], int | list[Segment]]] = {
+        setters: dict[int, Setter] = {
             Op.SET_PASS1: lambda packet, _: self._keep(memory.password, 0, packet[1:]),
             Op.SET_PASS2: lambda packet, _: self._keep(memory.password, 8, packet[1:]),
             Op.SET_NAME1: lambda packet, _: self._keep(memory.name, 0, packet[1:]),
@@ -423,19 +424,16 @@ class Scribbler:
         self._memory.save()
         return EEPROM_NS
 
-    def _set_volume(self, packet: bytes, now: int) -> int:
+    def _set_volume(self, packet: bytes, now: int) -> None:
         self._memory.volume = min(100, packet[1])
         self._memory.save()
-        return 0
 
-    def _set_led(self, packet: bytes, now: int) -> int:
+    def _set_led(self, packet: bytes, now: int) -> None:
         on, kept = LEDS[Op(packet[0])]
         self._leds = self._leds & kept | on
-        return 0
 
-    def _set_leds(self, packet: bytes, now: int) -> int:
+    def _set_leds(self, packet: bytes, now: int) -> None:
         self._leds = (packet[1] & 1) << 2 | (packet[2] & 1) << 1 | packet[3] & 1
-        return 0
 
     def _blink(self, now: int) -> None:
         """The center LED is toggled once a second while idle."""
@@ -450,15 +448,13 @@ class Scribbler:
         shown = self._leds ^ (((now - self._idle_since) // SECOND % 2) << 1)
         return shown >> 2 & 1, shown >> 1 & 1, shown & 1
 
-    def _stop(self, packet: bytes, now: int) -> int:
+    def _stop(self, packet: bytes, now: int) -> None:
         self._table.motors.stop()
         self.reckoning.forget()
-        return 0
 
-    def _drive(self, packet: bytes, now: int) -> int:
+    def _drive(self, packet: bytes, now: int) -> None:
         self._table.motors.drive(right=packet[1], left=packet[2])
         self.reckoning.forget()
-        return 0
 
     def _sound(self, packet: bytes, now: int) -> int:
         """Play a tone. The answer follows it, also when the robot is quiet."""
@@ -483,13 +479,11 @@ class Scribbler:
             self.reckoning.forget()
         return self.reckoning.turn(packet[1], _word(packet, 2))
 
-    def _set_position(self, packet: bytes, now: int) -> int:
+    def _set_position(self, packet: bytes, now: int) -> None:
         self.reckoning.x, self.reckoning.y = 2.0 * _long(packet, 1), 2.0 * _long(packet, 5)
-        return 0
 
-    def _set_angle(self, packet: bytes, now: int) -> int:
+    def _set_angle(self, packet: bytes, now: int) -> None:
         self.reckoning.angle = _long(packet, 1) * 955 / 360
-        return 0
 
 
 def _word(packet: bytes, first: int) -> int:

@@ -11,8 +11,8 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 from threading import Event, RLock, Thread
-from typing import Protocol
 
+from realitygap._closing import ClosedOnExit
 from realitygap.errors import RobotError
 
 from ._emulator import Emulator
@@ -27,40 +27,6 @@ ANSWER_S = 5.0  # within which an answer comes, by the emulator's time
 LONGEST_S = 0.05  # of real time that the physics may take in one piece
 PASSED_AT_ONCE_NS = SECOND // 4  # of the emulator's time, before it is looked whether they took so long
 IDLE_S = 0.5  # while the wheels turn, physics are computed at least so often
-
-
-class Channel(Protocol):
-    """A place to which a client connects.
-
-    Attributes:
-        name: Name that a client opens.
-    """
-
-    name: str
-
-    def watch(self, selector: selectors.BaseSelector) -> None:
-        """Register with the selector everything that may bring bytes."""
-        ...
-
-    def read(self, ready: object) -> bytes:
-        """Return the bytes that a client sent, or none."""
-        ...
-
-    def write(self, data: bytes) -> int:
-        """Hand bytes on and return the number that was accepted."""
-        ...
-
-    def want_write(self, selector: selectors.BaseSelector, *, wanted: bool) -> None:
-        """Choose whether the selector wakes when bytes can be handed on again."""
-        ...
-
-    def hang_up(self) -> None:
-        """The link goes away."""
-        ...
-
-    def close(self) -> None:
-        """Let go of it."""
-        ...
 
 
 class PtyChannel:
@@ -232,6 +198,10 @@ class TcpChannel:
         self._listening.close()
 
 
+Channel = PtyChannel | TcpChannel
+"""A place to which a client connects."""
+
+
 def listen(port: int) -> socket.socket:
     """A socket that listens on this machine only.
 
@@ -322,7 +292,7 @@ class WitnessDoor:
         self._listening.close()
 
 
-class Server:
+class Server(ClosedOnExit):
     """Carries bytes between an emulator and a channel, in real time or a multiple of it.
 
     Args:
@@ -418,12 +388,6 @@ class Server:
         self._selector.close()
         self._wake_read.close()
         self._wake_write.close()
-
-    def __enter__(self) -> Server:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
     def _pause(self) -> float | None:
         """Return the time until there is work again [s], or None while only a client can change anything."""

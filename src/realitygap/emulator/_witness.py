@@ -11,6 +11,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from realitygap._closing import ClosedOnExit
 from realitygap._limits import parse_json
 from realitygap.errors import RobotError
 from realitygap.world import Arena, Grid, Pose
@@ -155,10 +156,11 @@ class DirectWitness:
 
     def cells_at(self, times: Sequence[float]) -> tuple[int, ...]:
         """Cells at given times."""
-        return _cells_at(self.path(), self._emulator.scene.arena.grid, times)
+        return cells_at_times(self.path(), self._emulator.scene.arena.grid, times)
 
 
-def _cells_at(path: NDArray[np.float64], grid: Grid, times: Sequence[float]) -> tuple[int, ...]:
+def cells_at_times(path: NDArray[np.float64], grid: Grid, times: Sequence[float]) -> tuple[int, ...]:
+    """Return the cells in which a path (t, 4) was at given times [s], in order of first visits."""
     from realitygap.kernels.tasks.coverage import to_grid  # compiled code takes a while to import
 
     found = np.searchsorted(path[:, 0], np.asarray(times, dtype=float) + 1e-9, side="right") - 1
@@ -202,7 +204,7 @@ def _do(witness: Witness, what: str, request: dict[str, Any]) -> Any:
     raise ValueError(f"cannot do {what!r}")
 
 
-class RemoteWitness:
+class RemoteWitness(ClosedOnExit):
     """The witness of an emulator in another process, over TCP.
 
     Args:
@@ -297,12 +299,6 @@ class RemoteWitness:
         """Let go of the connection."""
         self._file.close()
         self._socket.close()
-
-    def __enter__(self) -> RemoteWitness:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
 
 def connect_witness(address: str) -> RemoteWitness:

@@ -14,7 +14,7 @@ from realitygap.errors import StudyError, did_you_mean, real_number, whole_numbe
 from realitygap.evolution import PAPER_INPUTS, ControllerInterface
 from realitygap.kernels.math.philox import MAX_INDIVIDUALS
 from realitygap.platforms import Fleet, JyroPlatform, Platform, SimPlatform, class_of, platform_of
-from realitygap.tasks import MAZE_TASKS, PYTHON, TASKS, ControllerSettings, CoverageTask
+from realitygap.tasks import MAZE_TASKS, PYTHON, TASKS, ControllerSettings
 from realitygap.trials import NoiseKey
 from realitygap.world import ArenaSettings
 
@@ -289,14 +289,3 @@ def _made(name: str, kind: type[T], given: T | Mapping[str, Any] | None) -> T:
     if not isinstance(given, Mapping | None):
         raise TypeError(f"{name} is {given!r}, expected {kind.__name__}, or a mapping of what it is made of.")
     return kind(**(given or {}))
-
-
-__all__ = [
-    "CoverageTask",
-    "GivenController",
-    "GivenPlatform",
-    "RealType",
-    "Robots",
-    "maze_robots",
-    "task_robots",
-]

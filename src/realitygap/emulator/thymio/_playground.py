@@ -19,15 +19,15 @@ import threading
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from types import TracebackType
-from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from realitygap._closing import ClosedOnExit
 from realitygap.errors import RobotError
 from realitygap.world import Arena, Pose, cells_along, paper_arena
 
+from .._witness import cells_at_times
 from ._bus import Bus
 from ._scene import CM, corner_of, scene_of
 
@@ -94,7 +94,7 @@ def _faketime() -> Path | None:
     return found[0] if found else None
 
 
-class Playground:
+class Playground(ClosedOnExit):
     """A playground with a Thymio in an arena; the witness of it, too.
 
     Its time is that of its robot: seconds since it was started, times its speed. Its random numbers cannot be chosen.
@@ -289,10 +289,7 @@ class Playground:
 
     def cells_at(self, times: Sequence[float]) -> tuple[int, ...]:
         """Cells of the grid in which the robot was at given times [s], in order of first visits."""
-        path = self.path()
-        rows = np.searchsorted(path[:, 0], np.asarray(times, float) + 1e-9, side="right") - 1
-        cells = (self._arena.grid.cell_at(*path[row, 1:3].tolist()) for row in np.maximum(rows, 0))
-        return tuple(dict.fromkeys(cell for cell in cells if cell is not None))
+        return cells_at_times(self.path(), self._arena.grid, times)
 
     # the robot's parts
 
@@ -312,11 +309,3 @@ class Playground:
         if self._bus is not None:
             self._bus.close()
         self._folder.cleanup()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import selectors
-from types import TracebackType
-from typing import Self
+
+from realitygap._closing import ClosedOnExit
 
 from .._serve import WitnessDoor
 from ._playground import Playground
@@ -13,7 +13,7 @@ LOOK_S = 0.2
 """Time between two looks at whether the playground still runs [s]."""
 
 
-class PlaygroundServer:
+class PlaygroundServer(ClosedOnExit):
     """Serves the witness of a playground; its robot has a separate port.
 
     Args:
@@ -57,11 +57,3 @@ class PlaygroundServer:
         if self._door:
             self._door.close()
         self._selector.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()

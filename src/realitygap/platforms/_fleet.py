@@ -35,8 +35,7 @@ class Outline:
     @classmethod
     def of_model(cls, model: RobotModel) -> Outline:
         """Return the outline of a robot from a file."""
-        mounts = tuple((sensor.x, sensor.y, sensor.direction) for sensor in model.range)
-        return cls(tuple(part.outline() for part in model.body), mounts)
+        return cls(tuple(part.outline() for part in model.body), model.mounts)
 
 
 class Fleet(Protocol):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 from collections.abc import Sequence
 from typing import Any, ClassVar, Self
 
@@ -87,6 +89,12 @@ class PlatformSettings(Settings):
         """The name of this platform as users write it."""
         rest = getattr(self, self.rest_setting) if self.rest_setting else ""
         return f"{self.name}:{rest}" if isinstance(rest, str) and rest else self.name
+
+    @property
+    def fingerprint(self) -> str:
+        """The name and a hash of all settings, equal for equal robots."""
+        settings = json.dumps(self.model_dump(mode="json"), sort_keys=True)
+        return f"{self.name} {hashlib.sha256(settings.encode()).hexdigest()[:16]}"
 
     def identified(self) -> Self:
         """Return the platform with the hash of each file that it does not store whole.

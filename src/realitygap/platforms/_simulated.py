@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
@@ -112,9 +110,7 @@ class SimTarget(RepeatableTarget):
     @cached_property
     def identity(self) -> str:
         """Identity, which is equal for the same simulated robot with any random numbers."""
-        settings = json.dumps(self.platform.model_dump(mode="json"), sort_keys=True)
-        digest = hashlib.sha256(settings.encode()).hexdigest()[:16]
-        return f"{self.platform.name} {digest}, noise {self.noise:g}"
+        return f"{self.platform.fingerprint}, noise {self.noise:g}"
 
     def carry_out(
         self, plans: Sequence[TrialPlan], observe: Observe, tell: TellTrial | None = None

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import math
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any, Protocol
@@ -506,9 +505,7 @@ class StepwiseTarget(RepeatableTarget):
         self.label: Label = robot.label
         self.step_s: float = robot.step_s
         self.n_sensors: int = robot.n_sensors
-        settings = json.dumps(platform.model_dump(mode="json"), sort_keys=True)
-        digest = hashlib.sha256(settings.encode()).hexdigest()[:16]
-        self.identity = f"{platform.name} {digest} {platform.version}, noise {noise:g}"
+        self.identity = f"{platform.fingerprint} {platform.version}, noise {noise:g}"
 
     @property
     def inputs(self) -> tuple[str, ...]:

@@ -82,9 +82,8 @@ class RobotShape:
         model: Any = getattr(robot, "model", None)
         if isinstance(robot, RobotModel) or isinstance(model, RobotModel):
             model = robot if isinstance(robot, RobotModel) else model
-            mounts = tuple((sensor.x, sensor.y, sensor.direction) for sensor in model.range)
             parts = tuple(part.outline() for part in model.body)
-            return cls(parts, mounts, tuple(sensor.reach for sensor in model.range))
+            return cls(parts, model.mounts, tuple(sensor.reach for sensor in model.range))
         mounts = robot.sensors.mounts
         return cls((robot.body.corners,), mounts, (robot.sensors.max_range,) * len(mounts))
 

@@ -82,6 +82,36 @@ class TrialBatch:
         return self.cells[k, : self.n_line[k]]
 
 
+class ResultsRoom(NamedTuple):
+    """Where a kernel writes the results of n trials, in the order of its arguments.
+
+    Attributes:
+        cells: (n, c) uint8, as in `TrialBatch`.
+        end_cells: (n, c) uint8, the cells at the ends of steps; no rows if nobody asks for them.
+        ended: (n, 2) position at the end, from the start [m].
+        counts: (n, 3) cells along the line, cells at the ends of steps, and blocked steps.
+    """
+
+    cells: NDArray[np.uint8]
+    end_cells: NDArray[np.uint8]
+    ended: NDArray[np.float64]
+    counts: NDArray[np.int32]
+
+    @classmethod
+    def of(cls, n: int, n_cells: int, *, ends: bool) -> ResultsRoom:
+        """Return room for n trials."""
+        cells, end_cells = (np.zeros((rows, n_cells), np.uint8) for rows in (n, n if ends else 0))
+        return cls(cells, end_cells, np.zeros((n, 2)), np.zeros((n, 3), np.int32))
+
+    def batch(
+        self, drawn: NDArray[np.float64] | None = None, drawn_names: tuple[str, ...] = ()
+    ) -> TrialBatch:
+        """Return the results, with what was drawn for the trials."""
+        n_line, n_ends, n_stalls = self.counts.T
+        drawn = np.empty((0, 0)) if drawn is None else drawn
+        return TrialBatch(self.cells, n_line, n_ends, n_stalls, drawn, drawn_names)
+
+
 @dataclass(frozen=True)
 class Trajectory:
     """A trial step by step; row 0 is the start.

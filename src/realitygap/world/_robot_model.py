@@ -362,6 +362,16 @@ class RobotModel(Described):
         return picture_of(self).to_svg()
 
     @property
+    def mounts(self) -> tuple[tuple[float, float, float], ...]:
+        """(s, 3) forward [m], left [m] and direction [rad] of each range sensor."""
+        return tuple((sensor.x, sensor.y, sensor.direction) for sensor in self.range)
+
+    @property
+    def reach(self) -> float:
+        """The longest reach of a range sensor [m]; 0 without one."""
+        return max((sensor.reach for sensor in self.range), default=0.0)
+
+    @property
     def radius(self) -> float:
         """The largest distance from the origin to a point of the body [m]."""
         return max(math.hypot(x, y) + part.radius for part in self.body for x, y in part.corners)

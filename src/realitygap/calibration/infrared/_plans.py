@@ -58,7 +58,7 @@ def sensor_distances(robot: RobotModel, heading: float = FACING) -> list[float]:
     Raises:
         ValueError: The robot has no range sensor.
     """
-    reach = max((sensor.reach for sensor in robot.range), default=0.0)
+    reach = robot.reach
     if not reach:
         raise ValueError(f"Robot {robot.name!r} has no range sensor: there is nothing to fit.")
     n = math.floor(reach / SPACING)

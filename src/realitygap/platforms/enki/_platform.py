@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar, Self
 
 from pydantic import Field
 
-from realitygap.world import Arena, Body, RangeSensors, RobotModel, load_robot
+from realitygap.world import Arena
 
-from .._platform import Platform
+from .._thymio_body import ThymioBody
 
 if TYPE_CHECKING:
     from realitygap.robots import Robot
 
 
-class EnkiPlatform(Platform):
+class EnkiPlatform(ThymioBody):
     """A Thymio II as Enki simulates it, in a program that `realitygap twin build-enki` compiles.
 
     The number of a trial alone chooses the noise of its wheels and sensors. Commands are wheel speeds.
@@ -27,7 +26,6 @@ class EnkiPlatform(Platform):
     name: ClassVar[str] = "enki"
     summary: ClassVar[str] = "a Thymio II in Enki: another simulator, in a separate program"
     channels: ClassVar[tuple[str, ...]] = ("line.0", "line.1", "encoder.0", "encoder.1")
-    base_robot: ClassVar[str] = "thymio"
     version: ClassVar[str] = "Enki, harness 1"
 
     step_s: float = Field(0.1, gt=0, le=10, description="Duration of a command [s].")
@@ -51,26 +49,6 @@ class EnkiPlatform(Platform):
     def at_pace(self, step_s: float) -> Self:
         """Return the platform with commands of this duration [s]."""
         return self.model_copy(update={"step_s": step_s})
-
-    @cached_property
-    def _thymio(self) -> RobotModel:
-        return load_robot(self.base_robot)
-
-    @property
-    def body(self) -> Body:
-        """The outline of the Thymio in figures."""
-        return Body(tuple(self._thymio.body[0].corners))
-
-    @property
-    def sensors(self) -> RangeSensors:
-        """The mounts of its infrared sensors in figures."""
-        mounts = tuple((sensor.x, sensor.y, sensor.direction) for sensor in self._thymio.range)
-        return RangeSensors(mounts, self._thymio.range[0].reach)
-
-    @property
-    def outline_words(self) -> str:
-        """The origin of the outline in figures, for their captions."""
-        return "Enki’s"
 
     def check(self, arena: Arena, inputs: Sequence[str], noise: float) -> None:
         """Raise an error if networks with these inputs cannot be tried here.

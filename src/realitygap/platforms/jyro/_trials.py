@@ -22,7 +22,7 @@ from realitygap.kernels.math.elementary import sin_cos
 from realitygap.kernels.neat.genome import NeatRules
 from realitygap.kernels.neat.network import Networks
 from realitygap.tasks import TraceArrays
-from realitygap.trials import REAL, TrialBatch, Tried
+from realitygap.trials import REAL, ResultsRoom, Tried
 from realitygap.world import Arena
 
 from ._settings import STEP_S, JyroSettings
@@ -181,7 +181,6 @@ class JyroTrials:
         self.sensors = tuple(f"range.{k}" for k in range(len(platform.sensors.mounts)))
         self.distance_unit = platform.sensor_range
         self._rules = rules
-        self._n_cells = arena.grid.n_cells
         self._hidden_room = -1
         self._scene = jyro_scene(platform, arena)
         self._trial = jyro_rules(
@@ -207,10 +206,7 @@ class JyroTrials:
             self.n_steps if trace else -1,
             n if trace else 1,
         )
-        cells = np.zeros((n, self._n_cells), np.uint8)
-        end_cells = np.zeros((n if ends else 0, self._n_cells), np.uint8)
-        ended = np.zeros((n, 2))
-        counts = np.zeros((n, 3), np.int32)
+        results = ResultsRoom.of(n, self.arena.grid.n_cells, ends=ends)
         hidden_room = networks.place.shape[1]
         if hidden_room != self._hidden_room:
             self._hidden_room = hidden_room
@@ -226,14 +222,10 @@ class JyroTrials:
             counters,
             lanes,
             wiring,
-            cells,
-            end_cells,
-            ended,
-            counts,
+            *results,
             steps,
         )
-        batch = TrialBatch(cells, counts[:, 0], counts[:, 1], counts[:, 2])
-        return Tried(batch, end_cells, ended, _as_arrays(steps), steps.readings)
+        return Tried(results.batch(), results.end_cells, results.ended, _as_arrays(steps), steps.readings)
 
 
 def _as_arrays(trace: Trace) -> TraceArrays:

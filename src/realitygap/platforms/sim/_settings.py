@@ -272,8 +272,7 @@ class SimSettings(SimulatedPlatform):
     @property
     def sensors(self) -> RangeSensors:
         """Mounts and reach of the range sensors, for figures."""
-        mounts = tuple((sensor.x, sensor.y, sensor.direction) for sensor in self.model.range)
-        return RangeSensors(mounts, max((sensor.reach for sensor in self.model.range), default=0.0))
+        return RangeSensors(self.model.mounts, self.model.reach)
 
     @property
     def title(self) -> str:

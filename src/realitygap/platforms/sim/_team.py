@@ -16,7 +16,7 @@ from realitygap.kernels.neat.network import Networks
 from realitygap.kernels.sim.lanes import make_sim_room, make_sim_trace
 from realitygap.kernels.sim.team import Team, run_team_trials
 from realitygap.tasks import TraceArrays
-from realitygap.trials import REAL, Draws, TrialBatch, Tried, counters_of_robot
+from realitygap.trials import REAL, Draws, ResultsRoom, Tried, counters_of_robot
 from realitygap.world import MOST_ROBOTS, Arena, Obstacle, check_drawn_starts
 
 from ._overlap import overlaps
@@ -86,7 +86,6 @@ class SimTeam:
     ) -> Tried:
         """See `PlatformTrials.carry_out`. `which` may also be (n, r), the network of each robot."""
         n, n_robots = len(which), len(self.scenes)
-        n_cells = self.arena.grid.n_cells
         each = np.stack([counters_of_robot(counters, robot) for robot in range(n_robots)])
         drawn = [self._draws.draw(key, words) for words in each]
         shape = self.scenes[0].shape
@@ -95,9 +94,7 @@ class SimTeam:
             shape, self._rules.n_inputs, self.n_steps if trace else -1, n if trace else 1, self._dtype
         )
         kept = stack([steps] * n_robots)
-        cells = np.zeros((n, n_cells), np.uint8)
-        end_cells = np.zeros((n if ends else 0, n_cells), np.uint8)
-        ended, counts = np.zeros((n, 2)), np.zeros((n, 3), np.int32)
+        results = ResultsRoom.of(n, self.arena.grid.n_cells, ends=ends)
         run_team_trials(
             self._team,
             np.stack(list(self._tables(drawn))),
@@ -107,19 +104,16 @@ class SimTeam:
             np.uint64(key),
             each,
             stack([room] * n_robots),
-            cells,
-            end_cells,
-            ended,
-            counts,
+            *results,
             kept,
         )
-        batch = TrialBatch(cells, counts[:, 0], counts[:, 1], counts[:, 2], drawn[0], self.drawn_names)
+        batch = results.batch(drawn[0], self.drawn_names)
         first = self.scenes[0].origin
         for robot, scene in enumerate(self.scenes):
             kept.poses[robot, :, :2] += np.subtract(scene.origin, first).astype(self._dtype)[:, None]
         poses, readings, inputs, commands, stalled, wheels, distances = (_in_columns(part) for part in kept)
         arrays = TraceArrays(poses, readings, inputs, commands, stalled, wheels)
-        return Tried(batch, end_cells, ended, arrays, distances)
+        return Tried(batch, results.end_cells, results.ended, arrays, distances)
 
     def _tables(self, drawn: Sequence[NDArray[np.float64]]) -> Iterator[NDArray[np.floating]]:
         """Yield (p, n) the numbers of each robot, or (p, 1) if none is drawn; draws of the arena are the first's."""

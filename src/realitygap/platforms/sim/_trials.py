@@ -13,7 +13,7 @@ from realitygap.kernels.sim.lanes import SimRules, SimTrace, make_sim_room, make
 from realitygap.kernels.sim.shape import SimShape
 from realitygap.kernels.sim.trial import run_sim_trials
 from realitygap.tasks import TraceArrays
-from realitygap.trials import REAL, Draws, TrialBatch, Tried
+from realitygap.trials import REAL, Draws, ResultsRoom, Tried
 from realitygap.world import SENSORS, Arena
 
 from ..jyro._trials import SNAP
@@ -53,7 +53,6 @@ class SimTrials:
         self._draws = Draws(self.scene.numbers)
         self.drawn_names = self._draws.names
         self._rules = rules
-        self._n_cells = arena.grid.n_cells
         self._sim_rules = sim_rules(self.scene, bias_value)
         self._hidden_room = -1
         self._fixed = self.scene.table(self.scene.fixed)
@@ -79,10 +78,7 @@ class SimTrials:
             self._hidden_room = hidden_room
             self._room = make_sim_room(self.scene.shape, self._rules, hidden_room, dtype)
         steps = self._trace(n) if trace else self._no_trace
-        cells = np.zeros((n, self._n_cells), np.uint8)
-        end_cells = np.zeros((n if ends else 0, self._n_cells), np.uint8)
-        ended = np.zeros((n, 2))
-        counts = np.zeros((n, 3), np.int32)
+        results = ResultsRoom.of(n, self.arena.grid.n_cells, ends=ends)
         run_sim_trials(
             self.scene.shape,
             self._table_of(drawn),
@@ -93,14 +89,11 @@ class SimTrials:
             np.uint64(key),
             counters,
             self._room,
-            cells,
-            end_cells,
-            ended,
-            counts,
+            *results,
             steps,
         )
-        batch = TrialBatch(cells, counts[:, 0], counts[:, 1], counts[:, 2], drawn, self.drawn_names)
-        return Tried(batch, end_cells, ended, _as_arrays(steps), steps.distances)
+        batch = results.batch(drawn, self.drawn_names)
+        return Tried(batch, results.end_cells, results.ended, _as_arrays(steps), steps.distances)
 
     def _make_trace(self, n_steps: int, n_kept: int) -> SimTrace:
         dtype = REAL[self.scene.platform.precision]

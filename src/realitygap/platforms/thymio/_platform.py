@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-from functools import cached_property
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 from pydantic import Field, PrivateAttr
 
-from realitygap.world import Arena, Body, RangeSensors, RobotModel, load_robot
+from realitygap.world import Arena
 
 from .._platform import Opening
 from .._port import PortPlatform
+from .._thymio_body import ThymioBody
 
 if TYPE_CHECKING:
     from realitygap.robots.thymio import Thymio
     from realitygap.trials import Target
 
 
-class ThymioPlatform(PortPlatform):
+class ThymioPlatform(ThymioBody, PortPlatform):
     """A Thymio II on a cable, on a dongle, or in Aseba's playground. The port comes from the command line.
 
     The robot moves on while a command's time runs, and until the next command, or for 0.2 s. A reading is the raw value
@@ -35,7 +35,6 @@ class ThymioPlatform(PortPlatform):
         *("encoder.0", "encoder.1"),  # of a robot, not in a playground
     )
     full_scale: ClassVar[float] = 4505.0
-    base_robot: ClassVar[str] = "thymio"
     emulated: ClassVar[str] = "thymio:emulator://playground"
 
     step_s: float = Field(
@@ -65,26 +64,6 @@ class ThymioPlatform(PortPlatform):
     def command_s(self) -> float:
         """Duration of a command [s]."""
         return self.step_s
-
-    @cached_property
-    def _model(self) -> RobotModel:
-        return load_robot(self.base_robot)
-
-    @property
-    def body(self) -> Body:
-        """The outline of the Thymio in figures."""
-        return Body(tuple(self._model.body[0].corners))
-
-    @property
-    def sensors(self) -> RangeSensors:
-        """The mounts of its infrared sensors in figures."""
-        mounts = tuple((sensor.x, sensor.y, sensor.direction) for sensor in self._model.range)
-        return RangeSensors(mounts, self._model.range[0].reach)
-
-    @property
-    def outline_words(self) -> str:
-        """The origin of the outline in figures, for their captions."""
-        return "Enki’s"
 
     def in_arena(self, arena: Arena) -> Self:
         """Return the platform with the arena with which a playground in this program begins."""

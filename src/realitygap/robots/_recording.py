@@ -146,6 +146,15 @@ class Recorder:
         self._file.close()
 
 
+class NoRecorder:
+    """The recorder of a session that is not recorded."""
+
+    def _nothing(self, *_: Any, **__: Any) -> None:
+        pass
+
+    begin = wire = call = fault = close = _nothing
+
+
 @dataclass(frozen=True)
 class Recording:
     """A recorded session.

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import weakref
-from collections.abc import Callable
-from dataclasses import asdict
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self, TypeVar
+from typing import Any
 
-from realitygap.errors import RecordError, RobotError
+from realitygap.errors import RobotError
 from realitygap.robots._clock import Clock
 from realitygap.robots._contract import Command, Label, Observation, check_command
-from realitygap.robots._recording import Recorder
+from realitygap.robots._port_driver import PortDriver
 from realitygap.world import Pose
 
 from . import _codec as codec
@@ -27,15 +24,13 @@ from ._ports import label_of, port_name
 from ._sound import SoundAndLight
 from ._watchdog import Watchdog, WatchedClock
 
-T = TypeVar("T")
-
 COUNT_M = 0.00025
 """Distance of a wheel for one count of an S2's encoders [m]: half of its half millimeter."""
 FAR = 99
 """Distance reading of an S2 if nothing is in range."""
 
 
-class Scribbler(Driving, Channels, SoundAndLight, Camera, Board):
+class Scribbler(Driving, Channels, SoundAndLight, Camera, Board, PortDriver):
     """A Scribbler (S1, S2 or S3), alone or with a Fluke (1 or 2), on a port.
 
     | command | least | most | unit |
@@ -85,7 +80,9 @@ class Scribbler(Driving, Channels, SoundAndLight, Camera, Board):
         )
         label = label_of(name) if isinstance(port, str) or is_serial_port(port) else "EMULATED"
         self.link = Link(open_port(name) if isinstance(port, str) else port, name)
-        self._recorder = None if record is None else self._record_into(record)
+        recorder = self._record_into(record, self.link.clock)
+        if record is not None:  # the link must not hold the robot, which would never be let go
+            self.link.tell = lambda exchange: recorder.wire(*exchange)
         EXITS.hold()
         self._released = weakref.finalize(self, _let_go, self.link)  # also when the program ends
         try:
@@ -94,9 +91,7 @@ class Scribbler(Driving, Channels, SoundAndLight, Camera, Board):
         except BaseException as error:
             self.link.close()
             self._released()
-            if self._recorder is not None:
-                self._recorder.begin({"port": name, "error": str(error)})
-                self._recorder.close()
+            self._record_failure(name, error)
             raise
         self.info = RobotInfo(*found, port=name, label=label)
         self.step_s = step_s
@@ -104,30 +99,7 @@ class Scribbler(Driving, Channels, SoundAndLight, Camera, Board):
         self.label: Label = label
         self.n_sensors = 3 if self.info.fluke != "none" else 2
         self._n_steps = 0
-        if self._recorder is not None:
-            names = ("label", "step_s", "n_sensors", "reading_max")
-            set_up = {each: getattr(self, each) for each in names}
-            self._recorder.begin(
-                {"port": name, "robot": asdict(self.info), **set_up, "watchdog_s": watchdog_s}
-            )
-
-    def _record_into(self, path: Path | str) -> Recorder:
-        try:
-            recorder = Recorder(path, self.link.clock)
-        except RecordError:
-            self.link.close()
-            raise
-        self.link.tell = lambda exchange: recorder.wire(*exchange)
-        return recorder
-
-    def _noted(self, name: str, work: Callable[[], T]) -> T:
-        """Call a function, and record an error that it raises."""
-        try:
-            return work()
-        except RobotError as error:
-            if self._recorder is not None:
-                self._recorder.fault(name, error)
-            raise
+        self._record_set_up(name, watchdog_s=watchdog_s)
 
     @property
     def clock(self) -> Clock:
@@ -154,25 +126,22 @@ class Scribbler(Driving, Channels, SoundAndLight, Camera, Board):
     def reset(self, pose: Pose | None = None) -> None:
         """Begin a trial: stop the motors, and count steps from 0. The operator has placed the robot at its start."""
         self.need_robot("reset")
-        if self._recorder is not None:
-            self._recorder.call("reset")
-        self._noted("reset", super().stop)
+        self._recorder.call("reset")
+        with self._noted("reset"):
+            super().stop()
         self._n_steps = 0
         self._counted = None
         self.link.where = ""
 
     def observe(self) -> Observation:
         """Read the sensors that look ahead, the selected channels, and the stall."""
-        if self._recorder is None:
-            return self._observe_all()
-        seen = self._noted("observe", self._observe_all)
+        with self._noted("observe"):
+            seen = self._observe()
+            if self._selected:
+                seen = seen._replace(channels=self._read_channels())
         more = {"channels": seen.channels} if seen.channels else {}
         self._recorder.call("observe", readings=seen.readings, stalled=seen.stalled, raw=seen.raw, **more)
         return seen
-
-    def _observe_all(self) -> Observation:
-        seen = self._observe()
-        return seen._replace(channels=self._read_channels()) if self._selected else seen
 
     def _observe(self) -> Observation:
         if self.info.fluke != "none":
@@ -196,11 +165,9 @@ class Scribbler(Driving, Channels, SoundAndLight, Camera, Board):
         self._n_steps += 1
         self.link.where = f"step {self._n_steps}"
         left, right = _within(move - turn), _within(move + turn)
-        if self._recorder is None:
+        self._recorder.call("drive", move=move, turn=turn)
+        with self._noted("drive"):
             self.motors(left, right)
-        else:
-            self._recorder.call("drive", move=move, turn=turn)
-            self._noted("drive", lambda: self.motors(left, right))
         if self._watchdog is not None:
             self._watchdog.excuse(self.step_s)
         self.link.clock.sleep(self.step_s)
@@ -208,7 +175,7 @@ class Scribbler(Driving, Channels, SoundAndLight, Camera, Board):
     def stop(self) -> None:
         """Stop the motors. This is safe at any moment, and if called twice."""
         try:
-            if self._recorder is not None and self.link.is_open:
+            if self.link.is_open:
                 self._recorder.call("stop")
         finally:  # also where the recording fails
             super().stop()
@@ -228,22 +195,8 @@ class Scribbler(Driving, Channels, SoundAndLight, Camera, Board):
                 self._watchdog.end()
             self.link.close()
             self._released()
-            if self._recorder is not None:
-                self._recorder.call("close")
-                self._recorder.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        try:
-            self.close()
-        except RobotError as failure:
-            if error is None:
-                raise
-            error.add_note(str(failure))
+            self._recorder.call("close")
+            self._recorder.close()
 
 
 def _within(wheel: float) -> float:

@@ -5,15 +5,14 @@ from __future__ import annotations
 import contextlib
 import time
 import weakref
-from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
-from realitygap.errors import RecordError, RobotError, RobotStopped
+from realitygap.errors import RobotError, RobotStopped
 from realitygap.robots._contract import Command, Label, Observation, check_command
-from realitygap.robots._recording import Recorder
+from realitygap.robots._port_driver import PortDriver
 from realitygap.robots.scribbler._exits import EXITS
 from realitygap.world import Pose
 
@@ -84,7 +83,7 @@ class _Seen:
     own: dict[str, int]
 
 
-class Thymio:
+class Thymio(PortDriver):
     """A Thymio II on a cable, on a wireless dongle, or in a playground.
 
     | command | least | most | unit |
@@ -138,7 +137,7 @@ class Thymio:
                 f"and ground_black {ground_black}, expected 0 or more, 1 to 1000, more than 0, and white above black."
             )
         name = port_name(port) if isinstance(port, str) else str(getattr(port, "name", None) or "a port")
-        self.link = Link(open_port(name) if isinstance(port, str) else port, name)
+        self.link: Link = Link(open_port(name) if isinstance(port, str) else port, name)
         self.step_s = step_s
         self.full_speed = full_speed
         self.reading_max = reading_max
@@ -151,7 +150,9 @@ class Thymio:
         self.has_encoders = False
         proxy = weakref.proxy(self)
         self.clock = BoardClock(lambda: proxy._read())
-        self._recorder = None if record is None else self._record_into(record)
+        recorder, clock = self._record_into(record, self.clock), self.clock
+        if record is not None:  # the link must not hold the robot, which would never be let go
+            self.link.tell = lambda name, sent, came: recorder.wire(clock.now(), 0.0, name, sent, came, "ok")
         EXITS.hold()
         try:
             self.description = self.link.find()
@@ -166,12 +167,10 @@ class Thymio:
         self.has_encoders = label == "REAL"
         self.channels = ("line.0", "line.1", *(_ENCODERS if self.has_encoders else ()))
         self.label: Label = label
-        self.info = ThymioInfo(self.description.name, self.description.node, firmware, name, label)
-        if self._recorder is not None:
-            set_up = {each: getattr(self, each) for each in ("label", "step_s", "n_sensors", "reading_max")}
-            self._recorder.begin(
-                {"port": name, "robot": asdict(self.info), **set_up, "full_speed": full_speed}
-            )
+        self.info: ThymioInfo = ThymioInfo(
+            self.description.name, self.description.node, firmware, name, label
+        )
+        self._record_set_up(name, full_speed=full_speed)
 
     @property
     def port(self) -> Any:
@@ -183,27 +182,10 @@ class Thymio:
         """The robot's name and number, by which it is recognized."""
         return f"{self.info.name} {self.info.node}"
 
-    def _record_into(self, path: Path | str) -> Recorder:
-        try:
-            recorder = Recorder(path, self.clock)
-        except RecordError:
-            self.link.close()
-            raise
-
-        clock = self.clock
-
-        def tell(name: str, sent: bytes, came: bytes) -> None:
-            recorder.wire(clock.now(), 0.0, name, sent, came, "ok")
-
-        self.link.tell = tell
-        return recorder
-
     def _give_up(self, name: str, error: BaseException) -> None:
         self.link.close()
         EXITS.release()
-        if self._recorder is not None:
-            self._recorder.begin({"port": name, "error": str(error)})
-            self._recorder.close()
+        self._record_failure(name, error)
 
     def _at(self, name: str) -> int:
         return self.description.variables[name][0]
@@ -299,8 +281,7 @@ class Thymio:
 
     def reset(self, pose: Pose | None = None) -> None:
         """Begin a trial: motors stopped, and armed again if its center button was pressed."""
-        if self._recorder is not None:
-            self._recorder.call("reset")
+        self._recorder.call("reset")
         with self._noted("reset"):
             _stop(self.link, self.description)
             halted = self.description.first_free + OWN.index("halted")
@@ -319,9 +300,8 @@ class Thymio:
         channels = dict(zip(self.channels, (*lines, *self._encoders()), strict=True))
         stalled = self._is_stalled(seen)
         chosen = {name: channels[name] for name in self._selected}
-        if self._recorder is not None:
-            more = {"channels": chosen} if chosen else {}
-            self._recorder.call("observe", readings=readings, stalled=stalled, raw=raw, **more)
+        more = {"channels": chosen} if chosen else {}
+        self._recorder.call("observe", readings=readings, stalled=stalled, raw=raw, **more)
         return Observation(readings, stalled, raw, chosen)
 
     def _encoders(self) -> tuple[float, ...]:
@@ -350,8 +330,7 @@ class Thymio:
             RobotStopped: The center button was pressed.
         """
         move, turn = check_command(command)
-        if self._recorder is not None:
-            self._recorder.call("drive", move=move, turn=turn)
+        self._recorder.call("drive", move=move, turn=turn)
         with self._noted("drive"):
             self._drive(move, turn)
 
@@ -399,20 +378,9 @@ class Thymio:
         if not self.link.is_open:
             return
         try:
-            if self._recorder is not None:
-                self._recorder.call("stop")
+            self._recorder.call("stop")
         finally:  # also if the recording fails
             _stop(self.link, self.description)
-
-    @contextlib.contextmanager
-    def _noted(self, name: str) -> Iterator[None]:
-        """Record what goes wrong."""
-        try:
-            yield
-        except RobotError as error:
-            if self._recorder is not None:
-                self._recorder.fault(name, error)
-            raise
 
     def close(self) -> None:
         """Stop the motors and let go of the robot; safe to call twice.
@@ -428,22 +396,8 @@ class Thymio:
         finally:
             self.link.close()
             self._released()
-            if self._recorder is not None:
-                self._recorder.call("close")
-                self._recorder.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        try:
-            self.close()
-        except RobotError as failure:
-            if error is None:
-                raise
-            error.add_note(str(failure))
+            self._recorder.call("close")
+            self._recorder.close()
 
 
 def _stop_messages(robot: Description) -> bytes:

@@ -10,7 +10,7 @@ from ._card import Bar, Card, Spark, Table
 from ._ink import PENS, Ink
 from ._picture import FONT, Disc, Line, Picture, Point, Shape, Text
 from ._pixels import to_image, to_png
-from ._shown import card_of, picture_of, widget_of
+from ._shown import ShownAsCard, card_of, picture_of, widget_of
 from ._theme import theme_rules, themed, themed_color
 from ._x11 import hex_of, rgb_of
 
@@ -25,6 +25,7 @@ __all__ = [
     "Picture",
     "Point",
     "Shape",
+    "ShownAsCard",
     "Spark",
     "Table",
     "Text",

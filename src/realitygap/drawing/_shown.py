@@ -29,6 +29,13 @@ def card_of(shown: Any) -> Card:
     raise TypeError(f"Nothing describes {type(shown).__name__}.")
 
 
+class ShownAsCard:
+    """Something that notebooks show by its card."""
+
+    def _repr_html_(self) -> str:
+        return card_of(self).to_html()
+
+
 @functools.singledispatch
 def widget_of(shown: Any) -> Any:
     """Return the widget of an object; None if it has none, or what shows it is not installed."""

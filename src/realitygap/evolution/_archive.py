@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from realitygap.drawing import card_of
+from realitygap.drawing import ShownAsCard
 from realitygap.kernels.neat import distances
 from realitygap.kernels.neat import novelty as novelty_kernels
 
@@ -15,7 +15,7 @@ from ._distances import Cells, measure_of, pack_behaviors
 from ._novelty import NoveltySettings, PaperArchive
 
 
-class NoveltyArchive:
+class NoveltyArchive(ShownAsCard):
     """Behaviors remembered by novelty search, as `[novelty]` of a study file says.
 
     The same as `PaperArchive` for kind `paper`; for kind `lehman-stanley` the same as `NearestArchive`, compiled, with
@@ -44,9 +44,6 @@ class NoveltyArchive:
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.settings.kind!r}, {len(self)} behaviors)"
-
-    def _repr_html_(self) -> str:
-        return card_of(self).to_html()
 
     @property
     def grid_size(self) -> tuple[int, int]:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
-from realitygap.drawing import card_of
+from realitygap.drawing import ShownAsCard
 from realitygap.kernels.neat import novelty as novelty_kernels
 from realitygap.settings import Settings
 
@@ -115,7 +115,7 @@ def sorted_cells_distance(
     return float(DISTANCES["paper"].distances([one], [other], columns=columns, rows=rows, sort=sort)[0, 0])
 
 
-class PaperArchive:
+class PaperArchive(ShownAsCard):
     """The paper's novelty: mean distance to a short archive whose oldest behavior is replaced.
 
     While there is room, the behaviors of a generation first enter the archive, in order. Then each individual is
@@ -136,9 +136,6 @@ class PaperArchive:
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({len(self)} of {self.settings.archive_size} behaviors)"
-
-    def _repr_html_(self) -> str:
-        return card_of(self).to_html()
 
     @property
     def grid_size(self) -> tuple[int, int]:
@@ -175,7 +172,7 @@ def euclidean(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
     return float(np.linalg.norm(one - other))
 
 
-class NearestArchive:
+class NearestArchive(ShownAsCard):
     """Lehman & Stanley's novelty: mean distance to the k nearest in population and archive.
 
     A behavior enters the archive when its novelty exceeds a threshold, which falls by 5 % after `patience`
@@ -218,9 +215,6 @@ class NearestArchive:
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({len(self)} behaviors, k={self._k}, threshold={self.threshold:.4g})"
-
-    def _repr_html_(self) -> str:
-        return card_of(self).to_html()
 
     @property
     def threshold(self) -> float:

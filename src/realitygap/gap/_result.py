@@ -6,7 +6,7 @@ import json
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
-from realitygap.drawing import card_of
+from realitygap.drawing import ShownAsCard
 
 from ._estimate import Estimate
 
@@ -99,7 +99,7 @@ MEASURES = tuple(each.name for each in SHOWN if each.name not in _LATE)
 
 
 @dataclass(frozen=True)
-class GapResult:
+class GapResult(ShownAsCard):
     """The gap between two platforms: the transfer gap, of the same controllers on both.
 
     Differences are target less simulator: below 0 where the target does worse than the simulator says.
@@ -152,9 +152,6 @@ class GapResult:
     def __repr__(self) -> str:
         n = f"n={self.rms.n}×{self.trials[1]}"
         return f"{type(self).__name__}({self.source} → {self.target}: RMS {self.rms}, {n})"
-
-    def _repr_html_(self) -> str:
-        return card_of(self).to_html()
 
     @property
     def excludes_no_gap(self) -> bool:

@@ -10,7 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from realitygap.drawing import card_of, widget_of
+from realitygap.drawing import ShownAsCard, widget_of
 from realitygap.kernels.tasks.coverage import BORDER_SNAP, visit, visit_line
 from realitygap.world import (
     Arena,
@@ -89,7 +89,7 @@ class RobotShape:
 
 
 @dataclass(frozen=True)
-class MovingTrial:
+class MovingTrial(ShownAsCard):
     """A robot's positions and readings, step by step; row 0 is the start.
 
     Attributes:
@@ -138,9 +138,6 @@ class MovingTrial:
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.title!r}, {self.label}, {self.n_steps} steps, {len(self.cells)} cells)"
-
-    def _repr_html_(self) -> str:
-        return card_of(self).to_html()
 
     def _repr_mimebundle_(self, **options: Any) -> dict[str, Any]:
         widget = widget_of(self)

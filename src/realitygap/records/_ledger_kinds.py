@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from realitygap.drawing import card_of
+from realitygap.drawing import ShownAsCard
 
 TrialState = Literal["planned", "running", "driven", "scored", "void"]
 ScoreRole = Literal["score", "second", "correction"]
@@ -57,7 +57,7 @@ class Turn:
 
 
 @dataclass(frozen=True)
-class Trial:
+class Trial(ShownAsCard):
     """A trial as the ledger has it; `trial` is its number.
 
     Attributes:
@@ -89,9 +89,6 @@ class Trial:
     def __repr__(self) -> str:
         cells = "" if self.cells is None else f", {len(self.cells)} cells"
         return f"Trial({self.trial}: {self.name}, {self.state}{cells})"
-
-    def _repr_html_(self) -> str:
-        return card_of(self).to_html()
 
     @property
     def name(self) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 
 from realitygap._closing import ClosedOnExit
 from realitygap._limits import parse_json
-from realitygap.drawing import card_of
+from realitygap.drawing import ShownAsCard
 from realitygap.errors import LedgerError
 from realitygap.records._ledger_file import connect, speaking
 from realitygap.records._ledger_kinds import (
@@ -31,7 +31,7 @@ FROM trials JOIN generations USING (condition, replicate, generation)
 """
 
 
-class LedgerReader(ClosedOnExit):
+class LedgerReader(ClosedOnExit, ShownAsCard):
     """A reader of a ledger of physical trials.
 
     Raises:
@@ -61,9 +61,6 @@ class LedgerReader(ClosedOnExit):
             f"{n_scored:,}/{n_whole:,} trials scored",
         ]
         return ", ".join([where, *shown, *(["+".join(labels)] if labels else [])]) + ")"
-
-    def _repr_html_(self) -> str:
-        return card_of(self).to_html()
 
     def close(self) -> None:
         """Let go of the file."""

@@ -11,7 +11,7 @@ from typing import Any, Self
 
 import polars as pl
 
-from realitygap.drawing import card_of
+from realitygap.drawing import ShownAsCard
 from realitygap.errors import RecordError, RecordVersionError, did_you_mean, whole_number
 from realitygap.records._chunk import (
     MAX_REPLICATE,
@@ -41,7 +41,7 @@ from realitygap.records._parquet import write_frames
 from realitygap.records._version import RESULTS_VERSION, RecordWarning
 
 
-class PublishedResults:
+class PublishedResults(ShownAsCard):
     """Published results of a folder: `study.json`, `trials/*.parquet`, `log.jsonl`, `ledger.sqlite`.
 
     For conditions that a robot drove, the ledger gives the rows of complete runs.
@@ -88,9 +88,6 @@ class PublishedResults:
         of = "" if n_runs is None else f"/{n_runs:,}"
         shown = [f"{n_conditions} condition{'s' * (n_conditions != 1)}", f"{n_there:,}{of} runs"]
         return ", ".join([where, *shown, *(["+".join(labels)] if labels else [])]) + ")"
-
-    def _repr_html_(self) -> str:
-        return card_of(self).to_html()
 
     @property
     def path(self) -> Path:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Literal
+from dataclasses import dataclass, field, replace
+from typing import Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -85,6 +85,12 @@ class TrialRecord:
     def n_stalls(self) -> int:
         """Number of steps that began with the robot blocked."""
         return int(self.stalled.sum())
+
+    def seen_as(self, observe: Observe) -> Self:
+        """Return the trial with no more than is to be observed."""
+        poses = self.poses if observe == "track" else np.empty((0, 3))
+        wheels = self.wheels if sees(observe, "encoders") else np.empty((0, 2))
+        return replace(self, poses=poses, wheels=wheels, cells=self.cells if sees(observe, "cells") else ())
 
     @property
     def observe(self) -> Observe:

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import AfterValidator, Field, model_validator
 
 from realitygap._version import __version__
-from realitygap.drawing import card_of
+from realitygap.drawing import ShownAsCard
 from realitygap.runs import NAME_PATTERN, Condition
 from realitygap.settings import Settings
 
@@ -105,7 +105,7 @@ def same_file(name: str, others: Iterable[str]) -> str | None:
     return next((other for other in others if other.casefold() == name.casefold()), None)
 
 
-class Study(Settings):
+class Study(Settings, ShownAsCard):
     """A study as resolved: nothing is left to a default."""
 
     about: StudySection
@@ -143,9 +143,6 @@ class Study(Settings):
         n, labels = len(self.conditions), "+".join(self.labels)
         runs = f"{n} condition{'s' * (n != 1)} × {self.about.replicates:,} runs"
         return f"{type(self).__name__}({self.about.name!r}, {runs}, {labels})"
-
-    def _repr_html_(self) -> str:
-        return card_of(self).to_html()
 
     @property
     def labels(self) -> tuple[str, ...]:

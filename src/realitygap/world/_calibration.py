@@ -8,7 +8,7 @@ from typing import Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from realitygap.drawing import card_of
+from realitygap.drawing import ShownAsCard
 from realitygap.settings import Settings
 
 from ._toml import toml_table
@@ -106,7 +106,7 @@ def _is_bound(values: Mapping[str, Any], lower: str = "low", upper: str = "high"
     return (least != 0.0 and first - least <= near) or ((least, most) != (0.0, 1.0) and most - last <= near)
 
 
-class Calibration(Settings):
+class Calibration(Settings, ShownAsCard):
     """A calibration of a robot: the fitted parameters, the robot's numbers, and draws from the posterior."""
 
     format: Literal["realitygap calibration 1"] = "realitygap calibration 1"
@@ -156,9 +156,6 @@ class Calibration(Settings):
         state = "rejected" if self.misspecified else "ok"
         counts = f"{self.trials} trials, {n_identified}/{len(self.fitted)} identified"
         return f"{type(self).__name__}({self.kind!r}, {counts}, {state})"
-
-    def _repr_html_(self) -> str:
-        return card_of(self).to_html()
 
     @property
     def recommended(self) -> str:

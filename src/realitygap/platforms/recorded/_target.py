@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
 
@@ -20,7 +19,6 @@ from realitygap.records import (
     TrialRecord,
     is_observations,
     read_observations,
-    sees,
 )
 from realitygap.robots import Label
 from realitygap.trials import RepeatableTarget, TellTrial, TrialPlan, check_plans, those_that_count
@@ -102,7 +100,7 @@ class RecordedTarget(RepeatableTarget):
                     f"was requested; most of its trials have {self.steps} steps. Request fewer, or record "
                     "more."
                 )
-            trial = _seen_as(there[taken[genome]], observe)
+            trial = there[taken[genome]].seen_as(observe)
             taken[genome] += 1
             found.append(trial)
             if tell is not None:
@@ -122,12 +120,3 @@ def _imported(path: str | Path) -> Observations:
     for log in logs:
         trials += trials_of(log, log_map, len(trials))
     return Observations(head_of(path, log_map, name, logs[0]), tuple(trials))
-
-
-def _seen_as(trial: TrialRecord, observe: Observe) -> TrialRecord:
-    """A trial with no more than is to be observed."""
-    if observe != "track":
-        trial = replace(trial, poses=np.empty((0, 3)))
-    if not sees(observe, "encoders"):
-        trial = replace(trial, wheels=np.empty((0, 2)))
-    return trial if sees(observe, "cells") else replace(trial, cells=())

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from realitygap.drawing import card_of
+from realitygap.drawing import ShownAsCard
 from realitygap.errors import StudyError
 from realitygap.gap import Why
 from realitygap.platforms import RecordedTarget, class_of, open_target, split_spec
@@ -25,7 +25,7 @@ Say = Callable[[str], None]
 
 
 @dataclass(frozen=True)
-class GapBetween:
+class GapBetween(ShownAsCard):
     """A gap between two platforms, and why it is there.
 
     Attributes:
@@ -38,9 +38,6 @@ class GapBetween:
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}{repr(self.study.result).removeprefix('GapResult')}"
-
-    def _repr_html_(self) -> str:
-        return card_of(self).to_html()
 
 
 def gap_between(

@@ -27,24 +27,24 @@ class BehaviorDistance:
     Attributes:
         name: Name in study files.
         compares: Part of a trial that it compares: the visited cells, or the final position.
-        needs_order: True if the order of first visits matters. A drawing on squared paper, scored by hand, does not
-            show this order.
-        is_metric: True if it is a metric: 0 only for equal behaviors, symmetric, and never longer than the path over
-            a third behavior.
         unit: Unit: cells, m, or 1 for a share.
         cost: Number of steps to compute one distance between behaviors of n and m cells in a grid of c cells.
         description: Definition in a sentence.
         source: Publication that describes it.
+        needs_order: True if the order of first visits matters. A drawing on squared paper, scored by hand, does not
+            show this order.
+        is_metric: True if it is a metric: 0 only for equal behaviors, symmetric, and never longer than the path over
+            a third behavior.
     """
 
     name: DistanceName
     compares: Literal["cells", "position"]
-    needs_order: bool
-    is_metric: bool
     unit: Literal["cells", "m", "1"]
     cost: str
     description: str
     source: str
+    needs_order: bool = False
+    is_metric: bool = True
 
     def distances(
         self,
@@ -85,8 +85,6 @@ DISTANCES: dict[str, BehaviorDistance] = {
         BehaviorDistance(
             "paper",
             compares="cells",
-            needs_order=False,
-            is_metric=True,
             unit="cells",
             cost="n + m + c",
             description="Sum of the distances between the cells at equal places of the two sorted lists. Each "
@@ -97,7 +95,6 @@ DISTANCES: dict[str, BehaviorDistance] = {
             "ordered",
             compares="cells",
             needs_order=True,
-            is_metric=True,
             unit="cells",
             cost="n + m",
             description="As `paper`, but with the cells in the order of first visits.",
@@ -106,8 +103,6 @@ DISTANCES: dict[str, BehaviorDistance] = {
         BehaviorDistance(
             "jaccard",
             compares="cells",
-            needs_order=False,
-            is_metric=True,
             unit="1",
             cost="c / 31",
             description="Number of cells that only one of the two visited, divided by the number that either visited.",
@@ -117,8 +112,6 @@ DISTANCES: dict[str, BehaviorDistance] = {
         BehaviorDistance(
             "hamming",
             compares="cells",
-            needs_order=False,
-            is_metric=True,
             unit="cells",
             cost="c / 31",
             description="Number of cells that only one of the two visited.",
@@ -127,8 +120,6 @@ DISTANCES: dict[str, BehaviorDistance] = {
         BehaviorDistance(
             "final",
             compares="position",
-            needs_order=False,
-            is_metric=True,
             unit="m",
             cost="1",
             description="Straight distance between the two final positions.",
@@ -138,7 +129,6 @@ DISTANCES: dict[str, BehaviorDistance] = {
             "edit",
             compares="cells",
             needs_order=True,
-            is_metric=True,
             unit="cells",
             cost="n m",
             description="Smallest number of cells to insert, delete, or replace that turns one list, in the order of "
@@ -149,7 +139,6 @@ DISTANCES: dict[str, BehaviorDistance] = {
             "alignment",
             compares="cells",
             needs_order=True,
-            is_metric=True,
             unit="1",
             cost="n m",
             description="Normalized cost of aligning the two lists, in the order of first visits. A pair of cells "

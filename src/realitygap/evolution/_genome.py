@@ -11,7 +11,7 @@ from typing import Any, Literal, Self, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from realitygap.drawing import card_of, picture_of
+from realitygap.drawing import ShownAsCard, picture_of
 from realitygap.errors import ControllerError, RecordError
 from realitygap.kernels.neat.genome import Genomes, NeatRules, make_genomes
 from realitygap.kernels.neat.network import Networks, activate, decode_rows, make_networks
@@ -43,11 +43,13 @@ class ConnectionGene:
     enabled: bool
 
 
-class Network:
+class Network(_json.Written[_json.NetworkForm]):
     """The network that a genome decodes to. It maps inputs to outputs, one pass a call.
 
     A recurrent network remembers its nodes between calls; `reset` makes it forget.
     """
+
+    _kind, _form = "network", _json.NetworkForm
 
     def __init__(self, networks: Networks, row: int, rules: NeatRules, bias_value: float) -> None:
         self._networks = networks
@@ -127,31 +129,6 @@ class Network:
         }
 
     @classmethod
-    def from_dict(cls, values: Mapping[str, Any]) -> Self:
-        """The network that `to_dict` described.
-
-        Raises:
-            RecordError: The values are not a network's.
-            RecordVersionError: Another version wrote them.
-        """
-        return cls._from(_json.checked(values, _json.NetworkForm, "network", "The mapping"), "The mapping")
-
-    def to_json(self) -> str:
-        """Return the network as JSON with a version; numbers are restored bit for bit."""
-        return _json.to_text(self.to_dict())
-
-    @classmethod
-    def from_json(cls, text: str) -> Self:
-        """The network that `to_json` wrote.
-
-        Raises:
-            RecordError: The text is no JSON, or not a network's.
-            RecordVersionError: Another version wrote it.
-        """
-        values = _json.from_text(text, "network", "The text")
-        return cls._from(_json.checked(values, _json.NetworkForm, "network", "The text"), "The text")
-
-    @classmethod
     def _from(cls, form: _json.NetworkForm, where: str) -> Self:
         _check_network(form, where)
         rules = form.rules(form.n_inputs, form.n_outputs, constant=form.constant, node_bias=True)
@@ -176,8 +153,10 @@ class Network:
         return cls(networks, 0, rules, form.bias_value)
 
 
-class Genome:
+class Genome(_json.Written[_json.GenomeForm], ShownAsCard):
     """Genes of an individual: a view of a row of a population's arrays."""
+
+    _kind, _form = "genome", _json.GenomeForm
 
     def __init__(self, genomes: Genomes, row: int, rules: NeatRules, bias_value: float = 1.0) -> None:
         self._genomes = genomes
@@ -295,31 +274,6 @@ class Genome:
             "connections": [asdict(connection) for connection in self.connections],
         }
 
-    @classmethod
-    def from_dict(cls, values: Mapping[str, Any]) -> Self:
-        """The genome that `to_dict` described; of NEAT's rates, which are no part of it, it has the defaults.
-
-        Raises:
-            RecordError: The values are not a genome's.
-            RecordVersionError: Another version wrote them.
-        """
-        return cls._from(_json.checked(values, _json.GenomeForm, "genome", "The mapping"), "The mapping")
-
-    def to_json(self) -> str:
-        """Return the genome as JSON with a version; numbers are restored bit for bit."""
-        return _json.to_text(self.to_dict())
-
-    @classmethod
-    def from_json(cls, text: str) -> Self:
-        """The genome that `to_json` wrote.
-
-        Raises:
-            RecordError: The text is no JSON, or not a genome's.
-            RecordVersionError: Another version wrote it.
-        """
-        values = _json.from_text(text, "genome", "The text")
-        return cls._from(_json.checked(values, _json.GenomeForm, "genome", "The text"), "The text")
-
     def save(self, path: str | Path) -> None:
         """Write the genome as JSON. An existing file is replaced once the new one is complete.
 
@@ -336,8 +290,7 @@ class Genome:
             RecordError: The file cannot be read, or holds no genome.
             RecordVersionError: Another version wrote it.
         """
-        values = _json.from_file(Path(path), "genome")
-        return cls._from(_json.checked(values, _json.GenomeForm, "genome", str(path)), str(path))
+        return cls._read(_json.from_file(Path(path), "genome"), str(path))
 
     @classmethod
     def _from(cls, form: _json.GenomeForm, where: str) -> Self:
@@ -364,9 +317,6 @@ class Genome:
 
     def _repr_svg_(self) -> str:
         return picture_of(self).to_svg(300.0)
-
-    def _repr_html_(self) -> str:
-        return card_of(self).to_html()
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Genome):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Literal, TypeVar
+from typing import Any, ClassVar, Generic, Literal, Self, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -195,3 +195,46 @@ def checked(values: Any, form: type[F], kind: Kind, where: str) -> F:
         first = error.errors()[0]
         place = ".".join(str(part) for part in first["loc"])
         raise RecordError(f"{where} is not a whole {kind}: {place}: {first['msg']}.") from error
+
+
+class Written(Generic[F]):
+    """What is written as JSON with a version, and read again: a genome or a network."""
+
+    _kind: ClassVar[Kind]
+    _form: type[F]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as plain values."""
+        raise NotImplementedError
+
+    @classmethod
+    def _from(cls, form: F, where: str) -> Self:
+        raise NotImplementedError
+
+    @classmethod
+    def _read(cls, values: Any, where: str) -> Self:
+        return cls._from(checked(values, cls._form, cls._kind, where), where)
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> Self:
+        """Return what `to_dict` described; of NEAT's rates, which are no part of it, it has the defaults.
+
+        Raises:
+            RecordError: The values are of something else.
+            RecordVersionError: Another version wrote them.
+        """
+        return cls._read(values, "The mapping")
+
+    def to_json(self) -> str:
+        """Return it as JSON with a version; numbers come back bit for bit."""
+        return to_text(self.to_dict())
+
+    @classmethod
+    def from_json(cls, text: str) -> Self:
+        """Return what `to_json` wrote.
+
+        Raises:
+            RecordError: The text is no JSON, or of something else.
+            RecordVersionError: Another version wrote it.
+        """
+        return cls._read(from_text(text, cls._kind, "The text"), "The text")

@@ -154,18 +154,14 @@ def parse_json(
     return value
 
 
-def parse_toml(text: str, *, most: int = MOST_TOML_BYTES) -> dict[str, Any]:
+def parse_toml(text: str) -> dict[str, Any]:
     """Return the values of a TOML text.
-
-    Args:
-        text: The text.
-        most: The largest number of characters that it may have.
 
     Raises:
         LimitError: It goes beyond a limit.
         ValueError: It is not TOML.
     """
-    _check_size(len(text), most)
+    _check_size(len(text), MOST_TOML_BYTES)
     bare = _TOML_STRING_OR_COMMENT.sub("s", text).replace("_", "").replace(" ", "").replace("\t", "")
     _check_depth(bare)
     if _LONG_NUMBER.search(bare):

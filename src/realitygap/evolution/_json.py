@@ -198,7 +198,7 @@ def checked(values: Any, form: type[F], kind: Kind, where: str) -> F:
 
 
 class Written(Generic[F]):
-    """What is written as JSON with a version, and read again: a genome or a network."""
+    """A genome or a network: written as JSON with a version, and read again."""
 
     _kind: ClassVar[Kind]
     _form: type[F]
@@ -217,7 +217,7 @@ class Written(Generic[F]):
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Self:
-        """Return what `to_dict` described; of NEAT's rates, which are no part of it, it has the defaults.
+        """Create it from the values of `to_dict`. NEAT's rates, which these values lack, have their defaults.
 
         Raises:
             RecordError: The values are of something else.
@@ -226,12 +226,12 @@ class Written(Generic[F]):
         return cls._read(values, "The mapping")
 
     def to_json(self) -> str:
-        """Return it as JSON with a version; numbers come back bit for bit."""
+        """Return it as JSON with a version; numbers are restored bit for bit."""
         return to_text(self.to_dict())
 
     @classmethod
     def from_json(cls, text: str) -> Self:
-        """Return what `to_json` wrote.
+        """Create it from the text of `to_json`.
 
         Raises:
             RecordError: The text is no JSON, or of something else.

@@ -99,11 +99,9 @@ def equivalence_power(margin: float, spread: float, n: int, difference: float = 
     return float(np.clip(passes - 1, 0.0, 1.0))
 
 
-def controllers_for_margin(
-    margin: float, spread: float, difference: float = 0.0, power: float = POWER
-) -> int | None:
+def controllers_for_margin(margin: float, spread: float, power: float = POWER) -> int | None:
     """Return the smallest number of controllers that shows equivalence with this power; None if 100,000 do not."""
-    return fewest(lambda n: equivalence_power(margin, spread, n, difference), power)
+    return fewest(lambda n: equivalence_power(margin, spread, n), power)
 
 
 def fewest(

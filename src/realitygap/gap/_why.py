@@ -102,7 +102,6 @@ def explain_gap(
     parts: Sequence[str],
     numbers: Sequence[int],
     *,
-    resamples: int = RESAMPLES,
     seed: int = 7,
 ) -> Why:
     """Share out the fall of the RMS gap among parts of the model.
@@ -113,7 +112,6 @@ def explain_gap(
         squares: (1 + d, 2^g, c) unbiased squares of the true differences (`square_differences`).
         parts: Names of the g parts.
         numbers: Number of numbers that the fit changes in each part.
-        resamples: Number of resamples of the bootstrap.
         seed: Seed of its draws.
 
     Returns:
@@ -123,9 +121,9 @@ def explain_gap(
     rng = np.random.default_rng(seed)
     n_draws, _, c = squares.shape
     worth = rms_of(squares[0].mean(axis=1))[None]
-    which = rng.integers(1, n_draws, resamples) if n_draws > 1 else np.zeros(resamples, np.int64)
-    drawn = np.empty((resamples, squares.shape[1]))
-    for k in range(resamples):
+    which = rng.integers(1, n_draws, RESAMPLES) if n_draws > 1 else np.zeros(RESAMPLES, np.int64)
+    drawn = np.empty((RESAMPLES, squares.shape[1]))
+    for k in range(RESAMPLES):
         drawn[k] = squares[which[k]][:, rng.integers(0, c, c)].mean(axis=1)
     gaps = rms_of(drawn)
     falls, others = _falls(worth)[0], _falls(gaps)

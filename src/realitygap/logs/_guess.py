@@ -9,7 +9,7 @@ from typing import Any
 
 from realitygap.errors import LogError
 
-from ._log_map import LogMap, TextFormat
+from ._log_map import LogMap
 from ._open import open_source
 from ._parquet import EPISODE
 from ._source import MOST_SHOWN, Source
@@ -45,20 +45,18 @@ TIME_UNITS = {"ms": "ms", "msec": "ms", "millis": "ms", "us": "us", "usec": "us"
               "nsec": "ns", "nanos": "ns", "min": "min"}  # fmt: skip
 
 
-def guess_log_map(path: str | Path, text: TextFormat | None = None) -> LogMap:
+def guess_log_map(path: str | Path) -> LogMap:
     """Return a mapping for a log, by the names of its columns.
 
     Args:
         path: The log.
-        text: Format of a text file, as far as it is known.
 
     Raises:
         LogError: The names do not say which columns are the wheels; the message lists them, and what a mapping has.
     """
     path = Path(path)
-    source = open_source(path, text)
+    source = open_source(path)
     names = source.columns()
-    values: dict[str, Any] = {} if text is None else {"text": text.model_dump()}
     parts = {
         "commands": _commands(names),
         "wheels": _wheels(names),
@@ -68,7 +66,7 @@ def guess_log_map(path: str | Path, text: TextFormat | None = None) -> LogMap:
     ranges = _ranges(source, names)
     if ranges is not None:
         parts["readings"] = ranges
-    values |= {name: part for name, part in parts.items() if part is not None}
+    values: dict[str, Any] = {name: part for name, part in parts.items() if part is not None}
     if "commands" not in values and "wheels" not in values:
         shown = ", ".join(names[:MOST_SHOWN])
         raise LogError(

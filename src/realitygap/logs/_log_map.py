@@ -170,7 +170,18 @@ class Readings(Part):
         return list(self.sensors)
 
 
-class LogMap(Settings):
+class MapFile(Settings):
+    """A mapping that a file keeps."""
+
+    def to_toml(self) -> str:
+        """Return the text of its file, without the defaults; the tables come last."""
+        values = self.model_dump(exclude_defaults=True)
+        tables = [(name, values.pop(name)) for name in tuple(values) if isinstance(values[name], dict)]
+        lines = [toml_table(values)] if values else []
+        return "\n\n".join([*lines, *(f"[{name}]\n{toml_table(table)}" for name, table in tables)]) + "\n"
+
+
+class LogMap(MapFile):
     """The mapping of a log."""
 
     robot: str = Field("", description="The robot that drove: a name or a file. `--base` takes precedence.")
@@ -217,13 +228,6 @@ class LogMap(Settings):
             "readings": self.readings,
         }
         return {name: part for name, part in parts.items() if part is not None}
-
-    def to_toml(self) -> str:
-        """The file that keeps it; `load_log_map` reads it."""
-        values = self.model_dump(exclude_defaults=True)
-        tables = [(name, values.pop(name)) for name in ("text", *self.parts) if name in values]
-        lines = [toml_table(values)] if values else []
-        return "\n\n".join([*lines, *(f"[{name}]\n{toml_table(table)}" for name, table in tables)]) + "\n"
 
 
 def load_log_map(path: str | Path) -> LogMap:

@@ -8,9 +8,8 @@ from typing import Literal, Self
 from pydantic import Field, model_validator
 
 from realitygap.settings import Settings
-from realitygap.world import toml_table
 
-from ._log_map import Column, TextFormat, checked_map, read_map
+from ._log_map import Column, MapFile, TextFormat, checked_map, read_map
 
 MeasuredFrom = Literal["body", "origin", "sensor"]
 
@@ -39,7 +38,7 @@ class TableColumns(Settings):
         return self
 
 
-class TableMap(Settings):
+class TableMap(MapFile):
     """The mapping of a table of readings."""
 
     robot: str = Field(
@@ -68,13 +67,6 @@ class TableMap(Settings):
     columns: TableColumns | None = Field(
         None, description="Columns of a text table. Default: by their names."
     )
-
-    def to_toml(self) -> str:
-        """The file that keeps it; `load_table_map` reads it."""
-        values = self.model_dump(exclude_defaults=True)
-        tables = [(name, values.pop(name)) for name in ("text", "columns") if name in values]
-        lines = [toml_table(values)] if values else []
-        return "\n\n".join([*lines, *(f"[{name}]\n{toml_table(table)}" for name, table in tables)]) + "\n"
 
 
 def load_table_map(path: str | Path) -> TableMap:

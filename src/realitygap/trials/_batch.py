@@ -83,7 +83,7 @@ class TrialBatch:
 
 
 class ResultsRoom(NamedTuple):
-    """Where a kernel writes the results of n trials, in the order of its arguments.
+    """Arrays for the results of n trials that a kernel writes, in the order of its arguments.
 
     Attributes:
         cells: (n, c) uint8, as in `TrialBatch`.

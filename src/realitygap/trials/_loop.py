@@ -46,7 +46,6 @@ def run_trial(
     begin: Callable[[], None] | None = None,
     look: Look | None = None,
     watch: Watch | None = None,
-    clock: Clock | None = None,
     sees_end: bool = False,
     channels: Sequence[str] = (),
 ) -> TrialRecord:
@@ -60,7 +59,6 @@ def run_trial(
         begin: Called once the robot is reset.
         look: Function that is called after each observation, and once when the robot is at rest at the end.
         watch: Called at each step, before its command is sent.
-        clock: Clock by which steps are timed; the robot's own, or real time, if not given.
         sees_end: True to observe the robot once more after the last command.
         channels: Names of the sensors that the controller sees besides range sensors.
 
@@ -73,7 +71,7 @@ def run_trial(
 
     Source: Rosenzweig & Remy, sections 2.1 to 2.3.
     """
-    clock = clock or getattr(robot, "clock", None) or SystemClock()
+    clock: Clock = getattr(robot, "clock", None) or SystemClock()
     looks: list[tuple[float, Observation]] = []
     commands: list[Command] = []
 

@@ -110,16 +110,19 @@ def fit_from_commands(
     values = {
         **values_at(fit.free, fit.draws(center, shape, N_REFITS[effort])),
         **_some_of(fit.noise, N_DRAWS, fit.rng),
-        **_sensors(fit, center, trials, arena),
+        **_sensors(fit, center, trials, arena, whole),
     }
     values = {parameter.name: values[parameter.name] for parameter in prior}
     return Posterior(standard_of(prior, values), values, np.zeros(len(prior)), fit.n_simulated)
 
 
-def _sensors(fit: _Fit, center: Floats, trials: Sequence[TrialRecord], arena: Arena) -> dict[str, Floats]:
-    """Return draws of the parameters of the sensors, (N_DRAWS,), by likelihoods at the poses that the fit predicts.
+def _sensors(
+    fit: _Fit, center: Floats, trials: Sequence[TrialRecord], arena: Arena, whole: Posterior
+) -> dict[str, Floats]:
+    """Return draws of the parameters of the sensors, (N_DRAWS,).
 
-    Only the first steps are used, whose poses are predicted well.
+    One half has likelihoods at the poses that the fit predicts for the first steps, where it predicts them well. It
+    does not know of their errors, so its draws spread too little. The other half is of whole trials by simulation.
     """
     parameters = [parameter for parameter in fit.prior if parameter.name.startswith("range.")]
     if not parameters:
@@ -137,7 +140,11 @@ def _sensors(fit: _Fit, center: Floats, trials: Sequence[TrialRecord], arena: Ar
         )
         for k, trial in enumerate(trials)
     ]
-    return sensors_of(shots_of(early, fit.robot, arena), parameters, fit.robot, arena, fit.rng, N_READINGS)
+    shots = shots_of(early, fit.robot, arena)
+    at_poses = sensors_of(shots, parameters, fit.robot, arena, fit.rng, N_READINGS)
+    of_whole = _some_of({p.name: whole.values[p.name] for p in parameters}, N_DRAWS, fit.rng)
+    is_at_pose = fit.rng.random(N_DRAWS) < 0.5
+    return {name: np.where(is_at_pose, value, of_whole[name]) for name, value in at_poses.items()}
 
 
 def _some_of(draws: Mapping[str, Floats], n: int, rng: np.random.Generator) -> dict[str, Floats]:

@@ -150,3 +150,19 @@ def test_estimate_at_the_end_of_its_prior_is_not_identified():
     share = {"name": "range.0.drop_most", "prior_low": 0.0, "prior_high": 1.0, "identified": True}
     assert Fitted(estimate=0.99, low=0.96, high=0.9999, **share).identified  # nothing is beyond 1
     assert Fitted(estimate=0.001, low=0.0, high=0.01, **share).identified
+
+
+@pytest.mark.parametrize(
+    ("estimate", "low", "high", "shown"),
+    [
+        (74.0561, 72.3212, 75.0102, ("74.06", "72.3 to 75")),
+        (2.016e-08, 2.08e-05, 0.000648, ("0", "2.1e-05 to 0.000648")),  # the digits differ between processors
+        (-8.005e-05, -0.0128, 0.01, ("-0.0001", "-0.0128 to 0.01")),
+        (0.2, 0.2, 0.2, ("0.2", "0.2 to 0.2")),
+    ],
+)
+def test_digits_beyond_a_hundredth_of_the_interval_are_not_shown(estimate, low, high, shown):
+    fitted = Fitted(
+        name="drive.gain", estimate=estimate, low=low, high=high, prior_low=-1, prior_high=99, identified=True
+    )
+    assert fitted.shown == shown

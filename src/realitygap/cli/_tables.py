@@ -77,7 +77,8 @@ def calibration_table(calibration: Calibration) -> Table:
     table.add_column("90 % interval", no_wrap=True)
     table.add_column("identified", no_wrap=True)
     for each in calibration.fitted:
-        cells = [each.name, f"{each.estimate:.4g} {each.unit}".rstrip(), f"{each.low:.3g} to {each.high:.3g}"]
+        estimate, interval = each.shown
+        cells = [each.name, f"{estimate} {each.unit}".rstrip(), interval]
         table.add_row(*(Text(cell) for cell in cells), Text("yes" if each.identified else "no"))
     return table
 

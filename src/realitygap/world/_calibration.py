@@ -76,6 +76,17 @@ class Fitted(Settings):
         return self
 
     @property
+    def shown(self) -> tuple[str, str]:
+        """The estimate and the interval as text, without digits beyond a hundredth of the interval's width."""
+        width = self.high - self.low
+        decimals = 2 - math.floor(math.log10(width)) if width > 0 else None
+
+        def text(value: float, digits: int) -> str:
+            return f"{(value if decimals is None else round(value, decimals)) + 0.0:.{digits}g}"
+
+        return text(self.estimate, 4), f"{text(self.low, 3)} to {text(self.high, 3)}"
+
+    @property
     def is_bound(self) -> bool:
         """True if an end of the interval is at an end of the prior that may cut off values."""
         return _is_bound(self.model_dump())

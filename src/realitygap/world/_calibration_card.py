@@ -24,8 +24,7 @@ def calibration_card(calibration: Calibration) -> Card:
     rows: list[list[str | Bar]] = [
         [
             f"{each.name} [{each.unit}]" if each.unit else each.name,
-            f"{each.estimate + 0.0:.4g}",
-            f"{each.low:.3g} to {each.high:.3g}",
+            *each.shown,
             _bar(each),
             "yes" if each.identified else f"no. {each.advice}",
         ]

@@ -12,7 +12,7 @@ from realitygap.lab._calibration_job import CalibrationJob
 from realitygap.lab._gap_plan import PLACING_S
 from realitygap.lab._lab import Lab, Visitor
 from realitygap.platforms import class_of, emulated_robots
-from realitygap.world import load_arena
+from realitygap.world import Fitted, load_arena
 
 from ._fields import Form
 from ._frame import framed, hint, section, text_of, visitor_of
@@ -404,8 +404,8 @@ def _show_fit(made: dict[str, Any], name: str) -> None:
     rows = [
         {
             "name": each["name"],
-            "estimate": f"{each['estimate']:.4g} {each['unit']}",
-            "interval": f"{each['low']:.4g} to {each['high']:.4g}",
+            "estimate": f"{Fitted(**each).shown[0]} {each['unit']}",
+            "interval": Fitted(**each).shown[1],
             "bar": _bar(each),
             "state": "Identified" if each["identified"] else "Not identified",
             "advice": each.get("advice", ""),

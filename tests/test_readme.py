@@ -66,6 +66,15 @@ def test_gap_of_the_readme_is_that_of_the_study():
         assert next(row for row in rows if row["goal"].endswith(f"floor, {observe}"))["verdict"] == "missed"
 
 
+def test_gap_to_a_thymio_in_the_readme_is_that_of_its_study():
+    goals = (ROOT / "docs" / "data" / "closing-thymio" / "goals.csv").read_text("utf-8").splitlines()
+    rows = {row["goal"]: row for row in csv.DictReader(goals)}
+    text = " ".join(README.split())
+    for observe, words in (("encoders", "encoders"), ("track", "camera poses")):
+        row = rows[f"fall of the RMS gap, enki, {observe}"]
+        assert f"by {row['figure']} ({row['95 % interval']}) with {words}" in text
+
+
 def test_newest_version_in_the_changelog_is_the_package_s():
     changelog = (ROOT / "CHANGELOG.md").read_text("utf-8")
     assert re.search(r"^## (\S+)", changelog, re.MULTILINE)[1] == __version__

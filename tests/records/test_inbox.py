@@ -103,7 +103,7 @@ def test_a_file_that_is_not_whole_is_refused(tmp_path, spoil):
                 {"empty": b"", "cut": data[:-20], "foreign": b"PAR1" + bytes(99) + b"PAR1"}[spoil]
             )
         with pytest.raises(
-            RecordError, match="is gone" if spoil == "missing" else "run the same|Run the same"
+            RecordError, match="no longer exists" if spoil == "missing" else "run the same|Run the same"
         ):
             folder.accept(inbox, [delivery])
     assert folder.chunks() == []

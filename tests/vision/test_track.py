@@ -17,7 +17,6 @@ from realitygap.vision import (
     Track,
     Tracker,
     VideoFile,
-    cells_along,
     corner_tags,
     find_beginning,
     fit_camera,
@@ -210,11 +209,21 @@ def test_what_was_not_seen_at_the_ends_has_no_poses_and_one_sighting_is_too_few(
         track_of(*_straight_above(poses, tag, seen), tag)
 
 
+def _track_along(*points):
+    poses = np.array([(*point, 0.0) for point in points])
+    return Track(np.arange(len(poses)) / 10, poses, np.ones(len(poses), np.bool_))
+
+
 def test_cells_are_those_along_the_line_in_the_order_of_first_visits():
     grid = Grid(0.0, 0.0, 0.1, 3, 2)
-    line = np.array([(0.05, 0.05), (0.25, 0.05), (0.25, 0.15), (0.25, 0.05), (0.5, 0.05)])
-    assert cells_along(line, grid) == (0, 1, 2, 5)
-    assert cells_along(np.array([(-1.0, -1.0)]), grid) == ()
+    line = [(0.05, 0.05), (0.25, 0.05), (0.25, 0.15), (0.25, 0.05), (0.5, 0.05)]
+    assert _track_along(*line).cells(grid) == (0, 1, 2, 5)
+    assert _track_along((-1.0, -1.0)).cells(grid) == ()
+
+
+def test_cells_include_one_whose_corner_is_cut_by_less_than_a_millimeter():
+    """Points a millimeter apart were looked up, so such a cell was missed; a simulated robot visits it."""
+    assert _track_along((0.0503, 0.15), (0.1503, 0.05)).cells(Grid(0.0, 0.0, 0.1, 3, 2)) == (3, 4, 1)
 
 
 def test_a_track_as_a_table_has_units_in_its_head():

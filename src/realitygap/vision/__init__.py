@@ -36,7 +36,7 @@ from .track._lens import Lens, fit_lens, read_lens
 from .track._live import LiveTrack
 from .track._overlay import draw_overlay, save_overlay
 from .track._source import CameraDevice, Source, VideoFile, open_source
-from .track._track import Track, cells_along, track_of
+from .track._track import Track, track_of
 from .track._tracker import Sightings, Tracker, gray_of
 from .track._video import Marks, Tracked, track_video
 
@@ -70,7 +70,6 @@ __all__ = [
     "VideoFile",
     "View",
     "arena_of_map",
-    "cells_along",
     "corner_tags",
     "draw_overlay",
     "find_beginning",

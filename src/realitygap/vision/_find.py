@@ -11,10 +11,11 @@ from realitygap.errors import from_extra
 
 from ._errors import SheetError
 from ._grid import GridOffsets, grid_offsets
-from ._layout import TAG_IDS, SheetLayout
+from ._layout import SheetLayout
 from ._lens import View
 from ._raster import shape_of, to_meters
-from ._tags import dictionary
+from ._tag_family import CORNER_FAMILY, dictionary
+from ._tag_layout import CORNER_IDS
 
 Floats = NDArray[np.float64]
 
@@ -64,7 +65,7 @@ def find_sheet(image: NDArray[np.uint8], layout: SheetLayout) -> Sheet:
     height, width = image.shape[:2]
     gray = _gray(image)
     corners = _tag_corners(gray)
-    there = np.concatenate([corners[number] for number in TAG_IDS])
+    there = np.concatenate([corners[number] for number in CORNER_IDS])
     here = layout.tag_corners().reshape(-1, 2)
     view = _first_view(here, there, width, height)
     view = _fitted(view, here, there, None)
@@ -149,18 +150,18 @@ def _tag_corners(gray: NDArray[np.uint8]) -> dict[int, Floats]:
     settings = cv2.aruco.DetectorParameters()
     settings.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
     settings.cornerRefinementWinSize = 5
-    detector = cv2.aruco.ArucoDetector(dictionary(), settings)
+    detector = cv2.aruco.ArucoDetector(dictionary(CORNER_FAMILY), settings)
     found: dict[int, Floats] = {}
     for blur in (0.0, 1.5, 3.0):
         seen = gray if blur == 0 else cv2.GaussianBlur(gray, (0, 0), blur)
         corners, numbers, _ = detector.detectMarkers(seen)
         for number, four in zip([] if numbers is None else numbers.ravel().tolist(), corners, strict=True):
-            if number in TAG_IDS:
+            if number in CORNER_IDS:
                 found.setdefault(number, np.asarray(four, np.float64).reshape(4, 2))
-        if len(found) == len(TAG_IDS):
+        if len(found) == len(CORNER_IDS):
             return found
     names = ("lower left", "lower right", "upper right", "upper left")
-    missing = ", ".join(names[number] for number in TAG_IDS if number not in found)
+    missing = ", ".join(names[number] for number in CORNER_IDS if number not in found)
     raise SheetError(
         f"Of the sheet's four tags {len(found)} were found; missing: {missing}. Take the photo again with all four "
         "corners in it, sharp and without glare; `realitygap print-sheet` prints such a sheet."

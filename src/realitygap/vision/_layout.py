@@ -12,16 +12,12 @@ from numpy.typing import NDArray
 
 from realitygap.world import Arena, Grid, Pose
 
-from ._tags import tag_bits
+from ._tag_family import CORNER_FAMILY, tag_bits
+from ._tag_layout import CORNER_IDS, CORNER_INSET_M, CORNER_SIZE_M, Box, bounds, ring_width
 
 PEN_NAMES = ("black", "red", "blue", "green", "orange", "purple", "brown", "pink")
 """Default names of the pens of a study."""
 
-TAG_IDS = (0, 1, 2, 3)
-"""Numbers in the family 36h11: lower left, lower right, upper right, upper left."""
-
-TAG_SIZE = 0.06  # side of a tag's black square [m]
-TAG_INSET = 0.01  # from the walls to it [m]
 GRID_GRAY = 0.62  # seen by people and camera through tracing paper, and no pen
 GRID_WIDTH = 0.0005
 TEXT_GRAY = 0.45
@@ -61,10 +57,6 @@ class Label:
     gray: float = TEXT_GRAY
 
 
-Box = tuple[float, float, float, float]
-"""Left, lower, right and upper end [m]."""
-
-
 @dataclass(frozen=True)
 class SheetLayout:
     """The sheet of an arena: its walls' rectangle with the grid, four tags, the start, and a box to try each pen in.
@@ -91,42 +83,34 @@ class SheetLayout:
         Raises:
             ValueError: Its tags would not fit.
         """
-        ends = np.array(arena.walls, np.float64).reshape(-1, 2, 2)
-        (left, lower), (right, upper) = ends.min(axis=(0, 1)).tolist(), ends.max(axis=(0, 1)).tolist()
-        layout = cls((left, lower, right, upper), arena.grid, arena.start, tuple(pens))
-        if min(right - left, upper - lower) < 3 * TAG_SIZE:
+        left, lower, right, upper = walls = bounds(arena)
+        layout = cls(walls, arena.grid, arena.start, tuple(pens))
+        if min(right - left, upper - lower) < 3 * CORNER_SIZE_M:
             raise ValueError(
-                f"arena {arena.name!r} is {right - left:g} m x {upper - lower:g} m, expected at least {3 * TAG_SIZE:g} "
-                "m each way: four tags lie at its corners"
+                f"arena {arena.name!r} is {right - left:g} m x {upper - lower:g} m, expected at least "
+                f"{3 * CORNER_SIZE_M:g} m each way: four tags lie at its corners"
             )
         return layout
 
     @property
     def is_ring_free(self) -> bool:
         """True if tags and boxes are between the walls and the reachable cells."""
-        grid, (left, lower, right, upper) = self.grid, self.walls
-        nearest = min(
-            grid.x - left,
-            grid.y - lower,
-            right - grid.x - grid.columns * grid.cell,
-            upper - grid.y - grid.rows * grid.cell,
-        )
-        return nearest >= TAG_SIZE + TAG_INSET
+        return ring_width(self.walls, self.grid) >= CORNER_SIZE_M + CORNER_INSET_M
 
     @property
     def paper(self) -> Box:
         """The whole sheet."""
-        out = MARGIN if self.is_ring_free else MARGIN + TAG_SIZE + TAG_INSET
+        out = MARGIN if self.is_ring_free else MARGIN + CORNER_SIZE_M + CORNER_INSET_M
         left, lower, right, upper = self.walls
         return left - out, lower - out, right + out, upper + out
 
     def tag_corners(self) -> NDArray[np.float64]:
         """Return the upper left, upper right, lower right and lower left corner of each tag, (4, 4, 2) [m]."""
-        inset = TAG_INSET if self.is_ring_free else -TAG_INSET - TAG_SIZE
+        inset = CORNER_INSET_M if self.is_ring_free else -CORNER_INSET_M - CORNER_SIZE_M
         left, lower, right, upper = self.walls
-        xs = (left + inset, right - inset - TAG_SIZE)
-        ys = (lower + inset, upper - inset - TAG_SIZE)
-        square = TAG_SIZE * np.array([(0, 1), (1, 1), (1, 0), (0, 0)], np.float64)
+        xs = (left + inset, right - inset - CORNER_SIZE_M)
+        ys = (lower + inset, upper - inset - CORNER_SIZE_M)
+        square = CORNER_SIZE_M * np.array([(0, 1), (1, 1), (1, 0), (0, 0)], np.float64)
         lowers = [(xs[0], ys[0]), (xs[1], ys[0]), (xs[1], ys[1]), (xs[0], ys[1])]
         return np.array([square + lower_left for lower_left in lowers])
 
@@ -167,7 +151,7 @@ class SheetLayout:
         marks = [*_outline((left, lower, right, upper), 0.3, 0.0008)]
         for box in self.key_boxes():
             marks += _outline(box, GRID_GRAY, GRID_WIDTH)
-        for number, corners in zip(TAG_IDS, self.tag_corners(), strict=True):
+        for number, corners in zip(CORNER_IDS, self.tag_corners(), strict=True):
             marks += _tag_marks(number, *corners[3].tolist())
         return marks
 
@@ -199,8 +183,8 @@ def _outline(box: Box, gray: float, width: float) -> list[Mark]:
 
 def _tag_marks(number: int, left: float, lower: float) -> list[Mark]:
     """The black parts of a tag, row by row."""
-    is_black = ~tag_bits(number)
-    size = TAG_SIZE / len(is_black)
+    is_black = ~tag_bits(CORNER_FAMILY, number)
+    size = CORNER_SIZE_M / len(is_black)
     marks = []
     for row, bits in enumerate(is_black[::-1]):
         edges = np.flatnonzero(np.diff(np.concatenate([[0], bits.astype(int), [0]])))

@@ -13,9 +13,10 @@ from realitygap.errors import from_extra
 
 from ._errors import SheetError
 from ._ink import to_linear
-from ._layout import Box, SheetLayout
+from ._layout import SheetLayout
 from ._mixtures import Mixtures
 from ._raster import shape_of, to_pixels
+from ._tag_layout import Box
 
 Floats = NDArray[np.float32]
 Place = tuple[NDArray[np.int64], ...]

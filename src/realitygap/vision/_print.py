@@ -9,16 +9,17 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from realitygap.errors import did_you_mean
+from realitygap.world import INCH
 
 from ._errors import SheetError
-from ._layout import Box, Label, Mark, SheetLayout
+from ._layout import Label, Mark, SheetLayout
+from ._tag_layout import Box
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-INCH = 0.0254
 PAPERS = {"a4": (0.297, 0.210), "letter": (11 * INCH, 8.5 * INCH), "a3": (0.420, 0.297)}
 """Width and height of pages that lie across [m]."""
 
@@ -93,9 +94,19 @@ def sheet_pdf(layout: SheetLayout, paper: str = "a4") -> bytes:
     return file.getvalue()
 
 
-def _page(layout: SheetLayout, marks: list[Mark], tile: Tile, paper: str, tiles: list[Tile]) -> Figure:
+def blank_page(width: float, height: float, left: float = 0.0, lower: float = 0.0) -> tuple[Figure, Axes]:
+    """Return a page of this size whose units are meters, from its lower left corner."""
     from matplotlib.figure import Figure
 
+    figure = Figure(figsize=(width / INCH, height / INCH))
+    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    axes.set_xlim(left, left + width)
+    axes.set_ylim(lower, lower + height)
+    axes.axis("off")
+    return figure, axes
+
+
+def _page(layout: SheetLayout, marks: list[Mark], tile: Tile, paper: str, tiles: list[Tile]) -> Figure:
     left, lower, right, upper = tile.box
     if paper == ONE_PAGE:
         width, height = right - left, upper - lower
@@ -105,11 +116,7 @@ def _page(layout: SheetLayout, marks: list[Mark], tile: Tile, paper: str, tiles:
         if right - left > _usable(width) or upper - lower > _usable(height):
             width, height = height, width  # the page stands upright
         x, y = (left + right - width) / 2, (lower + upper - height) / 2
-    figure = Figure(figsize=(width / INCH, height / INCH))
-    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
-    axes.set_xlim(x, x + width)
-    axes.set_ylim(y, y + height)
-    axes.axis("off")
+    figure, axes = blank_page(width, height, x, y)
     bleed = 0.0 if paper == ONE_PAGE else BLEED
     _draw(axes, marks, layout.labels(), (left - bleed, lower - bleed, right + bleed, upper + bleed))
     if paper != ONE_PAGE:

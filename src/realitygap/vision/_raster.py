@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from realitygap.errors import from_extra
 
-from ._layout import Box, Mark
+from ._layout import Mark
+from ._tag_layout import Box
 
 SUB = 4  # fractional bits of OpenCV's drawing coordinates
 

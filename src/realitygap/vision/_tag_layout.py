@@ -8,11 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from realitygap.world import Arena
+from realitygap.world import Arena, Grid
 
 from ._tag_family import FAMILIES
 
 Floats = NDArray[np.float64]
+Box = tuple[float, float, float, float]
+"""Left, lower, right and upper end [m]."""
 
 CORNER_IDS = (0, 1, 2, 3)
 """Lower left, lower right, upper right, upper left."""
@@ -66,7 +68,7 @@ class RobotTag:
         return np.array([(half, half), (half, -half), (-half, -half), (-half, half)])
 
 
-def bounds(arena: Arena) -> tuple[float, float, float, float]:
+def bounds(arena: Arena) -> Box:
     """Left, lower, right and upper end of an arena's walls [m]."""
     walls = np.array(arena.walls, np.float64).reshape(-1, 2, 2)
     (left, lower), (right, upper) = walls.min(axis=(0, 1)), walls.max(axis=(0, 1))
@@ -94,7 +96,11 @@ def corner_tags(
     """
     left, lower, right, upper = bounds(arena)
     if inset is None:
-        inset = CORNER_INSET_M if _ring(arena) >= size + CORNER_INSET_M else -CORNER_INSET_M - size
+        inset = (
+            CORNER_INSET_M
+            if ring_width(bounds(arena), arena.grid) >= size + CORNER_INSET_M
+            else -CORNER_INSET_M - size
+        )
     if not size > 0 or 2 * (size + inset) >= min(right - left, upper - lower):
         raise ValueError(
             f"Tags of {size:g} m, {inset:g} m from the walls, expected such as fit into the corners of "
@@ -109,11 +115,11 @@ def corner_tags(
     }
 
 
-def _ring(arena: Arena) -> float:
+def ring_width(walls: Box, grid: Grid) -> float:
     """Return the smallest distance from the walls to the reachable cells [m]."""
-    (left, lower, right, upper), grid = bounds(arena), arena.grid
-    far_x, far_y = grid.x + grid.columns * grid.cell, grid.y + grid.rows * grid.cell
-    return min(grid.x - left, grid.y - lower, right - far_x, upper - far_y)
+    left, lower, right, upper = walls
+    across, up = right - grid.x - grid.columns * grid.cell, upper - grid.y - grid.rows * grid.cell
+    return min(grid.x - left, grid.y - lower, across, up)
 
 
 def _square(x: float, y: float, size: float) -> Floats:

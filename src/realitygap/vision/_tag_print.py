@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal
 
+from ._print import PAPERS, blank_page
 from ._tag_family import CORNER_FAMILY, tag_bits
 from ._tag_layout import CORNER_IDS, CORNER_SIZE_M, RobotTag
 
@@ -12,9 +13,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Paper = Literal["a4", "letter", "a3"]
-PAPERS: tuple[str, ...] = get_args(Paper)
-SIZES_M = {"a4": (0.210, 0.297), "letter": (0.2159, 0.2794), "a3": (0.297, 0.420)}
-INCH_M = 0.0254
 PLACES = ("lower left", "lower right", "upper right", "upper left")
 EDGE_M = 0.012  # of paper that printers leave blank
 GRAY = "0.45"
@@ -37,13 +35,12 @@ def print_tags(
     Raises:
         ValueError: No such paper, no such tag, or tags that are too large for the paper.
     """
-    import matplotlib.pyplot as plt
     from matplotlib.backends.backend_pdf import PdfPages
 
-    if paper not in SIZES_M:
+    if paper not in PAPERS:
         raise ValueError(f"paper is {paper!r}, expected {', '.join(PAPERS)}.")
     robot = tag or RobotTag()
-    width, height = SIZES_M[paper]
+    height, width = PAPERS[paper]
     robots_side, corners_side = _with_border(robot.size), _with_border(corner_size)
     room = width - 2 * EDGE_M
     if robots_side > room or 2 * corners_side > room or 2 * corners_side + 0.07 > height - 2 * EDGE_M:
@@ -55,7 +52,6 @@ def print_tags(
     with PdfPages(path) as file:
         for page in pages:
             file.savefig(page)
-            plt.close(page)
     return len(pages)
 
 
@@ -66,13 +62,7 @@ def _with_border(size: float) -> float:
 
 def _page(width: float, height: float) -> tuple[Figure, Any]:
     """A sheet whose units are meters, from its lower left."""
-    import matplotlib.pyplot as plt
-
-    page = plt.figure(figsize=(width / INCH_M, height / INCH_M))
-    axes = page.add_axes((0, 0, 1, 1))
-    axes.set_xlim(0, width)
-    axes.set_ylim(0, height)
-    axes.axis("off")
+    page, axes = blank_page(width, height)
     _ruler(axes, width)
     return page, axes
 

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from realitygap.errors import from_extra
 
-from ._layout import Box
 from ._links import STEP, joined
 from ._pens import PenMaps
 from ._raster import to_pixels
+from ._tag_layout import Box
 
 Floats = NDArray[np.float32]
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from realitygap.errors import VisionError
 from realitygap.vision._tag_layout import RobotTag
-from realitygap.world import Grid
+from realitygap.world import Grid, cells_along
 
 from ._camera import Camera, square_poses
 from ._tracker import Sightings
@@ -18,7 +18,6 @@ from ._tracker import Sightings
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
-FINE_M = 0.001  # between points at which crossed cells are looked up
 MOST_OFF = 0.08  # of a tag's side, rms of its corners: beyond, it was seen wrongly
 FASTEST_M_S = 1.5  # no robot of this size is faster
 LEAST_SEEN = 2
@@ -169,19 +168,3 @@ def _slope(times: Floats, poses: Floats, otherwise: Floats) -> Floats:
         return otherwise
     slope: Floats = np.polyfit(times - times[0], poses, 1)[0]
     return slope
-
-
-def cells_along(line: Floats, grid: Grid) -> tuple[int, ...]:
-    """The cells of a grid that a line crosses, each once, in the order of their first visits.
-
-    Args:
-        line: (t, 2) x [m], y [m]; straight between points. Looked up at each millimeter.
-        grid: The cells.
-    """
-    way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
-    at = np.union1d(way, np.arange(0.0, way[-1], FINE_M))
-    x, y = (np.interp(at, way, column) for column in line.T)
-    column, row = np.floor((x - grid.x) / grid.cell), np.floor((y - grid.y) / grid.cell)
-    inside = (column >= 0) & (column < grid.columns) & (row >= 0) & (row < grid.rows)
-    numbers = (grid.columns * row + column)[inside].astype(int)
-    return tuple(dict.fromkeys(numbers.tolist()))

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from realitygap.cli import main
+from realitygap.emulator import why_not
 from realitygap.errors import VisionError
 from realitygap.records import (
     LEDGER_NAME,
@@ -25,6 +26,7 @@ from realitygap.study import (
     gap_between,
     observations_head,
     open_target,
+    parse_study,
     place_trial,
     sample_controllers,
     trial_of_file,
@@ -77,13 +79,10 @@ class _Looking(Unattended):
         return ()
 
 
-@pytest.fixture(scope="module")
-def driven(tmp_path_factory):
-    """A study whose first generation was driven and not scored, with a video of one of its trials."""
-    folder = tmp_path_factory.mktemp("track")
+def _driven_and_filmed(folder, study, port):
+    """Drive a study without scoring it, and film its longest trial: its number, path, and cells."""
     operator = _Looking()
-    study = small_study("coverage", steps="8")
-    drive_study(study, "emulator://s2?fluke=1&speed=off", folder / "out", operator=operator)
+    drive_study(study, port, folder / "out", operator=operator)
     farthest = max(operator.paths, key=lambda number: np.ptp(operator.paths[number][0][:, :2], axis=0).sum())
     path, cells = operator.paths[farthest]
     with Ledger.open(folder / "out" / LEDGER_NAME, writable=False) as ledger:
@@ -95,7 +94,15 @@ def driven(tmp_path_factory):
     way = path_through(at, path)
     film = Film(way, at[-1] + 0.4, rate=12.0, filmed=CAMERA, missed=((2.0, 2.2),), n_exposures=3)
     save_film(film, str(folder / "film.mp4"))
-    return folder, farthest, path, cells
+    return farthest, path, cells
+
+
+@pytest.fixture(scope="module")
+def driven(tmp_path_factory):
+    """A study whose first generation was driven and not scored, with a video of one of its trials."""
+    folder = tmp_path_factory.mktemp("track")
+    study = small_study("coverage", steps="8")
+    return folder, *_driven_and_filmed(folder, study, "emulator://s2?fluke=1&speed=off")
 
 
 def test_a_video_gives_a_table_an_overlay_and_the_lens(driven, command):
@@ -155,6 +162,40 @@ def test_a_trial_of_a_ledger_is_found_scored_and_kept_for_calibrations(driven, c
     assert status == 1
     assert "is scored; that can be done only while it is driven" in err
     assert len(read_observations(folder / "tracked.jsonl").trials) == 1
+
+
+@pytest.mark.skipif(bool(why_not()), reason=why_not() or "-")
+def test_a_camera_scores_a_trial_of_a_thymio(command, tmp_path):
+    study = parse_study(
+        """
+[study]
+name = "small"
+replicates = 1
+[controller]
+inputs = ["range.0", "range.2", "range.4", "bias"]
+[neat]
+population = 2
+generations = 1
+[platform.thymio]
+steps = 12
+step_s = 0.5
+[[condition]]
+name = "robot"
+platform = "thymio"
+""",
+        "small.toml",
+    )
+    number, path, cells = _driven_and_filmed(tmp_path, study, "thymio:emulator://playground")
+    words = ("track", "--camera", "film.mp4", "--study", "out", "--trial", number)
+    status, out, err = command(*words, "--begins", LEAD_S)  # its controller may hardly change its commands
+    assert (status, err) == (0, "")
+    assert "Entered into the ledger of out." in out
+    with Ledger.open(tmp_path / "out" / LEDGER_NAME, writable=False) as ledger:
+        (score,) = ledger.scores()
+    assert score["who"] == "camera"
+    assert len(set(score["cells"]) ^ cells) <= 1
+    off = np.array(score["path"]) - path
+    assert np.sqrt((off[:, :2] ** 2).sum(axis=1).mean()) < 0.02
 
 
 def _seen_by_camera(trial, rng):

@@ -178,7 +178,8 @@ def test_the_most_trials_of_about_one_length_are_kept():
     kept, said = of_one_length(trials)
     assert len(kept) == 9
     assert (
-        "1 of 10 trials were left out: their commands lasted 0.56 to 0.56 s, and most 0.5 to 0.53 s." in said
+        "1 of 10 trials were left out: their commands lasted 0.56 to 0.56 s. Those of the 9 that count lasted 0.5 "
+        "to 0.53 s." in said
     )
     assert of_one_length(lasting(0.5, 0.549))[1] == ""
     assert of_one_length([]) == ([], "")

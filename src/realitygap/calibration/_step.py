@@ -22,7 +22,8 @@ def of_one_length(trials: Sequence[TrialRecord]) -> tuple[list[TrialRecord], str
     others = [length for length in lengths if not least <= length <= (1 + ALIKE) * least]
     return kept, (
         f"{len(others)} of {len(trials)} trials were left out: their commands lasted {others[0]:.3g} to "
-        f"{others[-1]:.3g} s, and most {least:.3g} to {max(trial.step_s for trial in kept):.3g} s."
+        f"{others[-1]:.3g} s. Those of the {len(kept)} that count lasted {least:.3g} to "
+        f"{max(trial.step_s for trial in kept):.3g} s."
     )
 
 

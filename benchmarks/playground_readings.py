@@ -1,0 +1,45 @@
+"""Readings of a Thymio in a simulator, less those of `sim` at the same poses, by the rays of a sensor that meet a wall.
+
+    python benchmarks/playground_readings.py results/closing-the-gap-thymio/calibrations/playground-21-track-20.jsonl
+
+The file has the trials of a calibration with poses, as `realitygap closing-the-gap --plan thymio` keeps them.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+
+from realitygap.calibration._rays import rays_of
+from realitygap.platforms import SimEnsemble, SimPlatform
+from realitygap.records import read_observations
+from realitygap.study import choose_condition
+
+
+def main() -> None:
+    """Print a line for each number of rays."""
+    parser = argparse.ArgumentParser(description="Readings less those of sim, by the rays that meet a wall.")
+    parser.add_argument("file", type=Path, help="trials with poses (.jsonl)")
+    trials = read_observations(parser.parse_args().file).trials
+    arena = choose_condition("sim-thymio", None, 1).arena.arena()
+    platform = SimPlatform(robot="thymio")
+    poses = np.concatenate([trial.poses[: len(trial.readings)] for trial in trials])
+    readings = np.concatenate([trial.readings for trial in trials])
+    stands = np.zeros((len(poses), 1, 2))
+    made = SimEnsemble(platform, arena).replay(poses, stands, {}, 1, keep=("readings",)).readings[0, :, 0]
+    off: dict[int, list[float]] = {}
+    for k, sensor in enumerate(platform.robot.range):
+        distances, _ = rays_of(sensor, poses, arena)
+        for n, difference in zip(
+            (distances < sensor.reach).sum(axis=1), readings[:, k] - made[:, k], strict=True
+        ):
+            off.setdefault(int(n), []).append(float(difference))
+    print("rays that meet a wall   readings   median difference")
+    for n, differences in sorted(off.items()):
+        print(f"{n:21} {len(differences):10,} {np.median(differences):19.3f}")
+
+
+if __name__ == "__main__":
+    main()

@@ -296,6 +296,15 @@ def test_plan_of_other_platforms_has_sittings_and_leaves_out_what_cannot_be_seen
     assert small.n_units == 4
 
 
+def test_plan_of_fresh_twins_shares_no_twin_and_no_controllers_with_the_first():
+    plan, first = PLANS["fresh"][0], PLANS["twins"][0]
+    assert len(plan.names) == 24
+    assert not set(plan.names) & set(first.names)
+    seeds = {plan.seed_of_controllers(name) for name in plan.names}
+    assert seeds == set(range(2026112800 + 5000, 2026112800 + 5006))
+    assert plan.n_units == 24 * 4  # no transfers
+
+
 def test_folder_made_before_plans_of_other_platforms_opens(right, tmp_path):
     _, folder, _ = right
     shutil.copytree(folder, tmp_path / "old")

@@ -23,8 +23,8 @@ def closing(
         str,
         typer.Option(
             metavar="PLAN",
-            help="Plan of the study. twins: MuJoCo twins of a Scribbler. thymio: a Thymio in Enki and in Aseba's "
-            "playground.",
+            help="Plan of the study. twins: MuJoCo twins of a Scribbler. fresh: other twins and "
+            "controllers, without transfer. thymio: a Thymio in Enki and in Aseba's playground.",
         ),
     ] = "twins",
     twins: Annotated[

@@ -162,8 +162,23 @@ THYMIO = ClosingPlan(
 )
 """The same question for simulators that we did not write: a Thymio in Enki, and in Aseba's playground."""
 
+FRESH = replace(
+    TWINS,
+    twins=6,
+    first_seed=5000,
+    budgets=(0, 20),
+    controllers_seed=2026112800,
+    has_own_controllers=True,
+    transfers=False,
+)
+"""The same goals, without transfer, on other twins. Each seed has its own held-out controllers.
+
+The methods were fixed before any of these twins was drawn.
+"""
+
 PLANS = {
     "twins": (TWINS, SMALL),
+    "fresh": (FRESH, replace(FRESH, families=SMALL.families, controllers_seed=1, **_FEW)),
     "thymio": (THYMIO, replace(THYMIO, families=("enki",), controllers_seed=1, **_FEW)),
 }
 """The plans by name: at full size, and small."""

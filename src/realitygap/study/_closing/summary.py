@@ -235,6 +235,8 @@ def _goals(plan: ClosingPlan, twins: Sequence[Row], budget: int) -> Iterable[Row
         yield _median_goal(f"disattenuated SRCC, {observe}", order, LEAST_SRCC, above=True)
         ratio = [(twin, after, after["gap"]["mmrv_ratio"]) for twin, after in pairs]
         yield _median_goal(f"MMRV over its split-half floor, {observe}", ratio, MOST_MMRV, above=False)
+        if not plan.transfers:
+            continue
         for other, least in (("plain", 0.5), ("select", 0.5), ("direct", LEAST_OVER_DIRECT)):
             yield _wins(counted, observe, other, least)
 

@@ -1,8 +1,9 @@
 """Readings of a Thymio in a simulator, less those of `sim` at the same poses, by the rays of a sensor that meet a wall.
 
-    python benchmarks/playground_readings.py results/closing-the-gap-thymio/calibrations/playground-21-track-20.jsonl
+    python benchmarks/playground_readings.py FILE --robot thymio-playground
 
-The file has the trials of a calibration with poses, as `realitygap closing-the-gap --plan thymio` keeps them.
+The file has the trials of a calibration with poses, such as `playground-31-track-20.jsonl` in the folder `calibrations`
+of the results of `realitygap closing-the-gap --plan playground`.
 """
 
 from __future__ import annotations
@@ -22,9 +23,11 @@ def main() -> None:
     """Print a line for each number of rays."""
     parser = argparse.ArgumentParser(description="Readings less those of sim, by the rays that meet a wall.")
     parser.add_argument("file", type=Path, help="trials with poses (.jsonl)")
-    trials = read_observations(parser.parse_args().file).trials
+    parser.add_argument("--robot", default="thymio", help="robot in sim")
+    options = parser.parse_args()
+    trials = read_observations(options.file).trials
     arena = choose_condition("sim-thymio", None, 1).arena.arena()
-    platform = SimPlatform(robot="thymio")
+    platform = SimPlatform(robot=options.robot)
     poses = np.concatenate([trial.poses[: len(trial.readings)] for trial in trials])
     readings = np.concatenate([trial.readings for trial in trials])
     stands = np.zeros((len(poses), 1, 2))

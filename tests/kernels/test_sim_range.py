@@ -36,10 +36,12 @@ def respond(
     elif kind == "ir":
         ranges.rate_of(row(numbers["decay"], real), rate)
         ranges.ir_response(rays, row(reach, real), row(numbers["amplitude"], real), rate, reading)
-    elif kind == "lorentz":
+    elif kind in ("lorentz", "lorentz_edges"):
         ranges.widening_of(row(numbers["cone"] / (2 * np.pi), real), rate)
-        of_law = (row(value, real) for value in (reach, *(numbers[name] for name in LORENTZ)))
+        of_law = [row(value, real) for value in (reach, *(numbers[name] for name in LORENTZ))]
         ranges.lorentz_response(rays, *of_law, rate, reading)
+        if kind == "lorentz_edges":
+            ranges.add_edges(rays, near, *of_law, reading)
     else:
         entries = rows(itertools.chain(*numbers["table"]), real)
         ranges.prepare_table(entries)
@@ -121,6 +123,7 @@ def test_lorentz_equals_the_reference_with_other_numbers_in_each_lane(real: Any,
             "cone": rng.uniform(0.0, 1.2, LANES),
         }
         answer = respond("lorentz", rays, real, reach, **numbers)
+        with_edges = respond("lorentz_edges", rays, real, reach, **numbers)
         for lane in range(LANES):
             far = float(reach[lane]) - rays[n_rays // 2, lane] / math.cos(numbers["cone"][lane])
             if abs(far) < 1e-5:  # on the far edge rounding decides
@@ -128,6 +131,8 @@ def test_lorentz_equals_the_reference_with_other_numbers_in_each_lane(real: Any,
             law = [float(reach[lane]), *(numbers[name][lane] for name in LORENTZ)]
             plain = reference.enki([float(d) for d in rays[:, lane]], numbers["cone"][lane], *law)
             assert answer[lane] == pytest.approx(plain, abs=100 * TOLERANCE[real])
+            plain += reference.of_lost_rays([float(d) for d in rays[:, lane]], *law)
+            assert with_edges[lane] == pytest.approx(plain, abs=100 * TOLERANCE[real])
 
 
 def test_lorentz_of_a_facing_wall_is_that_of_the_middle_ray_up_to_the_far_edge() -> None:

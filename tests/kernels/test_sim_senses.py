@@ -23,17 +23,24 @@ from tests.reference.neat import Neat
 from tests.reference.philox import Stream
 
 KEY = 41
-RESPONSES = ("linear", "ir", "table", "pulses", "lorentz")
-FIRST_RAYS = {"linear": (0, 1), "ir": (1, 3), "table": (4, 1), "pulses": (5, 3), "lorentz": (8, 3)}
-N_RAYS = 11
+RESPONSES = ("linear", "ir", "table", "pulses", "lorentz", "lorentz_edges")
+FIRST_RAYS = {
+    "linear": (0, 1),
+    "ir": (1, 3),
+    "table": (4, 1),
+    "pulses": (5, 3),
+    "lorentz": (8, 3),
+    "lorentz_edges": (11, 3),
+}
+N_RAYS = 14
 TABLE = 3
 TAPE = (0.2, -1.0, 0.2, 1.0, 0.1, 0.1)
 SHAPE = make_sim_shape(
     parts=[1],
     range_response=RESPONSES,
     range_rays=[rays for _, rays in FIRST_RAYS.values()],
-    range_table=[0, 0, TABLE, 0, 0],
-    range_pulses=[0, 0, 0, 10, 0],
+    range_table=[0, 0, TABLE, 0, 0, 0],
+    range_pulses=[0, 0, 0, 10, 0, 0],
     n_light=2,
     n_line=2,
     line_levels=[False, True],
@@ -148,10 +155,12 @@ class Plain:
                 for j in range(TABLE)
             ]
             reading = reference.table(min(rays), entries)
-        elif kind == "lorentz":
-            of_lorentz = (self.number(f"range.{s}.{name}") for name in ("half_width", "peak"))
+        elif kind in ("lorentz", "lorentz_edges"):
+            of_lorentz = [self.number(f"range.{s}.{name}") for name in ("half_width", "peak")]
             cone = self.number(f"range.{s}.cone")
             reading = reference.enki(rays, cone, reach, of["amplitude"], *of_lorentz)
+            if kind == "lorentz_edges":
+                reading += reference.of_lost_rays(rays, reach, of["amplitude"], *of_lorentz)
         else:
             factors = reference.at_a_slant(cosines, k)
             reading = of["amplitude"] * reference.returned(rays, reach, decay, factors)

@@ -64,6 +64,12 @@ def enki(distances: Sequence[float], cone: float, *numbers: float) -> float:
     return lorentz(right, *numbers) + lorentz(left, *numbers) + straight
 
 
+def of_lost_rays(distances: Sequence[float], reach: float, *numbers: float) -> float:
+    """What rays that have lost a wall add in Enki 1.6.99, if each lost it at the reach."""
+    lost = [d for d in distances if d >= reach]
+    return len(lost) * lorentz(reach, math.inf, *numbers) if len(lost) < len(distances) else 0.0
+
+
 def at_a_slant(cosines: Sequence[float], incidence: float) -> list[float]:
     return [c / (c + incidence * (1 - c)) for c in cosines]
 

@@ -13,7 +13,7 @@ import pytest
 from realitygap.errors import RecordError
 from realitygap.platforms import SimPlatform, SimTarget, build_enki
 from realitygap.report import goal_table, write_closing_page
-from realitygap.study import PLANS, SMALL, ClosingPlan, closing_the_gap, summarize_closing
+from realitygap.study import PLANS, SMALL, ClosingPlan, choose_condition, closing_the_gap, summarize_closing
 from realitygap.study._closing.plan import adopt_plan
 from realitygap.study._closing.summary import is_met, median_interval, pooled_fall, share_interval
 from realitygap.study._closing.twin import ClosingTwin, held_out
@@ -294,6 +294,13 @@ def test_plan_of_other_platforms_has_sittings_and_leaves_out_what_cannot_be_seen
     assert units["playground"] == ["judged", "gap-none-0", "gap-track-20", "gap-track-10", "gap-track-40"]
     assert len({plan.seed_of_controllers(name) for name in plan.names}) == 8  # of each sitting
     assert small.n_units == 4
+
+
+def test_plan_of_the_playground_begins_with_a_robot_that_has_its_sensors():
+    plan = PLANS["playground"][0]
+    assert [str(name) for name in plan.names] == ["playground-31"]
+    robot = choose_condition(plan.study, None, plan.seed).on.robot
+    assert all(sensor.keeps_edge for sensor in robot.range)
 
 
 def test_plan_of_fresh_twins_shares_no_twin_and_no_controllers_with_the_first():

@@ -52,7 +52,14 @@ def test_the_issue_s_robots_are_there():
         for board in ("", "-fluke1", "-fluke2")
         for box in ("", "-cardboard")
     }
-    assert set(robot_names()) == scribblers | {"jyro", "pioneer", "khepera", "e-puck", "thymio"}
+    assert set(robot_names()) == scribblers | {
+        "jyro",
+        "pioneer",
+        "khepera",
+        "e-puck",
+        "thymio",
+        "thymio-playground",
+    }
 
 
 def test_jyro_is_what_the_platform_jyro_drives():
@@ -140,6 +147,25 @@ def test_each_is_put_into_every_entry_and_base_below(write):
     robot = load_robot(write('base = "mine.toml"\n[drive]\nspeed = 0.2\n', "other.toml"))
     assert [sensor.reach for sensor in robot.range] == [0.3, 0.4]
     assert (robot.name, robot.drive.speed, robot.drive.track) == ("other", 0.2, 0.05)
+
+
+def test_each_without_entries_is_put_over_every_entry_of_the_base(write):
+    sensors = "[[range]]\nx = 0\ny = 0\nreach = 0.3\n[[range]]\nx = 0.02\ny = 0\nreach = 0.4\n"
+    write(SMALL + sensors)
+    robot = load_robot(write('base = "mine.toml"\n[each.range]\nreach_mm = 250\n', "other.toml"))
+    assert [(sensor.x, sensor.reach) for sensor in robot.range] == [(0, 0.25), (0.02, 0.25)]
+    with pytest.raises(
+        DescriptionError, match=r"\[each.line\] is only for \[\[line\]\], of which there are none"
+    ):
+        load_robot(write('base = "mine.toml"\n[each.line]\nnoise = 0.1\n', "third.toml"))
+
+
+def test_thymio_of_the_playground_differs_by_what_its_rays_keep():
+    robot, real = load_robot("thymio-playground"), load_robot("thymio")
+    assert all(sensor.keeps_edge for sensor in robot.range)
+    assert robot.numbers() == real.numbers()
+    assert RobotModel.from_dict(robot.to_dict()).range == robot.range
+    assert "keeps_edge" not in real.to_dict()["range"][0]
 
 
 @pytest.mark.parametrize(
@@ -295,6 +321,11 @@ def test_a_lorentz_sensor_keeps_its_numbers_and_others_do_not_have_them(write):
         ("cone_deg = 15", "cone_deg = 90", "expected less than pi / 2"),
         ("peak_mm = 0.3", "peak_mm = 85", "peak is 0.085, expected less than half_width, 0.085"),
         ("half_width_mm = 85", "half_width_mm = 0", "more than 0"),
+        (
+            'response = "lorentz"',
+            "keeps_edge = true",
+            "keeps_edge is true, expected false with response 'linear'",
+        ),
     ],
 )
 def test_a_lorentz_sensor_that_cannot_be_is_refused(write, old, new, expected):

@@ -24,7 +24,8 @@ def closing(
         typer.Option(
             metavar="PLAN",
             help="Plan of the study. twins: MuJoCo twins of a Scribbler. fresh: other twins and "
-            "controllers, without transfer. thymio: a Thymio in Enki and in Aseba's playground.",
+            "controllers, without transfer. thymio: a Thymio in Enki and in Aseba's playground. "
+            "playground: the same, with its infrared sensors.",
         ),
     ] = "twins",
     twins: Annotated[

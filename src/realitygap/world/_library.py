@@ -135,7 +135,10 @@ def _with_base(values: dict[str, Any], origin: str, chain: list[str]) -> dict[st
         raise DescriptionError(f"{origin}: turned is {turned!r}, expected true or false.")
     below, _ = _robot_values(_beside(base, origin), chain)
     sources = [*_texts(below.get("sources")), *_texts(values.get("sources"))]
-    merged = _laid_over(_turned(below, origin) if turned else below, values)
+    below = _turned(below, origin) if turned else dict(below)
+    for kind, common in values.pop("each", {}).items():
+        _put_into_each(below, kind, common, origin, is_over=True)
+    merged = _laid_over(below, values)
     return merged | ({"sources": sources} if sources else {})
 
 
@@ -157,19 +160,31 @@ def _texts(value: Any) -> list[Any]:
 
 
 def _values_of(file: Traversable, origin: str) -> dict[str, Any]:
-    """The values of a robot's file in SI units, what [each.KIND] says put into every entry of that kind."""
+    """The values of a robot's file in SI units, what [each.KIND] says put into every entry of that kind.
+
+    `each` stays for those kinds of which only the robot's base has entries.
+    """
     values = _checked(origin, lambda: in_si(read_toml(file, origin)))
     each = values.pop("each", {})
     if not isinstance(each, dict):
         raise DescriptionError(f"{origin}: each is {each!r}, expected tables such as [each.range].")
-    for kind, common in each.items():
-        entries = values.get(kind)
-        if not isinstance(entries, list) or not isinstance(common, dict):
-            raise DescriptionError(
-                f"{origin}: [each.{kind}] is only for [[{kind}]], of which there are none."
-            )
-        values[kind] = [common | entry if isinstance(entry, dict) else entry for entry in entries]
-    return values
+    for_base = {kind: common for kind, common in each.items() if "base" in values and kind not in values}
+    for kind in each.keys() - for_base.keys():
+        _put_into_each(values, kind, each[kind], origin)
+    return values | ({"each": for_base} if for_base else {})
+
+
+def _put_into_each(
+    values: dict[str, Any], kind: str, common: Any, origin: str, *, is_over: bool = False
+) -> None:
+    """Put values that all entries of a kind have in common below those of each entry, or over them."""
+    entries = values.get(kind)
+    if not isinstance(entries, list | tuple) or not entries or not isinstance(common, dict):
+        raise DescriptionError(f"{origin}: [each.{kind}] is only for [[{kind}]], of which there are none.")
+    values[kind] = [
+        (entry | common if is_over else common | entry) if isinstance(entry, dict) else entry
+        for entry in entries
+    ]
 
 
 def _laid_over(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:

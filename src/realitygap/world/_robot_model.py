@@ -184,6 +184,11 @@ class RangeSensor(Settings):
         0.0,
         description="P of lorentz: the distance at which a reading is largest [m]; nearer it stays so. Less than W.",
     )
+    keeps_edge: bool = Field(
+        False,
+        description="True: a ray of lorentz that meets nothing adds what it would add at the reach, if another ray "
+        "meets something. False: it adds nothing.",
+    )
     compression: NotNegative = Field(
         0.0,
         description="c of ir: of the light x the sensor reads ln(1 + c x) / c, after noise_gain, up to 1. 0: x.",
@@ -206,6 +211,8 @@ class RangeSensor(Settings):
             raise ValueError("expected the table's rows by growing distance, each once")
         if self.response == "lorentz":
             self._check_lorentz()
+        elif self.keeps_edge:
+            raise ValueError(f"keeps_edge is true, expected false with response {self.response!r}")
         return self
 
     def _check_lorentz(self) -> None:
@@ -222,7 +229,7 @@ class RangeSensor(Settings):
     def _without_later_numbers(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
         """Leave out newer numbers that are not used, so that older conditions keep their hashes."""
         lorentz = {} if self.response == "lorentz" else {"half_width": 0.1, "peak": 0.0}
-        return _without(handler(self), lorentz | {"compression": 0.0})
+        return _without(handler(self), lorentz | {"keeps_edge": False, "compression": 0.0})
 
 
 class LightSensor(Settings):

@@ -131,7 +131,7 @@ def _model(robot: RobotModel, number: int, placements: list[Placement], weight: 
     if sensor.response == "pulses":
         return PulseReadings(placements, sensor.reach, sensor.pulses, weight, sensor)
     if sensor.response == "lorentz":
-        return LorentzReadings(placements, sensor.reach, sensor.peak, sensor.cone, weight)
+        return LorentzReadings(placements, sensor, weight)
     return MixtureReadings(placements, sensor.reach, weight, sensor)
 
 

@@ -37,8 +37,9 @@ FASTEST = 8.0
 """Largest speed with which a playground was found to keep up, on two cores."""
 LACKS = (
     "Aseba's playground differs from a Thymio: it reports targets as the speeds of the wheels, so there are no "
-    "encoders and no stall; at a wall the robot slides and does not turn; infrared sensors do not see colors; its "
-    "noise has no seed, so a trial cannot be repeated exactly."
+    "encoders and no stall; at a wall the robot slides and does not turn; infrared sensors do not see colors, "
+    "and a ray that has lost a wall keeps its last reading; its noise has no seed, so a "
+    "trial cannot be repeated exactly."
 )
 INNER_PORT = 33333
 START_S = 10.0

@@ -197,8 +197,8 @@ def widening_of(cone, widening):
 
 
 @inlined
-def _lorentz_of(d, reach, amplitude, half_width, peak):
-    """F(d) of `lorentz_response`."""
+def _uncut_lorentz_of(d, amplitude, half_width, peak):
+    """F(d) of `lorentz_response`, also beyond the reach."""
     real = type(d)
     past = d - peak
     width = half_width * half_width - peak * peak
@@ -207,7 +207,15 @@ def _lorentz_of(d, reach, amplitude, half_width, peak):
     is_near = (past <= real(0.0)) | (below <= real(0.0))
     share = width / (real(1.0) if is_near else below)
     share = real(1.0) if is_near else share
-    return amplitude * share if d < reach else real(0.0)
+    return amplitude * share
+
+
+@inlined
+def _lorentz_of(d, reach, amplitude, half_width, peak):
+    """F(d) of `lorentz_response`."""
+    real = type(d)
+    uncut = _uncut_lorentz_of(d, amplitude, half_width, peak)
+    return uncut if d < reach else real(0.0)
 
 
 @stage
@@ -253,6 +261,27 @@ def lorentz_response(distances, reach, amplitude, half_width, peak, widening, re
         _add_lorentz(distances[ray], reach, amplitude, half_width, peak, reading)
     if rays > 1:
         _take_off_twice(distances[rays >> 1], widening, reach, amplitude, half_width, peak, reading)
+
+
+@stage
+def add_edges(distances, near, reach, amplitude, half_width, peak, reading):
+    """Add F(reach) of `lorentz_response` for each ray that meets nothing, if another ray meets something.
+
+    Source: Enki 1.6.99 (S. Magnenat), where such a ray keeps the last value that it had.
+    Differs: The last value is taken at the reach, where most rays lose a wall.
+
+    Args:
+        distances: (1 or 3, LANES) d [m].
+        near: (LANES,) the least of them [m].
+        reach, amplitude, half_width, peak: As in `lorentz_response`.
+        reading: Changed.
+    """
+    real = reading.dtype.type
+    for ray in range(distances.shape[0]):
+        for lane in range(LANES):
+            is_lost = (distances[ray, lane] >= reach[lane]) & (near[lane] < reach[lane])
+            edge = _uncut_lorentz_of(reach[lane], amplitude[lane], half_width[lane], peak[lane])
+            reading[lane] = reading[lane] + (edge if is_lost else real(0.0))
 
 
 @stage

@@ -24,6 +24,7 @@ from .light import add_light, answer_light, look_to, prepare_light
 from .noise import PER_BLOCK, gain_noise, mixture, second_word, uniform_noise
 from .pulses import count_pulses, pulse_words
 from .ranges import (
+    add_edges,
     compress,
     ir_response,
     limit,
@@ -36,7 +37,18 @@ from .ranges import (
     table_response,
     widening_of,
 )
-from .shape import HALF_SHADOWS, IDLER, IR, LINEAR, LORENTZ, NO_SHADOWS, PULSES, RANGE_NUMBERS, TABLE
+from .shape import (
+    HALF_SHADOWS,
+    IDLER,
+    IR,
+    LINEAR,
+    LORENTZ,
+    LORENTZ_EDGES,
+    NO_SHADOWS,
+    PULSES,
+    RANGE_NUMBERS,
+    TABLE,
+)
 from .sight import answer_bump, gap_of_point, shade_light
 from .stall import idler_stall, prepare_stall
 from .words import blocks_of, draw_words_of
@@ -165,7 +177,7 @@ def _start_range(shape, p, senses):
         rate_of(p[row + OUTLIER_WIDTH], senses.range_rates[3 * s + 2])
         if shape.range_response[s] == TABLE:
             prepare_table(p[row + N_RANGE : row + N_RANGE + 2 * shape.range_table[s]])
-        if shape.range_response[s] == LORENTZ:
+        if shape.range_response[s] == LORENTZ or shape.range_response[s] == LORENTZ_EDGES:
             widening_of(p[row + CONE], senses.range_rates[3 * s])
         senses.noisy[0] |= _any(p[row + UNIFORM])
         senses.slanted[0] |= _any(p[row + INCIDENCE])
@@ -220,11 +232,11 @@ def _respond(shape, lanes, senses):
             linear_response(near, p[row + REACH], reading)
         elif kind == TABLE:
             table_response(near, p[row + N_RANGE : row + N_RANGE + 2 * shape.range_table[s]], reading)
-        elif kind == LORENTZ:
-            lorentz_response(
-                rays, p[row + REACH], p[row + AMPLITUDE], p[row + HALF_WIDTH], p[row + PEAK],
-                senses.range_rates[3 * s], reading,
-            )  # fmt: skip
+        elif kind == LORENTZ or kind == LORENTZ_EDGES:
+            law = p[row + REACH], p[row + AMPLITUDE], p[row + HALF_WIDTH], p[row + PEAK]
+            lorentz_response(rays, law[0], law[1], law[2], law[3], senses.range_rates[3 * s], reading)
+            if kind == LORENTZ_EDGES:
+                add_edges(rays, near, law[0], law[1], law[2], law[3], reading)
         elif senses.slanted[0] > 0:
             slanted_response(
                 rays, lanes.rates[shape.first_ray[s] : shape.first_ray[s + 1]], p[row + REACH], p[row + AMPLITUDE],

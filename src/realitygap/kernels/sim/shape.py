@@ -23,8 +23,15 @@ WHEELS, INDEPENDENT = 0, 1
 MIXINGS = {"wheels": WHEELS, "independent": INDEPENDENT}
 
 # How a range sensor answers.
-LINEAR, IR, TABLE, PULSES, LORENTZ = 0, 1, 2, 3, 4
-RESPONSES = {"linear": LINEAR, "ir": IR, "table": TABLE, "pulses": PULSES, "lorentz": LORENTZ}
+LINEAR, IR, TABLE, PULSES, LORENTZ, LORENTZ_EDGES = 0, 1, 2, 3, 4, 5
+RESPONSES = {
+    "linear": LINEAR,
+    "ir": IR,
+    "table": TABLE,
+    "pulses": PULSES,
+    "lorentz": LORENTZ,
+    "lorentz_edges": LORENTZ_EDGES,
+}
 
 # What says that a robot stalls: contact that held it up, or an idler wheel as in an S2.
 BLOCKED, IDLER = 0, 1
@@ -262,7 +269,7 @@ def make_sim_shape(
         substeps, late_substeps: Parts of a step in which contact is looked for, of the new command and of the
             old one that goes on before it (`substeps_for`).
         stall: "blocked" or "idler".
-        range_response: "linear", "ir", "table", "pulses" or "lorentz" for each range sensor.
+        range_response: A key of `RESPONSES` for each range sensor.
         range_rays, range_table, range_pulses: Rays (1 or odd), entries of the table, and pulses of each.
         encoders: Whether wheel encoders are read; they are where networks see them.
         n_light, n_line, n_bump: Other sensors.

@@ -260,7 +260,7 @@ def largest(value: float | Distribution) -> float:
 
 def _sensors(robot: RobotModel) -> dict[str, Any]:
     return {
-        "range_response": [sensor.response for sensor in robot.range],
+        "range_response": [sensor.response + "_edges" * sensor.keeps_edge for sensor in robot.range],
         "range_rays": [sensor.rays for sensor in robot.range],
         "range_table": [len(sensor.table) for sensor in robot.range],
         "range_pulses": [sensor.pulses for sensor in robot.range],

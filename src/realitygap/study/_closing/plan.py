@@ -176,10 +176,23 @@ FRESH = replace(
 The methods were fixed before any of these twins was drawn.
 """
 
+PLAYGROUND = replace(
+    THYMIO,
+    study="sim-thymio-playground",
+    families=("playground",),
+    twins=1,
+    first_seed=31,
+    observations=("track",),
+    fewer={},
+    controllers_seed=2026112900,
+)
+"""A Thymio in Aseba's playground, from a robot file that has its infrared sensors."""
+
 PLANS = {
     "twins": (TWINS, SMALL),
     "fresh": (FRESH, replace(FRESH, families=SMALL.families, controllers_seed=1, **_FEW)),
     "thymio": (THYMIO, replace(THYMIO, families=("enki",), controllers_seed=1, **_FEW)),
+    "playground": (PLAYGROUND, replace(PLAYGROUND, controllers_seed=1, **_FEW)),
 }
 """The plans by name: at full size, and small."""
 

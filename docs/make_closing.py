@@ -16,7 +16,7 @@ import csv
 import io
 import json
 import subprocess
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -75,7 +75,7 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
 def sentences(summary: dict[str, Any]) -> str:
     """What the page says in numbers, as paragraphs of Markdown."""
-    plan, goals = summary["plan"], summary["goals"]
+    plan = summary["plan"]
     done = (
         f"All {summary['n_units']} parts of the study are done."
         if summary["n_done"] == summary["n_units"]
@@ -95,15 +95,26 @@ def sentences(summary: dict[str, Any]) -> str:
     )
     if (plan["twins"], len(plan["families"])) < (10, 4):
         counted += " **This is less than the whole study. It shows only that every part works.**"
-    names = {True: [], False: [], None: []}  # type: dict[bool | None, list[str]]
-    for goal in goals:
+    parts = [
+        size,
+        counted,
+        *verdicts(summary),
+        *_of_stretch(summary),
+        *not_counted(summary),
+        *_reasons(summary),
+    ]
+    return "\n\n".join([*parts, *_of_order(summary)]) + "\n"
+
+
+def verdicts(summary: Mapping[str, Any]) -> list[str]:
+    """Return the goals that are met, open, and missed, as lists of Markdown."""
+    names: dict[bool | None, list[str]] = {True: [], False: [], None: []}
+    for goal in summary["goals"]:
         names[goal["met"]].append(goal["name"])
-    verdict = "\n\n".join(
+    return [
         "\n".join([f"{word}:", "", *(f"* {name}" for name in names[met] or [NOTHING])])
         for met, word in ((True, "Met"), (None, "Open"), (False, "Missed"))
-    )
-    parts = [size, counted, verdict, *_of_stretch(summary), *not_counted(summary), *_reasons(summary)]
-    return "\n\n".join([*parts, *_of_order(summary)]) + "\n"
+    ]
 
 
 def _of_stretch(summary: dict[str, Any]) -> list[str]:

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from make_closing import table
+from make_closing import table, verdicts
 from numpy.typing import NDArray
 
 from realitygap.report import FAMILY_HEAD, GOAL_HEAD, draw_closing, family_table, goal_table
@@ -53,14 +53,7 @@ def words(summary: Summary) -> str:
     sizes = ", ".join(
         f"{plan['fewer'].get(family, plan['twins'])} with `{family}`" for family in plan["families"]
     )
-    names: dict[bool | None, list[str]] = {True: [], False: [], None: []}
-    for goal in summary["goals"]:
-        names[goal["met"]].append(goal["name"])
-    verdicts = [
-        f"{word}:\n\n" + "\n".join(f"* {name}" for name in names[met] or ["none"])
-        for met, word in ((True, "Met"), (None, "Open"), (False, "Missed"))
-    ]
-    return "\n\n".join([f"Sittings: {sizes}. {done}", *verdicts, *_flagged(summary)]) + "\n"
+    return "\n\n".join([f"Sittings: {sizes}. {done}", *verdicts(summary), *_flagged(summary)]) + "\n"
 
 
 def _flagged(summary: Summary) -> Iterable[str]:

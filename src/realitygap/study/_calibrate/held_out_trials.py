@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -24,6 +24,9 @@ LEAST_TRIALS = 5
 
 N_ROBOTS = 100
 """Simulated robots whose mean is a prediction."""
+
+LEAST_ERROR = 1e-6
+"""A smaller share of the variance counts as this one."""
 
 Numbers = tuple[Mapping[str, float], Mapping[str, Sequence[float] | Floats]]
 """The estimate and draws of the robot's numbers, by dotted name."""
@@ -95,15 +98,23 @@ def compare_on_trials(
     if not seen:
         return parts
     compared = Compared(
-        f"share of the variance of {len(unseen)} held-out trials of {len(trials)} that is not predicted, mean over "
-        f"{', '.join(seen)}",
+        f"share of the variance of {len(unseen)} held-out trials of {len(trials)} that is not predicted, "
+        f"geometric mean over {', '.join(seen)}",
         "",
         len(unseen),
-        {name: float(np.mean(list(errors.values()))) for name, errors in by_kind.items()},
+        {name: _mean_error(errors.values()) for name, errors in by_kind.items()},
         {kind: {name: errors[kind] for name, errors in by_kind.items()} for kind in seen},
     )
     found = {**parts.evidence, "held_out": compared.to_dict()}
     return replace(parts, notes=(_advice(compared, len(trials)), *parts.notes), evidence=found)
+
+
+def _mean_error(errors: Iterable[float]) -> float:
+    """Return the geometric mean over kinds of observation, to which each kind contributes by its ratios.
+
+    In an arithmetic mean, a kind that nothing predicts well outweighs one that the numbers predict well.
+    """
+    return float(np.exp(np.mean(np.log(np.maximum(list(errors), LEAST_ERROR)))))
 
 
 def _center(value: float | Distribution) -> float:
@@ -120,7 +131,8 @@ def _advice(compared: Compared, n: int) -> str:
     errors = compared.errors
     text = (
         f"{compared.n} of {n} trials were held out. A fit to the others leaves {errors[FITTED]:.3g} of their variance "
-        f"unexplained, draws of its posterior {errors[POSTERIOR]:.3g}, and the numbers that it started from "
+        f"unexplained (geometric mean over kinds of observation), draws of its posterior {errors[POSTERIOR]:.3g}, and the "
+        f"numbers that it started from "
         f"{errors[NOMINAL]:.3g}."
     )
     advice = {

@@ -131,9 +131,8 @@ def _advice(compared: Compared, n: int) -> str:
     errors = compared.errors
     text = (
         f"{compared.n} of {n} trials were held out. A fit to the others leaves {errors[FITTED]:.3g} of their variance "
-        f"unexplained (geometric mean over kinds of observation), draws of its posterior {errors[POSTERIOR]:.3g}, and the "
-        f"numbers that it started from "
-        f"{errors[NOMINAL]:.3g}."
+        f"unexplained (geometric mean over kinds of observation), draws of its posterior {errors[POSTERIOR]:.3g}, and "
+        f"the numbers that it started from {errors[NOMINAL]:.3g}."
     )
     advice = {
         FITTED: "Use this calibration.",

@@ -1,11 +1,13 @@
 """The study of a Thymio in other simulators: tables, figures and sentences of the page "Closing the gap to a Thymio".
 
     uv run python docs/make_closing_thymio.py results/closing-the-gap-thymio
+    uv run python docs/make_closing_thymio.py results/closing-the-gap-playground --playground
     uv run python docs/make_closing_thymio.py    # without results: tables and sentences from the stored data
 
 With results of `realitygap closing-the-gap --plan thymio`, complete or not, it writes the data of the page:
-summary.json, with the mean coverage of each held-out controller. Tables and sentences follow from it; figures are drawn
-from the results. The study takes an hour and is not run here.
+summary.json, with the mean coverage of each held-out controller. Tables, sentences, and figures follow from it. With
+--playground, the results are those of the plan `playground`, and two tables follow. Each study takes an hour and is not
+run here.
 """
 
 from __future__ import annotations
@@ -139,24 +141,30 @@ def main() -> None:
     parser.add_argument(
         "folder", type=Path, nargs="?", help="results of `realitygap closing-the-gap --plan thymio`"
     )
-    folder = parser.parse_args().folder
-    for place in (TABLES, FIGURES):
-        place.mkdir(parents=True, exist_ok=True)
+    parser.add_argument("--playground", action="store_true", help="results of the plan `playground`")
+    options = parser.parse_args()
+    place = TABLES / "playground" if options.playground else TABLES
+    for each in (place, FIGURES):
+        each.mkdir(parents=True, exist_ok=True)
     summary = (
-        json.loads((TABLES / "summary.json").read_text("utf-8"))
-        if folder is None
-        else summarize_closing(folder)
+        json.loads((place / "summary.json").read_text("utf-8"))
+        if options.folder is None
+        else summarize_closing(options.folder)
     )
     files = {
-        TABLES / "goals.csv": table(GOAL_HEAD, goal_table(summary)),
-        TABLES / "budgets.csv": table(FAMILY_HEAD, family_table(summary)),
-        TABLES / "sittings.csv": table(SITTING_HEAD, sitting_table(summary)),
-        TABLES / "residuals.csv": table(RESIDUAL_HEAD, residual_table(summary)),
-        TABLES / "words.md": words(summary),
-        TABLES / "summary.json": json.dumps(summary, separators=(",", ":")) + "\n",
+        place / "goals.csv": table(GOAL_HEAD, goal_table(summary)),
+        place / "sittings.csv": table(SITTING_HEAD, sitting_table(summary)),
+        place / "summary.json": json.dumps(summary, separators=(",", ":")) + "\n",
     }
-    for name, drawing in draw_closing(summary).items():
-        files[FIGURES / f"{name}.svg"] = drawing.svg + "\n"
+    if not options.playground:
+        files |= {
+            place / "budgets.csv": table(FAMILY_HEAD, family_table(summary)),
+            place / "residuals.csv": table(RESIDUAL_HEAD, residual_table(summary)),
+            place / "words.md": words(summary),
+        }
+        files |= {
+            FIGURES / f"{name}.svg": drawing.svg + "\n" for name, drawing in draw_closing(summary).items()
+        }
     for path, text in files.items():
         path.write_text(text, "utf-8")
         print(f"Written: {path}")

@@ -203,6 +203,18 @@ def test_levels_of_twins_are_those_of_the_means_of_controllers():
         assert np.abs((target - source).mean(axis=1) - levels).max() < 1e-6
 
 
+def test_tables_of_the_sitting_with_the_playground_follow_from_its_data():
+    make_closing_thymio = _load("make_closing_thymio")
+    place = make_closing_thymio.TABLES / "playground"
+    summary = json.loads((place / "summary.json").read_text("utf-8"))
+    rows = make_closing_thymio.sitting_table(summary)
+    text = make_closing_thymio.table(make_closing_thymio.SITTING_HEAD, rows)
+    assert (place / "sittings.csv").read_text("utf-8") == text
+    goals = make_closing_thymio.goal_table(summary)
+    text = make_closing_thymio.table(make_closing_thymio.GOAL_HEAD, goals)
+    assert (place / "goals.csv").read_text("utf-8") == text
+
+
 @pytest.mark.slow
 def test_last_of_the_earlier_runs_is_the_one_on_the_page():
     make_closing = _load("make_closing")

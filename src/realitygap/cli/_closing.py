@@ -166,7 +166,7 @@ def _print(summary: dict[str, Any]) -> None:
 
     of, label = len(summary["twins"]), summary["label"]
     if summary["plan"]["platforms"]:
-        typer.echo(f"{of} sittings ({label}), each with its own held-out controllers")
+        typer.echo(f"{of} sitting{'s' * (of != 1)} ({label}), each with its own held-out controllers")
     else:
         typer.echo(
             f"{of} twins ({label}), of which {summary['n_counted']} differ from the simulator (SIM) by more than three "

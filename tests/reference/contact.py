@@ -14,6 +14,7 @@ Pose = tuple[float, float, float]
 
 CLEAR = 2e-6  # how far a body that was pushed is free [m]
 SUBSTEPS, RESCUES = 4, 4
+OPPOSED = -0.6  # cosine between the normals of two straight pushes, below which a body is wedged
 LEAST_GIVE, MOST_TURN = 0.05, 0.25
 SECANTS = 4
 
@@ -264,10 +265,14 @@ def step(body: Body, start: Pose, world: World, length: float, turn: float) -> P
             pose = pushed(body, pose, before, world)
     if body.model == "freeze":
         return start if blocked else pose
+    last = (0.0, 0.0)
     for _ in range(RESCUES):
         touch = deepest(body, pose, world)
         if touch.gap > 0:
             return pose
+        if touch.normal[0] * last[0] + touch.normal[1] * last[1] < OPPOSED:
+            return start
+        last = touch.normal
         deep = CLEAR - touch.gap
         pose = (pose[0] + deep * touch.normal[0], pose[1] + deep * touch.normal[1], pose[2])
     return pose if deepest(body, pose, world).gap > 0 else start

@@ -26,6 +26,7 @@ STALL_SHARE = 0.5  # of what was asked, of which less is done where a robot stal
 SLIGHT = 0.05  # of all that was asked, below which nothing stalls
 N_SECANTS = 4  # of grip, each to the slip that the one before leads to
 N_RESCUES = 4  # straight pushes at the end of a step before it is refused
+OPPOSED = -0.6  # cosine of the angle between the normals of two pushes, below which a body is wedged
 
 
 @stage
@@ -60,16 +61,32 @@ def _note_touch(gap, low):
 
 
 @stage
-def _push_straight(contact, pose):
-    """Move bodies that touch something straight away from it."""
+def _push_straight(contact, facing_before, beside_before, pose, active):
+    """Move bodies that touch something straight away from it, except wedged ones, and flag those that moved.
+
+    A body is wedged if it came from the opposite side. It stays where it is, and is wedged at the next call, too.
+
+    Args:
+        contact: The deepest contact.
+        facing_before, beside_before: Normal of the last push, written; 0 before the first push.
+        pose: Written.
+        active: Written.
+    """
     x, y, sine, cosine = pose.x, pose.y, pose.sine, pose.cosine
     gap, facing, beside = contact.gap, contact.facing, contact.beside
     real = gap.dtype.type
     for k in range(LANES):
         now = gap[k]
-        deep = real(CLEAR) - now if now <= real(0.0) else real(0.0)
-        x[k] = x[k] + deep * (facing[k] * cosine[k] - beside[k] * sine[k])
-        y[k] = y[k] + deep * (facing[k] * sine[k] + beside[k] * cosine[k])
+        a = facing[k]
+        b = beside[k]
+        is_wedged = a * facing_before[k] + b * beside_before[k] < real(OPPOSED)
+        moves = (now <= real(0.0)) & (not is_wedged)
+        deep = real(CLEAR) - now if moves else real(0.0)
+        x[k] = x[k] + deep * (a * cosine[k] - b * sine[k])
+        y[k] = y[k] + deep * (a * sine[k] + b * cosine[k])
+        facing_before[k] = -a if is_wedged else a
+        beside_before[k] = -b if is_wedged else b
+        active[k] = real(TOUCHES) if moves else real(0.0)
 
 
 @stage
@@ -167,10 +184,18 @@ def _answer_part(shape, p, seconds, parts, near, sweep):
 
 @kernel
 def _leave_free(near, sweep):
-    """Push what still touches something straight out, and where that fails go back to the beginning of the step."""
+    """Push what still touches something straight out, and where that fails go back to the beginning of the step.
+
+    Returns:
+        Whether to look again, at what was pushed.
+    """
+    if sweep == 0:
+        for row in range(2):
+            fill(near.pushes[row], near.low.dtype.type(0.0))
     if sweep < N_RESCUES:
-        _push_straight(near.first, near.pose)
-        return True
+        _push_straight(near.first, near.pushes[0], near.pushes[1], near.pose, near.active)
+        if any_above_zero(near.active):
+            return True
     _put_back_places(near.first.gap, near.start, near.pose)
     _put_back_turns(near.first.gap, near.start, near.pose)
     return False
@@ -224,8 +249,9 @@ def _resolve(shape, lanes, near):
                 else _leave_free(near, sweep)
             )
         if again:
-            # What does not touch has not moved.
-            _flag_touching(near.first.gap, near.active)
+            if part < last:
+                # What does not touch has not moved.
+                _flag_touching(near.first.gap, near.active)
             sweep += 1
             continue
         if part < last and shape.contact != FREEZE:

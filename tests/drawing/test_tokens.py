@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import re
+import xml.etree.ElementTree as ET
 from importlib import resources
 
 import pytest
 
-from realitygap.drawing import Ink
+from realitygap.drawing import Ink, Line, Picture, themed_file
 
 SHEET = resources.files("realitygap.drawing").joinpath("tokens.css").read_text("utf-8")
 LIGHT, DARK = (dict(re.findall(r"--([\w-]+): (#\w{6});", part)) for part in (SHEET.partition("@media")[::2]))
@@ -38,3 +39,15 @@ def test_words_can_be_read_on_their_grounds(colors):
     for ink in ("text", "muted", "accent", "danger", "ok", "warn", "violet"):
         for ground in ("ground", "card"):
             assert contrast(colors[ink], colors[ground]) >= 4.5, (ink, ground)
+
+
+def test_picture_as_a_file_is_dark_on_a_dark_page_and_light_without_styles():
+    picture = Picture("title", "text", 0.0, 0.0, 1.0, 1.0, (Line(((0.0, 0.0), (1.0, 1.0)), "#000000"),))
+    styled = '<svg><path style="fill: #1c1f24; stroke: #fefefe"/></svg>'
+    for svg in (picture.to_svg(), styled):
+        root = ET.fromstring(themed_file(svg))
+        rules = root[0].text or ""
+        assert "(prefers-color-scheme: dark)" in rules
+        assert "--ink-text: #e6e8eb" in rules
+        assert "var(--ink-text, #" in themed_file(svg)
+        assert "var(--ink-ground, #fefefe)" in themed_file(svg)

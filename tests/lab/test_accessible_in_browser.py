@@ -130,7 +130,13 @@ def test_a_calibration_whose_plot_grows_and_its_result(lab, look):
     open_advanced(page, page.get_by_label("Number of trials"))
     page.get_by_label("Number of trials").fill("4")
     page.get_by_role("button", name="Calibrate", exact=True).click()
-    page.locator(".lab-plot").wait_for()
+    page.locator(".lab-plot text").first.wait_for()
     assert faults(page, lab.root) == []
+    inks = []
+    for theme in ("light", "dark"):
+        page.emulate_media(color_scheme=theme)
+        inks.append(page.locator(".lab-plot text").first.evaluate("text => getComputedStyle(text).fill"))
+    assert inks == ["rgb(28, 31, 36)", "rgb(230, 232, 235)"]
+    page.emulate_media(color_scheme="light")
     page.get_by_role("button", name="Use in a study").wait_for()
     assert faults(page, lab.root) == []

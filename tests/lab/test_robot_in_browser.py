@@ -154,7 +154,12 @@ def test_lost_link_disables_the_pad_and_keeps_the_last_readings_with_their_age(v
         page.get_by_label("Port", exact=True).fill(server.name)
         page.get_by_role("button", name="Connect", exact=True).click()
         page.get_by_text("Standing", exact=True).wait_for()
+        assert page.locator(".lab-chip").inner_text() == f"Robot on {server.name}"
+    page.locator(".lab-robot-silent .lab-chip", has_text="no readings").wait_for()
+    assert page.get_by_role("button", name="Stop robot").is_visible()
     page.get_by_role("button", name="Retry").wait_for()
+    page.locator(".lab-robot-lost .lab-chip", has_text="link lost").wait_for()
+    assert not page.get_by_role("button", name="Stop robot").is_visible()  # it would reach no robot
     page.get_by_text(re.compile(r"Last reading \d+ s ago")).wait_for()
     page.locator('.lab-pad[aria-disabled="true"]').wait_for()
     page.locator(".lab-stale").wait_for()

@@ -9,6 +9,7 @@ import pytest
 from realitygap.errors import RecordError
 from realitygap.records import ResultsFolder
 from realitygap.report import summarize, write_report
+from realitygap.report._template import packed, template_text
 from realitygap.study import run_study
 from tests.report.results import describe, random_runs, settings, write_results
 
@@ -306,3 +307,17 @@ def test_page_is_small(tiny_html):
 def test_the_study_s_remark_stands_under_its_summary(tmp_path):
     page = write_report(run_study("paper", tmp_path / "r", replicates=1).folder).read_text("utf-8")
     assert page.count("which does not say which search it reports") == 1
+
+
+def test_no_line_ends_between_a_number_and_its_unit(tiny_page):
+    html, _ = tiny_page
+    bare = re.sub(r"<(script|style|svg|pre|code)\b.*?</\1>|<[^>]*>", "|", html, flags=re.DOTALL)
+    assert "95\u00a0%" in bare
+    assert not re.findall(r"\d (?:%|m|s|in)(?!\w)", bare)
+
+
+def test_script_that_shows_values_has_at_most_2_kb(tiny_page):
+    script = packed(template_text("hover.js"))
+    assert len(script.encode()) <= 2048
+    assert script in tiny_page[0]
+    assert "  " not in script

@@ -11,7 +11,7 @@ from ._ink import PENS, Ink
 from ._picture import FONT, Disc, Line, Picture, Point, Shape, Text
 from ._pixels import to_image, to_png
 from ._shown import ShownAsCard, card_of, picture_of, widget_of
-from ._theme import theme_rules, themed, themed_color
+from ._theme import theme_rules, themed, themed_color, themed_file
 from ._x11 import hex_of, rgb_of
 
 __all__ = [
@@ -36,6 +36,7 @@ __all__ = [
     "theme_rules",
     "themed",
     "themed_color",
+    "themed_file",
     "to_image",
     "to_png",
     "widget_of",

@@ -10,6 +10,8 @@ from ._ink import Ink
 
 _BLACK = "#000000"
 _COLOR = re.compile('"(' + "|".join(Ink.names().values()) + f')"|(?<=stroke=)"({_BLACK})"')
+_STYLED = re.compile("(?<=: )(" + "|".join(Ink.names().values()) + ')(?=[;"])')
+"""A color within a `style` attribute, as matplotlib writes it."""
 _NAMES = {color: name for name, color in Ink.names().items()} | {_BLACK: "text"}
 """A black line, such as a wall of Jyro's, would vanish on a dark ground; black areas have an outline or a ground."""
 
@@ -33,14 +35,28 @@ def theme_rules(selector: str) -> str:
     Args:
         selector: A class, such as ".rg-card". Only these elements and what they contain have the variables.
     """
+    light, dark = _rules()
+    pages = ", ".join(f"{page} {selector}" for page in _DARK)
+    by_system = f"@media (prefers-color-scheme: dark) {{ {_NOT_LIGHT} {selector} {{ {dark} }} }}"
+    return f"{selector} {{ {light} }} {pages} {{ {dark} }} {by_system} "
+
+
+@functools.cache
+def _rules() -> tuple[str, str]:
+    """Return the variables of `tokens.css`, light and dark; pictures lie on a card."""
     sheet = resources.files("realitygap.drawing").joinpath("tokens.css").read_text("utf-8")
     light, dark = (
         " ".join(rules.split()) + "; --ink-ground: var(--card);"
         for rules in re.findall(r":root \{(.*?);\s*\}", re.sub(r"/\*.*?\*/", "", sheet), re.DOTALL)
     )
-    pages = ", ".join(f"{page} {selector}" for page in _DARK)
-    by_system = f"@media (prefers-color-scheme: dark) {{ {_NOT_LIGHT} {selector} {{ {dark} }} }}"
-    return f"{selector} {{ {light} }} {pages} {{ {dark} }} {by_system} "
+    return light, dark
+
+
+def themed_file(svg: str) -> str:
+    """Return a picture as a separate SVG file that is dark if the page that shows it is dark."""
+    start, _, rest = svg.partition(">")
+    dark = f"<style>@media screen and (prefers-color-scheme: dark) {{ :root {{ {_rules()[1]} }} }}</style>"
+    return f"{start}>{dark}{_STYLED.sub(lambda match: themed_color(match[1]), themed(rest))}"
 
 
 def themed(svg: str) -> str:

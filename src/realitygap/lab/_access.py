@@ -19,9 +19,10 @@ Headers = list[tuple[bytes, bytes]]
 VISITOR = "realitygap_visitor"
 """The cookie that tells one browser from another."""
 LARGEST_BODY = 32 * 1024 * 1024
-"""Of an upload [bytes]: a photograph of 24 million pixels has a third of it."""
+"""Largest size of an upload [bytes]. A photograph of 24 million pixels has a third of it."""
 _TALK = "/_nicegui_ws/"
-"""Where pages' websockets are; the same without one would go past what is checked."""
+"""Address of the websockets of pages. Other transports at this address are refused, because they would pass
+unchecked."""
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
 
 _POLICY = (
@@ -210,7 +211,7 @@ def _bounded(receive: Receive) -> Receive:
 
 
 def _with_policy(send: Send, visitor: str | None) -> Send:
-    """Answers with the policy, and with a cookie for a browser that has not been here."""
+    """Answer with the policy, and with a cookie for a new browser."""
     cookie = f"{VISITOR}={visitor}; Path=/; HttpOnly; SameSite=Strict; Max-Age=31536000"
 
     async def sent(message: MutableMapping[str, Any]) -> None:

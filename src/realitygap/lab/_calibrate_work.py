@@ -87,7 +87,7 @@ def _tell_made(channel: Channel, made: Calibration, out: Path) -> None:
 
 
 class _Growing:
-    """Tells how many trials there are, and what they read, as they come."""
+    """Reports the number of trials and their readings while they are recorded."""
 
     def __init__(self, channel: Channel, kept: Path, arena: Arena, robot: RobotModel) -> None:
         self._channel, self._kept, self._arena, self._robot = channel, kept, arena, robot
@@ -110,14 +110,14 @@ class _Growing:
 
 
 class _PageOperator(Operator):
-    """Asks at a page for the robot at its place, and what a ruler says."""
+    """Asks an operator at a page to place the robot, and to measure with a ruler."""
 
     def __init__(self, channel: Channel, arena: Arena, robot: RobotModel, growing: _Growing) -> None:
         super().__init__()
         self._channel, self._arena, self._robot, self._growing = channel, arena, robot, growing
 
     def lead(self, plan: TrialPlan, number: int, n: int) -> Led:
-        """Say where the robot has to stand, and wait."""
+        """State where the robot has to stand, and wait for the operator."""
         self._growing.tell(number, n)
         words = placing_words(plan, self._arena, self._robot)
         answer = self._channel.ask("place", text=words, trial=number, n=n).get("answer")
@@ -126,7 +126,7 @@ class _PageOperator(Operator):
         return "redo" if answer == "redo" and number else "go"
 
     def measure(self, plan: TrialPlan, trial: TrialRecord) -> TrialRecord | None:
-        """Ask where a path ended; None where it is to be driven again."""
+        """Ask where a path ended; return None if it is to be driven again."""
         if plan.purpose != "path" or len(trial.poses):
             return trial
         is_straight = plan.commands[0, 0] != 0

@@ -42,6 +42,11 @@ class CalibrationJob(Job):
         return names_a_port(self.platform) and not self.is_over
 
     @property
+    def is_lost(self) -> bool:
+        """Whether a robot was measured, and the link to it has failed."""
+        return self.is_link_lost and bool(self.n_trials) and names_a_port(self.platform)
+
+    @property
     def progress(self) -> str:
         """Progress in words."""
         if self.outcome is not None:

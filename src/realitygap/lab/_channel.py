@@ -14,9 +14,10 @@ from realitygap.errors import RealityGapError
 
 Message = dict[str, Any]
 MOST_EARLY = 100
-"""Messages that are kept until somebody says what to do with them."""
+"""Largest number of messages that are kept until a function handles them."""
 LOOK_S = 0.2
-"""How often who waits looks up [s]: a library lets waits outlast signals; between two an interrupt is seen."""
+"""Longest single wait [s]. An interrupt is handled between two waits, because a library lets a wait outlast a
+signal."""
 
 
 class Channel:
@@ -49,7 +50,7 @@ class Channel:
         return order
 
     def at_once(self, what: str, do: Callable[[Message], None]) -> None:
-        """Have the thread that reads do this, when it comes; what came before is done now."""
+        """Have the reading thread handle these messages as they arrive; handle the earlier ones now."""
         with self._hearing:
             self._at_once[what] = do
             early = [message for message in self._early if message.get("do") == what]
@@ -58,7 +59,7 @@ class Channel:
             do(message)
 
     def say(self, kind: str, **values: Any) -> None:
-        """Tell the server; nothing where it is gone."""
+        """Send a message to the server; do nothing if the server is gone."""
         line = json.dumps({"kind": kind, **values}, separators=(",", ":"))
         with self._lock, contextlib.suppress(OSError, ValueError):
             self._sink.write(line + "\n")

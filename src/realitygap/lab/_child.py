@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 PATIENCE_S = 10.0
-"""Until a process that was told to end is killed [s]: it stops its robot first."""
+"""Time after which a process that was told to end is killed [s]. It stops its robot first."""
 
 
 class Child:
@@ -49,7 +49,7 @@ class Child:
 
     @property
     def is_alive(self) -> bool:
-        """Whether it works still."""
+        """Whether the process is still running."""
         return self._process.poll() is None
 
     @property
@@ -58,15 +58,15 @@ class Child:
         return self._process.pid
 
     def tell(self, message: Mapping[str, Any]) -> None:
-        """Say something to it; nothing where it has ended."""
+        """Send a message to the process; do nothing if the process has ended."""
         self._lines.put(json.dumps(message, separators=(",", ":")) + "\n")
 
     def ask_to_end(self) -> None:
-        """Have it stop what it does, its robot first."""
+        """Ask the process to stop its robot, then its work."""
         self.tell({"do": "quit"})
 
     def end(self) -> None:
-        """Have it end, and wait until it has."""
+        """Ask the process to end, and wait for its end."""
         self.ask_to_end()
         try:
             self._process.wait(PATIENCE_S)
@@ -75,7 +75,7 @@ class Child:
             self._process.wait()
 
     def kill(self) -> None:
-        """Kill it, whatever it is doing."""
+        """Kill the process."""
         self._process.kill()
 
     def _send(self) -> None:

@@ -51,7 +51,7 @@ class CountedTrial:
         return self.trial.trial
 
     def role_of(self, who: str) -> ScoreRole | None:
-        """In which role this person may count it now; None where they cannot."""
+        """Return the role in which this person may count the trial now; None if there is none."""
         if self.trial.state == "driven":
             return "score"
         if self.trial.state != "scored" or who in (self.first, self.second):
@@ -61,7 +61,7 @@ class CountedTrial:
 
 @dataclass(frozen=True)
 class CountCard:
-    """Everything that is shown while a trial is counted.
+    """Facts that a page shows while a trial is counted.
 
     Attributes:
         draft: What they have tapped so far.
@@ -142,11 +142,11 @@ class Counts:
             return self._found
 
     def trials(self) -> list[CountedTrial]:
-        """All trials, as they were at the last look."""
+        """Trials as last read."""
         return self._found
 
     def trial(self, number: int) -> CountedTrial:
-        """A trial by its number.
+        """Return a trial by its number.
 
         Raises:
             LedgerError: There is none.
@@ -193,7 +193,7 @@ class Counts:
         self.score_all({number: draft}, who, role)
 
     def score_all(self, drafts: Mapping[int, Draft], who: str, role: ScoreRole = "score") -> None:
-        """Enter the cells of several trials by their numbers: all of them, or none where one is refused.
+        """Enter the cells of several trials by their numbers; if one is refused, enter none of them.
 
         Raises:
             LedgerError: The ledger does not allow it: the text says why.
@@ -233,7 +233,7 @@ class Counts:
         return self._keeper.submit(keep_draft, self._folder, number, who, role, draft)
 
     def card(self, number: int, who: str, role: ScoreRole) -> CountCard:
-        """Everything that is shown while a trial is counted."""
+        """Return the facts that a page shows while a trial is counted."""
         draft = self.draft(number, who, role)
         arena = self.arena(self.trial(number).trial.condition)
         return CountCard(draft, arena, self.proposals(number), read_drawn(self._folder, number))
@@ -246,7 +246,7 @@ class Counts:
         return next((each for each in self.proposals(number) if mark and each.mark == mark), None)
 
     def undo(self, number: int) -> None:
-        """Take a score back, as far as its generation is not closed."""
+        """Take a score back unless its generation is closed."""
         with self._writing() as ledger:
             ledger.undo(number)
 
@@ -256,13 +256,13 @@ class Counts:
             ledger.void(number, reason[:LONGEST_NOTE])
 
     def note(self, number: int | None, text: str, who: str) -> None:
-        """Keep a note."""
+        """Save a note about a trial."""
         with self._writing() as ledger:
             ledger.note(text[:LONGEST_NOTE], _named(who), number)
 
     @contextlib.contextmanager
     def _writing(self) -> Iterator[Ledger]:
-        """Open the ledger, and look at it again after the writing."""
+        """Open the ledger for writing, and read it again afterwards."""
         with Ledger.open(self._folder / LEDGER_NAME) as ledger:
             yield ledger
         self.look()
@@ -275,7 +275,7 @@ def _named(who: str) -> str:
 
 
 def _changed(folder: Path) -> int:
-    """When a file came into a folder, or left it, last; 0 if there is no folder."""
+    """Return when a file was last added to a folder or removed from it; 0 if there is no folder."""
     try:
         return folder.stat().st_mtime_ns
     except OSError:
@@ -283,7 +283,7 @@ def _changed(folder: Path) -> int:
 
 
 def _stamp(path: Path) -> tuple[Any, ...]:
-    """Changes whenever what can be read of the ledger does; empty while there is none.
+    """Return a value that changes with the readable part of the ledger; empty if there is no ledger.
 
     Files change before what was written to them can be read, by as long as the disk takes to keep it: so the head of
     the index is looked at, which SQLite writes last, and by which it knows itself that there is something new

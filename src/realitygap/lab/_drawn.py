@@ -14,7 +14,7 @@ from realitygap._limits import MOST_JSON_BYTES, parse_json, read_file
 from realitygap.records import refuse_links, write_whole
 
 FOLDER = "lab"
-"""Within a study's folder. What it holds can be lost without harm once its trials are scored."""
+"""Folder within a study's folder. Its files are no longer needed once the trials are scored."""
 
 
 def keep_drawn(folder: Path, trial: int, path: Sequence[Sequence[float]]) -> None:
@@ -27,7 +27,7 @@ def keep_drawn(folder: Path, trial: int, path: Sequence[Sequence[float]]) -> Non
 
 
 def read_drawn(folder: Path, trial: int) -> list[tuple[float, float]]:
-    """The line of a trial [m]; empty where none was kept."""
+    """Return the line of a trial [m]; empty if none was kept."""
     found = read_json(folder / FOLDER / f"line-{trial}.json")
     with contextlib.suppress(TypeError, ValueError, IndexError):
         return [(float(each[0]), float(each[1])) for each in found or ()]
@@ -63,7 +63,7 @@ def read_draft(folder: Path, trial: int, who: str, role: str) -> Draft | None:
 
 
 def forget_draft(folder: Path, trial: int, who: str, role: str) -> None:
-    """It was entered."""
+    """Delete the cells that a visitor has marked, because they were entered."""
     with contextlib.suppress(OSError):
         _draft(folder, trial, who, role).unlink(missing_ok=True)
 

@@ -18,7 +18,7 @@ from realitygap.settings import shown
 from realitygap.study import Study, python_tasks
 
 LONGEST_TEXT = 200_000
-"""Of a study file [letters]."""
+"""Largest length of a study file [letters]."""
 
 _SOCKETS = ("socket", "rfc2217")
 _EMULATORS_FILES = ("arena", "state", "twin")

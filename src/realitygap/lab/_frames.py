@@ -10,7 +10,7 @@ from realitygap._limits import parse_json
 Message = MutableMapping[str, Any]
 
 LONGEST_LOG = 2000
-"""Of what a page reports to the server's log [letters]."""
+"""Largest length of a report of a page to the server's log [letters]."""
 REFUSED = "This is no message of a page of the lab."
 _VIOLATION = 1008
 _TEXTS = ("client_id", "listener_id", "request_id", "tab_id", "document_id", "old_tab_id", "level", "message")

@@ -50,6 +50,11 @@ class GapJob(Job):
         return names_a_port(self.platform) and not self.is_over
 
     @property
+    def is_lost(self) -> bool:
+        """Whether a robot has driven, and the link to it has failed."""
+        return self.is_link_lost and bool(self.trials) and names_a_port(self.platform)
+
+    @property
     def progress(self) -> str:
         """Progress in words."""
         if self.outcome is not None:

@@ -39,7 +39,7 @@ def work(channel: Channel, order: Message) -> None:
 
 
 def _measure(channel: Channel, values: dict[str, Any], page: Path, kept: Path) -> None:
-    """Again and again with more trials of each controller: those of the target are kept and not driven again."""
+    """Measure repeatedly with more trials of each controller. Trials of the target are kept, and never driven again."""
     told = _Telling(channel)
     for trials in rounds(int(values.pop("trials"))):
         found = gap_between(**values, trials=trials, results=kept, tell=told.show)
@@ -82,7 +82,7 @@ def pairs_of(gap: GapStudy) -> dict[str, Any]:
 
 
 def _words(estimate: Estimate) -> str:
-    """A measure with its interval, or why there is none."""
+    """Return a measure with its interval, or the reason for its absence."""
     if estimate.estimate is None:
         return estimate.refused or "not measured"
     text = f"{estimate.estimate:.3f}"
@@ -90,7 +90,7 @@ def _words(estimate: Estimate) -> str:
 
 
 def rounds(trials: int) -> list[int]:
-    """Trials of each controller after which there is a report: 2, 4, 8 and so on, and all."""
+    """Return the numbers of trials of each controller after which there is a report: 2, 4, 8, and so on, and all."""
     steps = [2**k for k in range(1, 13) if 2**k < trials]
     return [*steps, trials]
 

@@ -11,6 +11,9 @@ from realitygap.world import Arena, Grid, Pose
 
 from ._job import MOST_POINTS, Job
 
+SILENT_S = 1.0
+"""Age of the readings from which a robot counts as silent [s]."""
+
 
 class Hand(Job):
     """A robot at its port.
@@ -65,6 +68,16 @@ class Hand(Job):
     def is_lost(self) -> bool:
         """Whether it was connected, and its link has failed."""
         return self.is_failed and self.senses is not None
+
+    @property
+    def age_s(self) -> float:
+        """Age of the last readings [s]; 0 before the first ones."""
+        return 0.0 if self.senses is None else time.monotonic() - self.sensed_s
+
+    @property
+    def is_silent(self) -> bool:
+        """Whether the robot is connected, but has not answered for a while."""
+        return not self.is_over and self.age_s > SILENT_S
 
     @property
     def reply(self) -> str:

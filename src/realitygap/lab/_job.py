@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import threading
+import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, ClassVar
@@ -11,7 +12,7 @@ from typing import Any, ClassVar
 from ._child import Child
 
 MOST_POINTS = 4000
-"""Of the line of a robot that pages are shown: 200 s of it."""
+"""Largest number of points of a robot's line on a page: 200 s."""
 
 
 class Job:
@@ -24,6 +25,8 @@ class Job:
         ask: What somebody has to answer before it goes on; None where nothing waits.
         outcome: What it ended with: a message; None while it goes on.
         is_failed: Whether that was a failure.
+        is_link_lost: Whether it failed because the robot did not answer or did not obey.
+        began_s: Time of its begin, on the monotonic clock [s].
 
     Args:
         order: What the process is told first.
@@ -32,7 +35,7 @@ class Job:
     """
 
     QUIET: ClassVar[frozenset[str]] = frozenset()
-    """What is said so often that pages look for it by themselves."""
+    """Kinds of messages that are so frequent that pages poll for them."""
 
     STOPPED: ClassVar = "Stopped."
     LOST: ClassVar = "Its process ended (status {status})."
@@ -40,7 +43,8 @@ class Job:
     def __init__(self, order: Mapping[str, Any], root: Path, changed: Callable[[], None]) -> None:
         self.ask: dict[str, Any] | None = None
         self.outcome: str | None = None
-        self.is_failed = False
+        self.is_failed = self.is_link_lost = False
+        self.began_s = time.monotonic()
         self._asking = threading.Lock()
         self._changed = changed
         self._child = Child(order, root, self._hear)
@@ -49,6 +53,11 @@ class Job:
     def is_over(self) -> bool:
         """Whether it has ended."""
         return self.outcome is not None
+
+    @property
+    def is_lost(self) -> bool:
+        """Whether it had a robot, and the link to it has failed."""
+        return self.is_link_lost
 
     def answer(self, number: int, **values: Any) -> bool:
         """Answer the question of this number; False where it is not asked any more.
@@ -64,11 +73,11 @@ class Job:
         return True
 
     def ask_to_end(self) -> None:
-        """Have it end, motors first; what was recorded is kept."""
+        """Ask the process to stop its motors and to end. Recorded data are kept."""
         self._child.ask_to_end()
 
     def end(self) -> None:
-        """Have it end, and wait for that."""
+        """Ask the process to end, and wait for its end."""
         self._child.end()
 
     def _hear(self, message: dict[str, Any]) -> None:
@@ -90,6 +99,7 @@ class Job:
                 self.ask = None
 
     def _on_error(self, message: dict[str, Any]) -> None:
+        self.is_link_lost = bool(message.get("is_of_robot"))
         self.outcome, self.is_failed = message["text"], True
 
     def _on_interrupted(self, message: dict[str, Any]) -> None:

@@ -74,6 +74,13 @@ class RobotRequest:
     state: Literal["asked", "kept", "unanswered"] = "asked"
 
 
+def _port_of(job: Hand | StudyJob | GapJob | CalibrationJob) -> str:
+    """Return the port of the robot that something uses or used; empty if it needs none."""
+    if isinstance(job, Hand | StudyJob):
+        return job.port
+    return job.platform.removeprefix("scribbler:") if names_a_port(job.platform) else ""
+
+
 class Lab:
     """The lab of a folder of studies.
 
@@ -388,7 +395,7 @@ class Lab:
         return "" if hand is None else hand.reply
 
     def take_robot(self, visitor: Visitor) -> None:
-        """Have the visitor who began to use a robot be its operator."""
+        """Make the visitor who began to use a robot its operator."""
         with self._lock:
             self.operator, self.request = visitor, None
         self.changed()
@@ -490,7 +497,16 @@ class Lab:
         if self.hand is not None and not self.hand.is_over:
             return self.hand.port
         measured = (each for each in (self.gap, self.calibration) if each is not None and each.has_robot)
-        return next((each.platform.removeprefix("scribbler:") for each in measured), "")
+        return next((_port_of(each) for each in measured), "")
+
+    @property
+    def lost_port(self) -> str:
+        """Port of the last robot if the link to it failed, and no robot has been connected since; empty otherwise."""
+        single = (self.hand, self.gap, self.calibration)
+        users = [*self.jobs.values(), *(each for each in single if each is not None)]
+        users = [each for each in users if _port_of(each)]
+        last = max(users, key=lambda each: each.began_s, default=None)
+        return _port_of(last) if last is not None and last.is_lost else ""
 
     @property
     def robot_action(self) -> str:

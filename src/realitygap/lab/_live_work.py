@@ -33,7 +33,7 @@ class _FarPage:
         self._channel.say("told", content=content)
 
     def on_msg(self, handler: Callable[[Any, dict[str, Any], Any], None]) -> None:
-        """Nothing: the server remembers everything for pages that come later."""
+        """Do nothing: the server keeps the messages for pages that are opened later."""
 
 
 def work(channel: Channel, order: Message) -> None:

@@ -19,7 +19,7 @@ from ._drawn import keep_drawn
 from ._proposals import keep_proposal, track_proposal
 
 LIVE_S = 0.05
-"""Between two messages on where an emulated robot is [s]."""
+"""Time between two messages on the position of an emulated robot [s]."""
 
 
 class _Stops:
@@ -31,7 +31,7 @@ class _Stops:
         channel.at_once("stop", self._stop)
 
     def met(self, robot: Robot) -> None:
-        """This robot is to be stopped."""
+        """Remember the robot that a stop has to reach."""
         self._robot = robot
 
     def _stop(self, message: Message) -> None:
@@ -53,7 +53,7 @@ class _Live:
         threading.Thread(target=self._look, args=(witness, self._ended), daemon=True).start()
 
     def end(self) -> None:
-        """It has ended."""
+        """End the updates of the position."""
         self._ended.set()
 
     def _look(self, witness: Witness, ended: threading.Event) -> None:
@@ -62,7 +62,7 @@ class _Live:
 
 
 class _Shown:
-    """Tells the page about trials, and hears whether a person there pressed stop."""
+    """Reports trials to the page, and receives stops from it."""
 
     def __init__(self, channel: Channel) -> None:
         self._channel = channel
@@ -70,7 +70,7 @@ class _Shown:
         self._live = _Live(channel)
 
     def met(self, robot: Robot) -> None:
-        """This robot is in use."""
+        """Report the robot that is in use."""
         self.stops.met(robot)
         self._channel.say("met", label=robot.label)
 
@@ -121,7 +121,7 @@ class WatchedOperator(Operator):
         self._is_stopped = False
 
     def meet(self, robot: Robot) -> None:
-        """It is the one to stop."""
+        """Remember the robot, so that a visitor can stop it."""
         super().meet(robot)
         self._page.met(robot)
 
@@ -184,7 +184,7 @@ class PageOperator(Operator):
     # the robot
 
     def meet(self, robot: Robot) -> None:
-        """Have the robot stood free for its pre-flight."""
+        """Ask the operator to place the robot on free floor for its pre-flight."""
         self._page.met(robot)
         if robot.label == "EMULATED" and (own_witness(robot) or self._remote) is not None:
             self._witness = WitnessObserver(self._remote)

@@ -32,7 +32,7 @@ from ._proposals import Proposal, keep_proposal
 JUMP_M = 0.02
 """Points of a trace farther apart belong to two pieces of it."""
 QUALITY = 80
-"""Of the JPEG that is shown."""
+"""Quality of the JPEG that the page shows."""
 
 _SPOILED = (
     "This pen also drew trial {}, which is void. Where that line is still on the sheet, both look alike."

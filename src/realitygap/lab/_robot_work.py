@@ -23,15 +23,15 @@ if TYPE_CHECKING:
     from realitygap.emulator import Witness
 
 DEAD_MAN_S = 0.4
-"""After so long without a word from whoever drives the motors are stopped [s]."""
+"""Time without a message from the driving page after which the motors are stopped [s]."""
 PERIOD_S = 0.05
-"""Of the loop: what the robot is asked in it takes longer over Bluetooth."""
+"""Period of the loop [s]. Over Bluetooth, the requests in the loop take longer."""
 WATCHDOG_S = 1.0
-"""After so long a silence of the loop itself the driver stops the motors [s]."""
+"""Time without a request of the loop after which the driver stops the motors [s]."""
 BATTERY_S = 5.0
-"""Between two looks at the battery [s]."""
+"""Time between two readings of the battery [s]."""
 _MORE = ("light", "line")
-"""Sensors that are told of besides range sensors, if the robot has them."""
+"""Sensors that are reported in addition to range sensors, if the robot has them."""
 
 
 def work(channel: Channel, order: Message) -> None:
@@ -75,7 +75,7 @@ class _Hand:
         channel.at_once("want", self._wanted.put)
 
     def carry_on(self) -> None:
-        """Until the process is interrupted, or the robot fails."""
+        """Sense and drive until the process is interrupted or the robot fails."""
         robot = self._robot
         self._channel.say(
             "met",
@@ -99,14 +99,14 @@ class _Hand:
     # driving
 
     def _drive(self, message: Message) -> None:
-        """From the thread that listens."""
+        """Set the speeds of the wheels; the listening thread calls this."""
         move, turn = (_share(message.get(name)) for name in ("move", "turn"))
         with self._lock:
             self._wheels = (_share(move - turn), _share(move + turn))
             self._told_s = time.monotonic()
 
     def _stop(self, message: Message) -> None:
-        """From the thread that listens, whatever the loop is at."""
+        """Stop the motors; the listening thread calls this."""
         with self._lock:
             self._told_s = 0.0
             self._moves = False

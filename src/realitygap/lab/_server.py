@@ -26,11 +26,11 @@ from ._access import LOOPBACK, Access
 DEFAULT_PORT = 8321
 SCHEME = "http"
 LOST_S = 20.0
-"""How long a page may be out of reach, as a phone behind a wall is, before it has to be loaded anew [s]."""
+"""Time that a page may be out of reach, such as on a phone behind a wall, before it is loaded again [s]."""
 
 
 THREADS = 32
-"""That wait for disks and ledgers in place of the event loop: some may wait long, and others must still be free."""
+"""Number of threads that wait for disks and ledgers. Some may wait long, and others must still be free."""
 
 
 def open_lab(

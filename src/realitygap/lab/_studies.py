@@ -25,10 +25,10 @@ from ._figure_cache import has_thumbnail, read_rows
 
 LABELS = ("SIM", "TWIN", "EMULATED", "REAL")
 LATELY_S = 0.8
-"""How old what those who watch are told may be [s]."""
+"""Largest age of the state that pages show [s]."""
 _HOLDER = re.compile(r"process (\d{1,9}) on (.+)")
 _LONGEST_HOLDER = 1000
-"""Of what a lock says [bytes]."""
+"""Largest size of a lock's text [bytes]."""
 
 
 @dataclass(frozen=True)
@@ -168,7 +168,7 @@ class Studies:
             return state
 
     def forget(self, name: str) -> None:
-        """Have the next look at a study read its folder again."""
+        """Forget the state of a study, so that its folder is read again."""
         with self._looking:
             self._seen.pop(name, None)
 

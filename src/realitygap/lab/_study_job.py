@@ -50,6 +50,11 @@ class StudyJob(Job):
         self._ending: tuple[str, bool] | None = None
         super().__init__(order, root, changed)
 
+    @property
+    def is_lost(self) -> bool:
+        """Whether a robot was connected, and the link to it has failed."""
+        return self.is_link_lost and bool(self.label)
+
     def stop_robot(self) -> None:
         """Stop the motors, and with them the trial."""
         self._child.tell({"do": "stop"})
@@ -92,6 +97,7 @@ class StudyJob(Job):
         self._ending = (message["waiting"] or "Complete.", False)
 
     def _on_error(self, message: dict[str, Any]) -> None:
+        self.is_link_lost = bool(message.get("is_of_robot"))
         self._ending = (message["text"], True)
 
     def _on_interrupted(self, message: dict[str, Any]) -> None:

@@ -19,7 +19,7 @@ from ._files import refuse_code
 from ._page_operator import PageOperator, WatchedOperator
 
 _TOLD_S = 0.5
-"""Between two messages on how far a study is [s]."""
+"""Time between two messages on the progress of a study [s]."""
 
 
 def work(channel: Channel, order: Message) -> None:
@@ -66,7 +66,8 @@ def _operated(channel: Channel, order: Message, study: Study, folder: Path) -> I
     if counts == "witness":
         if camera is not None:
             raise StudyError(
-                "A camera goes with a robot on the floor: an emulator's witness sees where it drives."
+                "A camera cannot see an emulated robot, which its witness scores. Leave the field 'Camera' empty, "
+                "or choose another scorer."
             )
         yield WatchedOperator(channel, remote)
         return
@@ -84,14 +85,14 @@ def _operated(channel: Channel, order: Message, study: Study, folder: Path) -> I
 
 
 class _Telling:
-    """Tells how far the study is, not too often."""
+    """Reports the progress of the study at a limited rate."""
 
     def __init__(self, channel: Channel) -> None:
         self._channel = channel
         self._last = 0.0
 
     def show(self, progress: Progress) -> None:
-        """Tell of it."""
+        """Report the progress, unless the last report is recent."""
         now = time.monotonic()
         if now - self._last < _TOLD_S and progress.n_done < progress.n_runs:
             return

@@ -20,7 +20,7 @@ from ._channel import Channel, Message
 from ._proposals import keep_proposal, track_proposal
 
 _TOLD_S = 0.3
-"""Between two messages on how far it is [s]."""
+"""Time between two messages on the progress [s]."""
 
 
 def work(channel: Channel, order: Message) -> None:

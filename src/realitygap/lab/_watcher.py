@@ -10,6 +10,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from realitygap.drawing import themed_file
+
 from ._drawer import Drawer
 from ._figure_cache import read_figures
 
@@ -156,6 +158,8 @@ class Watcher:
 def _packed(figure: dict[str, Any]) -> dict[str, Any]:
     """A figure, its drawings packed as they are served."""
     drawn: dict[str, Any] = {
-        key: gzip.compress(figure[key].encode(), 6) for key in ("wide", "narrow") if key in figure
+        key: gzip.compress(themed_file(figure[key]).encode(), 6)
+        for key in ("wide", "narrow")
+        if key in figure
     }
     return {**figure, **drawn}

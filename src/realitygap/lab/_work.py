@@ -10,7 +10,7 @@ from collections.abc import Callable
 from importlib import import_module
 
 from realitygap._interrupts import kept_interrupts
-from realitygap.errors import RealityGapError
+from realitygap.errors import RealityGapError, RobotError
 
 from ._channel import Channel, Message
 
@@ -50,7 +50,7 @@ def _work(channel: Channel) -> int:
         with kept_interrupts():
             work(channel, order)
     except (RealityGapError, OSError, ValueError) as error:
-        channel.say("error", text=str(error))
+        channel.say("error", text=str(error), is_of_robot=isinstance(error, RobotError))
         return 1
     except Exception as error:
         if isinstance(error.__cause__, KeyboardInterrupt):  # Python 3.11 reports one in a class body so

@@ -153,7 +153,7 @@ class Audit:
     runs_needed: dict[str, int]
 
     def to_dict(self) -> dict[str, Any]:
-        """Everything as plain values; each pair has its `verdict`."""
+        """Return all results as plain values; each pair has its `verdict`."""
         found = asdict(self)
         for plain, pair in zip(found["pairs"], self.pairs, strict=True):
             plain["verdict"] = pair.verdict

@@ -398,7 +398,7 @@ def _caption(tally: Tally, panels: list[Panel], points: Points) -> str:
 
 
 def say_runs(panels: list[Panel]) -> str:
-    """Say which lines are runs, and whether some are left out."""
+    """Return a sentence on which lines are runs, and whether some are left out."""
     cut = [panel for panel in panels if panel.n_drawn < len(panel.values)]
     if cut:
         drawn = ", ".join(f"{panel.n_drawn} of {len(panel.values)} in {panel.title}" for panel in cut)
@@ -410,7 +410,7 @@ def say_runs(panels: list[Panel]) -> str:
 
 
 def say_interval(panels: list[Panel]) -> str:
-    """Say whether the medians have intervals."""
+    """Return a sentence on the intervals of the medians."""
     counts = [len(panel.values) for panel in panels]
     if max(counts) < SMALLEST_N:
         return f" (no interval: fewer than {SMALLEST_N} runs cannot give one of 95 %)"

@@ -111,7 +111,7 @@ class DistanceAudit:
         return self.leverage / mean if mean > 0 else np.full_like(self.leverage, math.nan)
 
     def to_dict(self) -> dict[str, Any]:
-        """Everything but the single pairs, as plain values."""
+        """Return all results but the single pairs as plain values."""
         found = asdict(self)
         for name in ("leverage", "leverage_low", "leverage_high"):
             found[name] = getattr(self, name).tolist()

@@ -101,9 +101,16 @@ def _panel_content(panel: Panel) -> dict[str, Any]:
     texts = list(dict.fromkeys(each.text for each in panel.series))
     return {
         "decimals": panel.decimals,
-        "texts": texts,
+        "texts": [_numbered(text) for text in texts],
         "series": [_series_content(each, panel, texts) for each in panel.series],
     }
+
+
+def _numbered(text: str) -> str:
+    """Return a text with numbers instead of names in braces, as `hover.js` reads it."""
+    for number, name in enumerate(("name", "label", "x", "y")):
+        text = text.replace(f"{{{name}}}", f"{{{number}}}")
+    return text
 
 
 def _series_content(series: Series, panel: Panel, texts: Sequence[str]) -> list[Any]:

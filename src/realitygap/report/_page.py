@@ -108,7 +108,7 @@ def write_report(
 
 @contextmanager
 def _uncollected() -> Iterator[None]:
-    """Without looking for garbage: figures are many small objects, and all of them live as long as the page."""
+    """Suspend garbage collection: figures are many small objects that live as long as the page."""
     was_enabled = gc.isenabled()
     gc.disable()
     try:
@@ -130,7 +130,7 @@ def _render(content: Mapping[str, Any]) -> str:
 
 
 def _content(tally: Tally) -> dict[str, Any]:
-    """Everything the template shows."""
+    """Return the content of the template."""
     with ThreadPoolExecutor(max_workers=1) as beside:
         digest = beside.submit(tally.folder.digest)
         computed = beside.submit(_statistics, tally)

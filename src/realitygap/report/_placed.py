@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from realitygap.report._drawing import NARROW, Drawing, inline
 from realitygap.report._marks import marks_content
-from realitygap.report._template import template_text
+from realitygap.report._template import packed, template_text
 
 if TYPE_CHECKING:
     from markupsafe import Markup
@@ -59,7 +59,7 @@ def hover_content(content: Mapping[str, Any]) -> dict[str, Any]:
     """Return what a page needs to show the values of its figures: `marks`, `hover`, and `hover_hash`."""
     from markupsafe import Markup
 
-    script = template_text("hover.js") + template_text("tables.js")
+    script = packed(template_text("hover.js")) + template_text("tables.js")
     marks = {each.anchor: each.marks for each in figures_in(content) if each.marks}
     return {"marks": as_json(marks), "hover": Markup(script), "hover_hash": hash_of(script)}
 

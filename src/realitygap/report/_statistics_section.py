@@ -41,7 +41,7 @@ _SELECTIONS = {"coverage": "objective search", "novelty": "novelty search", "ran
 def statistics_content(
     tally: Tally, comparisons: Sequence[Comparison], champions: Sequence[Champions]
 ) -> dict[str, Any]:
-    """Everything that the template of the section shows.
+    """Return the content of the section's template.
 
     Args:
         tally: The study.

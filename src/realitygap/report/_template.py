@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from importlib import resources
 from typing import Any
@@ -26,7 +27,28 @@ def render_page(name: str, content: Mapping[str, Any], **filters: Callable[..., 
     )
     environment.filters.update(filters)
     tokens = resources.files("realitygap.drawing").joinpath("tokens.css").read_text(encoding="utf-8")
-    return environment.get_template(name).render({**content, "css": tokens + template_text("report.css")})
+    page = environment.get_template(name).render({**content, "css": tokens + template_text("report.css")})
+    return _keep_units(page)
+
+
+_UNIT = re.compile(
+    r"<(script|style|svg|pre|code)\b.*?</\1>|<[^>]*>|(\d) (?=(?:%|m?s|min|h|[cmk]?m|in|m?V|Hz|°|[kM]B|px)(?!\w))",
+    re.DOTALL,
+)
+"""A number before its unit, or a part of a page in which spaces stay as they are. The lab's `frame.js` has the same."""
+
+
+def _keep_units(page: str) -> str:
+    """Return a page on which no line ends between a number and its unit."""
+    return _UNIT.sub(lambda found: f"{found[2]}\u00a0" if found[2] else found[0], page)
+
+
+def packed(script: str) -> str:
+    """Return a script without comments, indentation, and spaces at operators. Each of its comments ends its line."""
+    bare = re.sub(r"^\s*//.*\n|^\s+|\s+//.*$", "", script, flags=re.MULTILINE)
+    return re.sub(
+        r"(\"[^\"]*\"|`[^`]*`)|\s*([{}(),;:=+*/<>?&|])\s*", lambda found: found[1] or found[2], bare
+    )
 
 
 def template_text(name: str) -> str:

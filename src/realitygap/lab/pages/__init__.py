@@ -21,7 +21,7 @@ from ._trials import add_trials
 
 
 def add_pages(lab: Lab) -> None:
-    """Add all pages, to be served."""
+    """Add all pages."""
     app.add_static_files("/lab-files", str(resources.files(__package__) / "static"))
     tokens = resources.files("realitygap.drawing") / "tokens.css"
     app.add_static_file(local_file=str(tokens), url_path="/lab-tokens/tokens.css")

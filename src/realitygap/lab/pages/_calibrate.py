@@ -8,6 +8,7 @@ from typing import Any
 from nicegui import ui
 from starlette.requests import Request
 
+from realitygap.drawing import Ink, themed_color
 from realitygap.lab._calibration_job import CalibrationJob
 from realitygap.lab._gap_plan import PLACING_S
 from realitygap.lab._lab import Lab, Visitor
@@ -47,7 +48,7 @@ _STATE = """
   <div v-if="props.row.advice" class="lab-hint">{{ props.row.advice }}</div>
 </q-td>
 """
-_INKS = ("#0072b2", "#c94f00", "#00805c", "#b0508c")
+_INKS = tuple(themed_color(color) for color in (Ink.PEN1, Ink.PEN2, Ink.PEN3, Ink.PEN4))
 
 
 def add_calibrate(lab: Lab) -> None:
@@ -223,7 +224,7 @@ class _Page:
         self._steps.look()
 
     def _show_card(self, kind: str) -> ui.element:
-        """One of the cards, as a radio button: arrow keys and Space choose."""
+        """Show one of the cards as a radio button: arrow keys and Space choose it."""
         name, meaning, n_trials, minutes = _KINDS[kind]
         with ui.element("div").classes("lab-kind").props(f'role="radio" data-kind="{kind}"') as card:
             ui.label(name).classes("lab-label")
@@ -279,7 +280,7 @@ class _Page:
         """Show the mean reading of each sensor by distance from the wall, or by trial."""
         job, self._chart = self._lab.calibration, None
         if job is not None and any(each["means"] for each in job.readings):
-            self._chart = ui.echart({}).classes("lab-plot").props('role="img"')
+            self._chart = ui.echart({}, renderer="svg").classes("lab-plot").props('role="img"')
             _grow(self._chart, job)
 
     def _show_made(self) -> None:
@@ -353,12 +354,14 @@ def _grow(chart: ui.echart, job: CalibrationJob) -> None:
 def _options(points: list[dict[str, Any]], across: str) -> dict[str, Any]:
     """Return the options of the plot."""
     n = max(len(each["means"]) for each in points)
+    text, rule = {"color": "var(--text)"}, {"lineStyle": {"color": "var(--ink-rule)"}}
+    axis = {"type": "value", "nameTextStyle": text, "axisLabel": text, "axisLine": rule, "splitLine": rule}
     return {
         "animation": False,
         "grid": {"left": 50, "right": 16, "top": 36, "bottom": 44},
-        "legend": {"data": [f"sensor {k + 1}" for k in range(n)], "top": 4, "left": 80},
-        "xAxis": {"type": "value", "name": across, "nameLocation": "middle", "nameGap": 28},
-        "yAxis": {"type": "value", "name": "reading", "min": 0},
+        "legend": {"data": [f"sensor {k + 1}" for k in range(n)], "top": 4, "left": 80, "textStyle": text},
+        "xAxis": axis | {"name": across, "nameLocation": "middle", "nameGap": 28},
+        "yAxis": axis | {"name": "reading", "min": 0},
         "series": [
             {
                 "name": f"sensor {k + 1}",

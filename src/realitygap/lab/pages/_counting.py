@@ -80,7 +80,7 @@ class Counting:
     # inside
 
     def _chosen_now(self) -> tuple[int, ScoreRole, str] | None:
-        """Which trial is counted, as what, and by whom; the first that waits where none was chosen."""
+        """Trial that is counted, role, and visitor; the first trial without a score if none was chosen."""
         who = self._who()
         listed = self._counts.trials()
         chosen = next((each for each in listed if each.number == self._chosen), None)

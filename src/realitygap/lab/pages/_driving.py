@@ -13,7 +13,7 @@ from ._frame import hint
 from ._grid import CellGrid
 
 LIVE_S = 0.05
-"""Between two looks: 20 a second. The robot is driven by a process of its own, whoever looks."""
+"""Time between two updates [s]. Another process drives the robot, even if no page is open."""
 
 
 class Driving:

@@ -21,7 +21,7 @@ from ._notices import show_error
 from ._stop import Stop
 
 WHO = "realitygap_who"
-"""The cookie with the name of who counts."""
+"""The cookie with the name of the person who counts."""
 LONGEST_NAME = 60
 
 _PAGES = {"/": "Studies", "/robot": "Robot", "/calibrate": "Calibrate", "/gap": "Gap"}
@@ -94,13 +94,13 @@ def text_of(field: Any) -> str:
 
 
 def visitor_of(request: Request) -> Visitor:
-    """Who sits at the page."""
+    """Return the visitor who sent a request."""
     who = unquote(request.cookies.get(WHO, ""))[:LONGEST_NAME].strip()
     return Visitor(request.cookies.get(VISITOR, ""), who)
 
 
 def remember_who(name: str) -> None:
-    """Have the browser keep the name."""
+    """Store the visitor's name in a cookie."""
     kept = f"{WHO}=' + encodeURIComponent({_js(name)}) + '; path=/; max-age=31536000; SameSite=Lax"
     ui.run_javascript(f"document.cookie = '{kept}'")
 
@@ -110,10 +110,10 @@ def _js(text: str) -> str:
 
 
 def section(text: str) -> ui.label:
-    """A heading within a page."""
+    """Show a heading within a page."""
     return ui.label(text).props('role="heading" aria-level="2"').classes("lab-section")
 
 
 def hint(text: str) -> ui.label:
-    """A remark below what it is about."""
+    """Show a remark below its subject."""
     return ui.label(text).classes("lab-hint")

@@ -127,7 +127,7 @@ class _Page:
             )
 
     def _want_thumbnails(self, standings: tuple[Standing, ...]) -> None:
-        """Have the pictures of the first studies drawn that have none."""
+        """Request the missing pictures of the first studies."""
         missing = [each for each in standings if each.n_done and not each.medians and each.word in _AT_REST]
         for each in missing[:MOST_DRAWN]:
             with contextlib.suppress(RealityGapError):  # it was removed in this moment
@@ -142,7 +142,7 @@ class _Page:
             ui.navigate.to(f"/study/{PAPER}")
 
     def _other(self) -> tuple[tuple[str, str, str], ...]:
-        """Title, progress, and address of what is measured, or was last."""
+        """Return the title, progress, and address of the current or last measurements."""
         found = []
         gap, calibration = self._lab.gap, self._lab.calibration
         if gap is not None:

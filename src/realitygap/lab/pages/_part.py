@@ -11,7 +11,7 @@ from nicegui import ui
 from realitygap.lab._lab import Lab
 
 LOOK_S = 0.25
-"""How often a page looks whether something has changed [s]."""
+"""Time between two looks of a page for changes [s]."""
 
 T = TypeVar("T")
 
@@ -34,18 +34,18 @@ class Part(Generic[T]):
         self._is_due = False
 
     def show(self) -> None:
-        """Show it, for the first time."""
+        """Show the part for the first time."""
         self._refreshable = ui.refreshable(self._draw)
         self._refreshable()
 
     def look(self) -> None:
-        """Draw it again if its content has changed."""
+        """Draw the part again if its content has changed."""
         if not self._is_due and self._stand() != self._shown:
             self._is_due = True
             self._refreshable.refresh()
 
     def refresh(self) -> None:
-        """Show it again, although what it shows is the same."""
+        """Draw the part again although its content is the same."""
         self._is_due = True
         self._refreshable.refresh()
 

@@ -23,7 +23,7 @@ from ._notices import attempt
 
 
 class PhotoInput(Element, component="photo_input.js"):
-    """Takes a photograph; `address` is where it is sent."""
+    """Field that takes a photograph and sends it to `address`."""
 
     def __init__(self, address: str, name: str) -> None:
         super().__init__()
@@ -31,7 +31,7 @@ class PhotoInput(Element, component="photo_input.js"):
 
 
 def add_photos(lab: Lab) -> None:
-    """Add what takes photographs, and what shows them."""
+    """Add the addresses that receive photographs and show them."""
 
     @app.post("/photos/{name}")
     async def take(name: str, request: Request) -> Response:
@@ -97,7 +97,7 @@ class SheetPhotos:
         self._drafts: dict[int, Draft] = {}
 
     def stand(self) -> Any:
-        """Changes when something else is to be shown."""
+        """Return a value that changes with the content of the section."""
         sheets = tuple(self.sheets())
         states = tuple((each.mark, each.state, each.said) for each in self._photos.photos())
         trials = self._counts.trials()
@@ -121,7 +121,7 @@ class SheetPhotos:
         return any(photo.sheet in waiting for photo in self._photos.photos())
 
     def sheets(self) -> list[int]:
-        """Those with lines that may be counted, once or twice."""
+        """Return the sheets with lines that may be counted, once or twice."""
         found = {
             each.trial.sheet
             for each in self._counts.trials()
@@ -130,7 +130,7 @@ class SheetPhotos:
         return sorted(found)
 
     def show(self) -> None:
-        """Show it; where no sheet has a line, nothing."""
+        """Show the section; show nothing if no sheet has a line."""
         sheets = self.sheets()
         if not sheets:
             return

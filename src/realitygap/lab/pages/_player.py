@@ -11,7 +11,7 @@ from realitygap.lab._lab import Lab
 from realitygap.lab._live_job import LiveJob
 
 LIVE_S = 0.05
-"""Between two looks at a robot that is driven: 20 a second."""
+"""Time between two looks at a robot that is driven [s]."""
 
 
 class Player(Element, component="player.js"):
@@ -51,7 +51,7 @@ class LivePlayer:
             self._timer = ui.timer(LIVE_S, self._look)
 
     def _ready(self) -> None:
-        """The page can be told."""
+        """Begin to send the trial, because the page is ready."""
         self._is_ready, self._n_told = True, 0
 
     def _look(self) -> None:

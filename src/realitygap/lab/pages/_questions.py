@@ -17,7 +17,7 @@ from ._notices import notify
 
 
 def show_question(job: StudyJob, ask: dict[str, Any], counts: Counts, *, may: bool) -> None:
-    """Show what a study waits for.
+    """Show the question that a study waits for.
 
     Args:
         job: The study at work.
@@ -51,12 +51,12 @@ class _Asked:
         return found
 
     def answer(self, **values: Any) -> None:
-        """Answer it."""
+        """Answer the question."""
         if not self.job.answer(self.ask["number"], **values):
             notify("Another page has answered this question.")
 
     def button(self, text: str, *, is_main: bool = True, **values: Any) -> None:
-        """One that answers."""
+        """Show a button that answers the question."""
         ui.button(text, on_click=lambda: self.answer(**values)).props(
             ("unelevated" if is_main else "outline") + " no-caps"
         ).classes("lab-primary" if is_main else "").set_enabled(self.may)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from typing import Any
 
 from nicegui import events, run, ui
@@ -25,8 +24,6 @@ from ._part import watching
 
 LIVE_S = 0.05
 """Time between two updates of the readings [s]."""
-STALE_S = 1.0
-"""Age from which readings are shown as old [s]."""
 EMULATED = "emulator://s2?fluke=2"
 THYMIO = "thymio:emulator://playground"
 _Sensor = tuple[str, str, float]
@@ -283,13 +280,9 @@ class _Page:
                 f'src="data:image/png;base64,{hand.picture}" alt="Picture of the robot\'s camera"'
             ).classes("lab-picture")
 
-    def _age(self, hand: Hand) -> float:
-        """Age of the last reading [s]; 0 before the first one."""
-        return 0.0 if hand.senses is None else time.monotonic() - hand.sensed_s
-
     def _is_off(self, hand: Hand) -> bool:
         """Whether the pad is off: the robot is lost, does not answer, or is another visitor's."""
-        return hand.is_over or self._age(hand) > STALE_S or not self._lab.may_operate(self._visitor)
+        return hand.is_over or hand.is_silent or not self._lab.may_operate(self._visitor)
 
     def _live(self) -> None:
         hand = self._lab.hand
@@ -298,14 +291,13 @@ class _Page:
         self._pad.know(hand.n_stops, is_off=self._is_off(hand))
         if hand.senses is None:
             return
-        age = self._age(hand)
-        is_old = hand.is_over or age > STALE_S
+        is_old = hand.is_over or hand.is_silent
         self._senses.classes(**{"add" if is_old else "remove": "lab-stale"})
         if hand.n_live != self._n_shown:
             self._n_shown = hand.n_live
             self._show_senses(hand, hand.senses)
         if is_old:
-            self._motion.text = f"Last reading {duration(age)} ago"
+            self._motion.text = f"Last reading {duration(hand.age_s)} ago"
 
     def _show_senses(self, hand: Hand, senses: dict[str, Any]) -> None:
         for kind, gauges in self._gauges.items():

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 from nicegui import app, events, ui
 from starlette.responses import PlainTextResponse, Response
 
@@ -19,6 +21,14 @@ def add_stop(lab: Lab) -> None:
     @app.post("/stop")
     async def stop() -> Response:  # in the event loop: it waits for no thread
         return PlainTextResponse("stopped" if lab.stop_robot() else "no robot")
+
+
+class _State(NamedTuple):
+    """Text of the chip, fault of the link ("silent", "lost", or none), and whether the robot was stopped just now."""
+
+    text: str
+    fault: str
+    is_stopped: bool
 
 
 class Stop:
@@ -52,19 +62,23 @@ class Stop:
         watching(self._lab, part.look)
         ui.timer(1.0, part.look)  # nothing reports that the seconds after a stop are over
 
-    def _state(self) -> tuple[str, bool]:
+    def _state(self) -> _State:
         lab = self._lab
         if not (port := lab.robot_port):
-            return "", lab.is_just_stopped
-        name = "Emulated robot" if "emulator://" in port else f"Robot on {port}"
+            lost = lab.lost_port
+            text = f"{_name_of(lost)}: link lost. If it moves, switch it off." if lost else ""
+            return _State(text, "lost" if lost else "", lab.is_just_stopped)
         other = "" if lab.may_operate(self._visitor) else f"{lab.operator_name} is operating · "
-        return other + name, lab.is_just_stopped
+        is_silent = lab.hand is not None and lab.hand.is_silent
+        silent = " · no readings" if is_silent else ""
+        return _State(other + _name_of(port) + silent, "silent" if is_silent else "", lab.is_just_stopped)
 
-    def _update(self, state: tuple[str, bool]) -> None:
-        text, is_stopped = state
-        self._bar.classes(**{"add" if text else "remove": "lab-connected"})
-        self._chip.text = text
-        self._button.text = "Robot stopped" if is_stopped else "Stop robot"
+    def _update(self, state: _State) -> None:
+        self._bar.classes(**{"add" if state.text else "remove": "lab-connected"})
+        for fault in ("silent", "lost"):
+            self._bar.classes(**{"add" if state.fault == fault else "remove": f"lab-robot-{fault}"})
+        self._chip.text = state.text
+        self._button.text = "Robot stopped" if state.is_stopped else "Stop robot"
 
     def _press(self) -> None:
         if not self._lab.stop_robot():
@@ -73,3 +87,7 @@ class Stop:
     def _key(self, event: events.KeyEventArguments) -> None:
         if event.action.keydown and event.key.escape:
             self._lab.stop_robot()
+
+
+def _name_of(port: str) -> str:
+    return "Emulated robot" if "emulator://" in port else f"Robot on {port}"

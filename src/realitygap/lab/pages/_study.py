@@ -11,6 +11,7 @@ from nicegui import app, events, run, ui
 from starlette.exceptions import HTTPException
 from starlette.responses import FileResponse, PlainTextResponse, Response
 
+from realitygap.drawing import themed_file
 from realitygap.errors import RealityGapError, StudyError
 from realitygap.lab._access import FOREIGN_HEADERS
 from realitygap.lab._counted import counted
@@ -101,7 +102,8 @@ def add_study(lab: Lab) -> None:
         if svg is None:
             return PlainTextResponse("There is no such picture.", 404)
         headers = {**FOREIGN_HEADERS, "cache-control": "no-store"}
-        return Response(svg, media_type="image/svg+xml", headers=headers)
+        themed = themed_file(svg.decode("utf-8", "replace"))
+        return Response(themed, media_type="image/svg+xml", headers=headers)
 
     @app.get("/reports/{name}")
     def report(name: str) -> Response:

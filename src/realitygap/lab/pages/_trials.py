@@ -255,7 +255,7 @@ class _Page:
     # the robot
 
     def _job(self) -> StudyJob | None:
-        """The job of this study that a robot is in use for."""
+        """Job of this study that uses a robot."""
         job = self._lab.job(self._name)
         return job if job is not None and job.port else None
 
@@ -277,7 +277,7 @@ class _Page:
         )
 
     def _show_robot(self, now: _RobotStand) -> None:
-        """Which robot drives, for whom; before, how to begin."""
+        """Show the robot in use and its operator, or the form that connects one."""
         job = now.job
         if job is None:
             if now.outcome:
@@ -325,7 +325,7 @@ class _Page:
             ui.label("Preparing the next trial…").props('role="status"')
 
     def _show_rest(self) -> None:
-        """Say how far the trials are while no robot is connected."""
+        """Show the progress of the trials while no robot is connected."""
         if self._can_begin is not None and self._can_begin.is_complete:
             n_scored = sum(each.trial.state == "scored" for each in self._counts.trials())
             with ui.row().classes("lab-row"):

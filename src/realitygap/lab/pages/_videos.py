@@ -30,11 +30,11 @@ class Videos:
         self._files: list[str] = []
 
     async def load(self) -> None:
-        """Look which videos are in the lab's folder."""
+        """Read the list of videos in the lab's folder."""
         self._files = await run.io_bound(videos_in, self._lab.root) or []
 
     def stand(self) -> Any:
-        """Changes when something else is to be shown."""
+        """Return a value that changes with the content of the section."""
         job = self._job()
         shown = None if job is None else (id(job), job.outcome)
         return shown, bool(self._waiting())
@@ -45,7 +45,7 @@ class Videos:
         return self._job() is not None
 
     def show(self) -> None:
-        """Show it; where no line waits to be counted, only how a video went."""
+        """Show the section; if there is no line to count, show only the result of a video."""
         job = self._job()
         if job is not None and not job.is_over:
             self._show_tracking(job)

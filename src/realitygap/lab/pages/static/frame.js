@@ -30,6 +30,21 @@
     probe();
   };
 
+  // A number and its unit stay on one line. Text that is copied, such as that of a file, keeps its spaces.
+  const UNIT = /(\d) (?=(?:%|m?s|min|h|[cmk]?m|in|m?V|Hz|°|[kM]B|px)(?![\p{L}\p{N}_]))/gu;
+  const join = (node) => {
+    if (node.nodeType !== Node.TEXT_NODE) return node.childNodes.forEach(join);
+    const text = node.nodeValue.replace(UNIT, "$1\u00a0");
+    if (text !== node.nodeValue && !node.parentElement?.closest("pre, code, textarea, style, script")) node.nodeValue = text;
+  };
+  const joining = new MutationObserver((found) => {
+    for (const { target, addedNodes } of found) [...addedNodes, ...(target.nodeType === Node.TEXT_NODE ? [target] : [])].forEach(join);
+  });
+  addEventListener("DOMContentLoaded", () => {
+    join(document.body);
+    joining.observe(document.body, { subtree: true, childList: true, characterData: true });
+  });
+
   // A lab that was started again has another token. Its answer then states where the new one is.
   const reloadIfRefused = async () => {
     const answer = await fetch(location.href, { method: "HEAD" }).catch(() => null);

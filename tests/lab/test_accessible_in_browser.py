@@ -119,7 +119,7 @@ def test_a_robot_in_a_sitting_and_in_the_hand(lab, look):
         watcher = look("robot")
         watcher.get_by_role("button", name="Request control").wait_for()
         assert faults(watcher, lab.root) == []
-    robot.get_by_text(re.compile(r"Last reading \d+ s ago")).wait_for()
+    robot.get_by_text(re.compile(r"Last reading \d+\ss ago")).wait_for()
     assert faults(robot, lab.root) == []
 
 

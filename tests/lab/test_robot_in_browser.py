@@ -122,7 +122,7 @@ def test_its_preflight_and_its_picture_are_shown(visit):
     page.get_by_text("Pre-flight check passed.").wait_for()
     page.get_by_role("button", name="Take picture").click()
     page.get_by_alt_text("Picture of the robot's camera").wait_for()
-    page.get_by_text(re.compile(r"^\d\.\d\d V$")).first.wait_for()
+    page.get_by_text(re.compile(r"^\d\.\d\d\sV$")).first.wait_for()
 
 
 def test_robot_stops_within_half_a_second_of_a_key_release_and_sensors_have_names(visit):
@@ -160,7 +160,7 @@ def test_lost_link_disables_the_pad_and_keeps_the_last_readings_with_their_age(v
     page.get_by_role("button", name="Retry").wait_for()
     page.locator(".lab-robot-lost .lab-chip", has_text="link lost").wait_for()
     assert not page.get_by_role("button", name="Stop robot").is_visible()  # it would reach no robot
-    page.get_by_text(re.compile(r"Last reading \d+ s ago")).wait_for()
+    page.get_by_text(re.compile(r"Last reading \d+\ss ago")).wait_for()
     page.locator('.lab-pad[aria-disabled="true"]').wait_for()
     page.locator(".lab-stale").wait_for()
 

@@ -20,6 +20,8 @@ AXE_SIZES = ("desktop", "phone")
 MOST_CONTROLS = 200
 SETTLED_MS = 250
 """Time until nothing fades in any more [ms]."""
+STILL_MS = 80
+"""The same with reduced motion: time until a page has its new size [ms]."""
 
 _COVERED = """(it) => {
   const box = it.getBoundingClientRect();
@@ -80,6 +82,12 @@ _RUN_AXE = """async (options) => {
 }"""
 
 
+def settle(page: Any) -> None:
+    """Wait until nothing fades in any more, and a page has its size."""
+    is_still = page.evaluate("() => matchMedia('(prefers-reduced-motion: reduce)').matches")
+    page.wait_for_timeout(STILL_MS if is_still else SETTLED_MS)
+
+
 def covered(locator: Any) -> list[str]:
     """Return what lies above the center or a corner of an element, or "out of sight"."""
     found: list[str] = locator.evaluate(_COVERED)
@@ -118,13 +126,14 @@ def states(page: Any) -> list[str]:
 def keyboard(page: Any) -> list[str]:
     """Return the controls that Tab reaches out of order, without a visible focus, or not at all."""
     page.set_viewport_size({"width": DESKTOP[0], "height": DESKTOP[1]})
+    page.emulate_media(reduced_motion="reduce")  # a border has its width at once
+    settle(page)
     found: list[str] = []
     for _ in range(2):  # again if a part of the page was drawn again meanwhile: its controls are new
         page.evaluate(_TO_START)
         found = []
         for _ in range(MOST_CONTROLS):
             page.keyboard.press("Tab")
-            page.wait_for_timeout(50)  # until the border has its width
             problem = page.evaluate(_FOCUSED)
             if problem == "all":
                 break
@@ -150,7 +159,7 @@ def axe(page: Any, size: str = "") -> list[str]:
     found = []
     for theme, options in (("light", {}), ("dark", {"runOnly": ["color-contrast"]})):
         page.emulate_media(color_scheme=theme)
-        page.wait_for_timeout(SETTLED_MS)
+        settle(page)
         _keep(page, f"{size}-{theme}")
         for fault in page.evaluate(_RUN_AXE, options):
             found.append(f"{theme}: {fault['impact']}: {fault['id']}: {fault['targets'][:3]}")
@@ -168,7 +177,7 @@ def faults(page: Any, root: Path) -> list[str]:
     found = no_paths(page, root)
     for size, (width, height) in SIZES.items():
         page.set_viewport_size({"width": width, "height": height})
-        page.wait_for_timeout(SETTLED_MS)
+        settle(page)
         problems = [*wide(page), *cut(page), *(axe(page, size) if size in AXE_SIZES else [])]
         if (width, height) == PHONE:
             problems += small(page)

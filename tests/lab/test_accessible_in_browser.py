@@ -29,8 +29,8 @@ selection = "novelty"
 
 @pytest.fixture
 def look(visit):
-    """Opens a page: look("robot")."""
-    return lambda path, **options: visit(path, bypass_csp=True, **options)
+    """Opens a page: look("robot"). Nothing in it moves, because a browser needs much time to draw motion."""
+    return lambda path, **options: visit(path, bypass_csp=True, reduced_motion="reduce", **options)
 
 
 def test_pages_without_a_study(lab, look):

@@ -33,7 +33,7 @@ def test_a_ratio_above_one_says_that_ours_is_faster_for_rates_and_for_times():
     assert times["multineat"]["ratio"] == 3.0
 
 
-def test_what_was_not_measured_has_no_ratio():
+def test_a_missing_measurement_has_no_ratio():
     answers = {"ours": {"median": 1.0}, "jyro": {"not_measured": "no cairo"}}
     peers.add_ratios("steps_core", answers)
     assert "ratio" not in answers["jyro"]

@@ -227,7 +227,7 @@ def test_last_of_the_earlier_runs_is_the_one_on_the_page():
         assert last[place + 1] == f"{100 * goal['low']:.1f} to {100 * goal['high']:.1f} %"
 
 
-def test_what_the_page_of_closing_the_gap_says_of_random_controllers_is_what_the_table_says():
+def test_the_page_of_closing_the_gap_states_the_table_of_random_controllers():
     make_closing = _load("make_closing")
     with (make_closing.TABLES / "kinds.csv").open(encoding="utf-8") as file:
         rows = {(row["controllers"], row["observed"]): row for row in csv.DictReader(file)}
@@ -326,7 +326,7 @@ def _rows(name):
     return list(csv.DictReader(path.read_text("utf-8").splitlines()))
 
 
-def test_what_the_page_of_the_paper_says_of_its_table_2_is_what_the_numbers_say():
+def test_the_page_of_the_paper_states_the_numbers_of_its_table_2():
     rows = [row for row in _rows("published") if row["Condition"].startswith("novelty")]
     below_all = [row["The paper"] for row in rows if row["our runs at or below it: along the line"] == "0"]
     assert below_all == ["0.154", "0.166", "0.208", "0.180"]
@@ -341,7 +341,7 @@ def test_what_the_page_of_the_paper_says_of_its_table_2_is_what_the_numbers_say(
     assert sum(lowest[value] > 0 for value in below_all) == 3
 
 
-def test_what_the_page_of_the_paper_says_of_plateaus_is_what_the_numbers_say():
+def test_the_page_of_the_paper_states_the_numbers_of_plateaus():
     shares = {row["Condition"]: row for row in _rows("table-plateaus")}
     plateaus = {name: int(row["plateaus"].split()[0]) for name, row in shares.items()}
     assert max(plateaus[f"coverage-{level}"] for level in (10, 50, 80)) == 29
@@ -350,7 +350,7 @@ def test_what_the_page_of_the_paper_says_of_plateaus_is_what_the_numbers_say():
     assert int(ends[1][0]) < int(ends[0][1])  # the intervals overlap
 
 
-def test_what_the_page_of_the_paper_says_of_neat_settings_is_what_the_numbers_say():
+def test_the_page_of_the_paper_states_the_numbers_of_neat_settings():
     for row in _rows("neat-sets"):
         difference = float(row["novelty less coverage"].replace("−", "-"))
         if row["constant input"].startswith("novelty only"):
@@ -362,7 +362,7 @@ def test_what_the_page_of_the_paper_says_of_neat_settings_is_what_the_numbers_sa
     assert sum(text.startswith("equivalent") for text in equivalence) == 3
 
 
-def test_what_the_page_of_the_paper_says_of_the_constant_input_is_what_the_numbers_say():
+def test_the_page_of_the_paper_states_the_numbers_of_the_constant_input():
     for row in _rows("constant-input"):
         one, other = (row[side].split("-") for side in ("First", "Second"))
         if one[0] == other[0]:  # with the input and without it
@@ -372,7 +372,7 @@ def test_what_the_page_of_the_paper_says_of_the_constant_input_is_what_the_numbe
             assert row["Conclusion"].startswith("not shown")
 
 
-def test_what_the_page_of_the_paper_says_of_noise_and_selection_is_what_the_numbers_say():
+def test_the_page_of_the_paper_states_the_numbers_of_noise_and_selection():
     rows = [row for row in _rows("table-comparisons") if row["Conclusion"]]
     said = {tuple(row["First less second"].split(" less ")): row["Conclusion"] for row in rows}
     for selection in ("coverage", "novelty", "random"):
@@ -535,7 +535,7 @@ def test_weights_on_the_page_of_distances_are_those_of_the_audit():
     )
 
 
-def test_what_the_page_of_distances_says_is_what_the_numbers_say():
+def test_the_page_of_distances_states_the_numbers():
     _, coverage = _distance_rows("coverage")
     for name in ("paper-by-y", "ordered", "hamming", "edit", "coverage"):
         assert coverage[name][-2] == "not shown", name

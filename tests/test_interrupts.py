@@ -185,7 +185,7 @@ def test_process_of_the_lab_ends_with_130_after_an_interrupt_that_python_drops()
 
 
 @pytest.mark.parametrize("place", [IN_A_COMMAND, IN_A_PROCESS_OF_THE_LAB])
-def test_interrupt_in_a_class_body_that_python_reports_as_another_error(place: str) -> None:
+def test_an_interrupt_in_a_class_body_ends_without_a_traceback(place: str) -> None:
     done = run(IN_A_CLASS_BODY + place)
     assert done.returncode == 130, done.stderr
     assert "Traceback" not in done.stderr

@@ -279,7 +279,7 @@ def test_mistakes_are_one_message_and_lose_nothing(arguments, says, tmp_path, mo
     assert not Path("x.toml").exists()
 
 
-def test_what_is_no_calibration_is_not_overwritten(tmp_path):
+def test_calibrate_never_overwrites_a_file_that_is_no_calibration(tmp_path):
     twin = tmp_path / "worn.toml"
     twin.write_text('format = "realitygap twin 1"\n')
     assert "is not a calibration: it was not changed" in refused("path", "--robot", "sim", "-o", twin)

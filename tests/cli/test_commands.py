@@ -137,7 +137,7 @@ def loaded_for(*words: str) -> set[str]:
     return {name.split(".")[0] for name in done.stderr.split()}
 
 
-def test_version():
+def test_option_version_prints_the_version():
     assert started("--version").stdout.strip() == f"realitygap {__version__}"
 
 
@@ -287,7 +287,7 @@ def test_a_terminal_without_some_letters_shows_question_marks(small):
     assert "The paper?s simulated study" in done.stdout
 
 
-def test_what_is_printed_can_be_pasted_into_a_shell(tmp_path):
+def test_printed_commands_and_paths_can_be_pasted_into_a_shell(tmp_path):
     done = realitygap("run", "paper", "--replicates", "1", "--out", "my results", cwd=tmp_path)
     assert "realitygap report 'my results'" in done.stdout
     assert "polars.scan_parquet('my results/trials/*.parquet')" in done.stdout

@@ -47,7 +47,7 @@ def test_the_port_is_printed_first_and_linked_until_it_is_told_to_end(tmp_path, 
     assert not link.is_symlink()
 
 
-def test_on_a_tcp_port_with_a_witness_and_a_state_that_stays(tmp_path):
+def test_emulator_on_a_tcp_port_has_a_witness_and_keeps_its_state(tmp_path):
     state = tmp_path / "robot.json"
     for expected in (b"Scribby ", b"Rosie   "):
         options = ("--tcp", "0", "--witness", "0", "--state", str(state), "--timing", "off", "--speed", "5")

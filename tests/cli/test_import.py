@@ -91,7 +91,7 @@ def test_import_writes_trials_and_reports_what_it_did(log, tmp_path):
     assert (report["n_steps"], report["step_s"]) == (40, 0.2)
 
 
-def test_import_names_mistakes(log, tmp_path):
+def test_import_reports_likely_mistakes(log, tmp_path):
     commands, poses = drive(300)
     write(log, rows(commands[:, ::-1], poses))
     assert "Check (swapped)" in run("import", log, "-o", tmp_path / "trials.jsonl")

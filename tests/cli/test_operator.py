@@ -418,7 +418,7 @@ def test_cells_are_marked_cleared_and_taken_back():
     assert "[#]" in "".join(written)
 
 
-def test_later_enters_nothing():
+def test_canceling_the_editor_enters_nothing():
     arena = paper_arena()
     assert edit_cells(arena.grid, arena.start, keys("right", "space", "escape"), lambda text: None) is None
     assert edit_cells(arena.grid, arena.start, keys("space"), lambda text: None) is None

@@ -73,7 +73,7 @@ def test_mistakes_are_said_in_words(folder, tmp_path):
         run("transfer", "sim-paper", "--to", "sim", "--strategy", "select", *SMALL, "-o", folder)
 
 
-def test_what_cannot_be_is_refused_before_a_trial_is_spent(folder, tmp_path):
+def test_wrong_options_are_refused_before_a_trial_is_spent(folder, tmp_path):
     champion, out = folder / "champions" / "select-3-0.json", tmp_path / "travels"
     run("gap", "sim", "sim", "--n-controllers", "2", "--trials", "2", "-o", tmp_path / "gap.jsonl")
     recorded = f"recorded:{tmp_path / 'gap.jsonl'}"

@@ -72,7 +72,7 @@ def test_the_emulator_refuses_a_twin_that_it_cannot_move(tmp_path):
         assert said in str(done.exception)
 
 
-def test_what_cannot_be_rendered_is_refused(tmp_path):
+def test_render_refuses_wrong_options(tmp_path):
     file = tmp_path / "a.toml"
     twin("sample", "--family", "close", "-o", file)
     for options, said in (

@@ -284,7 +284,7 @@ def test_serial_memory_is_written_read_and_erased():
     assert say(robot, bytes((90, 1, 2, 0, 7))) == b"\xff"
 
 
-def test_leds_servos_and_log_of_a_fluke_2():
+def test_a_fluke_2_sets_leds_and_servos_and_returns_its_log():
     robot = make("s2", "2")
     assert say(robot, bytes((116, 126, 200, 12, 1, 77, 13, 1, 0x23))) == b""
     assert (robot.fluke.front_led, robot.fluke.back_led, robot.fluke.servos[1]) == (True, 200, 77)
@@ -382,7 +382,7 @@ def test_distance_is_near_0_at_a_wall_and_99_where_nothing_is():
     assert ask(robot, 172, 0, 0, 100) == b"\x01"  # the highest threshold sees nothing
 
 
-def test_volume_and_microphone():
+def test_an_s2_sets_its_volume_and_measures_sound():
     robot = make("s2")
     assert len(ask(robot, 160, 55)) == 11
     assert robot.memory.volume == 55

@@ -43,7 +43,7 @@ def test_dropped_bytes_are_as_many_as_asked_for_and_the_same_for_a_seed():
     assert 0.4 < whole < 0.75  # 0.98 ** 29 = 0.56
 
 
-def test_extra_and_flipped_bytes():
+def test_faults_add_and_flip_bytes_of_answers():
     assert any(len(answer) > 20 for answer in conversation(1, extra=0.01))
     flipped = conversation(1, flip=0.01)
     assert any(len(answer) == 20 and answer[:9] != packet(65) for answer in flipped)

@@ -68,17 +68,17 @@ def hurl(model, fluke, n, seed, faults=None, pauses=PAUSES):
 
 
 @pytest.mark.parametrize(("model", "fluke"), SET_UPS)
-def test_ten_thousand_random_and_mutated_strings(model, fluke):
+def test_emulator_survives_ten_thousand_random_and_mutated_strings(model, fluke):
     assert hurl(model, fluke, 10_000 // len(SET_UPS) + 1, 1) > 10_000
 
 
-def test_random_strings_over_a_link_with_faults():
+def test_emulator_survives_random_strings_over_a_link_with_faults():
     hurl("s2", "2", 1000, 2, Faults(drop=0.05, extra=0.05, flip=0.05, delay=0.1, hangup=20.0, sag=0.4))
 
 
 @pytest.mark.long
 @pytest.mark.parametrize(("model", "fluke"), SET_UPS)
-def test_a_million_random_and_mutated_strings(model, fluke):
+def test_emulator_survives_a_million_random_and_mutated_strings(model, fluke):
     pauses = (0.0,) * 12 + PAUSES
     assert hurl(model, fluke, 1_000_000 // len(SET_UPS) + 1, 3, pauses=pauses) > 100_000
 

@@ -19,7 +19,7 @@ def open_port(url="emulator://s2?fluke=2&speed=off", **given):
     return serial.serial_for_url(url, **given)
 
 
-def test_a_command_through_the_port():
+def test_a_command_through_the_port_is_echoed_and_answered():
     with open_port() as port:
         port.write(packet(65))
         assert port.read(9) == packet(65)
@@ -59,7 +59,7 @@ def test_without_a_timeout_reading_for_ever_is_refused():
         port.read(1)
 
 
-def test_lines_and_single_bytes():
+def test_a_port_reads_lines_and_single_bytes():
     port = open_port()
     port.write(b"P" + b" " * 8)
     assert port.readline() == b"fluke:3.0.5,Robot-Version:1.1.5,Robot:Scribbler2,Mode:Serial\n"

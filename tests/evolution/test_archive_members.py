@@ -18,7 +18,7 @@ def test_an_archive_fills_in_order_and_then_the_oldest_gives_way_to_the_novel():
     ]
 
 
-def test_of_individuals_that_behave_alike_the_first_is_named():
+def test_the_first_of_individuals_that_behave_alike_is_named():
     assert archive_members([[[5], [5], [6]]], NoveltySettings(archive_size=3)) == [[(0, 0), (0, 0), (0, 2)]]
 
 

@@ -36,7 +36,7 @@ def matrix(name: str, behaviors: list[Any]) -> np.ndarray:
 
 @pytest.mark.parametrize("name", DISTANCES)
 @given(data=st.data())
-def test_what_claims_to_be_a_metric_is_one(name: str, data: st.DataObject) -> None:
+def test_distances_that_claim_to_be_metrics_are_metrics(name: str, data: st.DataObject) -> None:
     """Of three behaviors: 0 means equal, both ways are the same, and no way over the third is shorter."""
     assert DISTANCES[name].is_metric
     kind = LISTS if DISTANCES[name].compares == "cells" else POSITIONS

@@ -258,7 +258,7 @@ def test_a_model_wants_names_for_the_inputs_that_are_given():
 
 
 @pytest.mark.parametrize("wrong", [3, [1], "genome"])
-def test_what_is_no_mapping_is_refused_as_one(wrong):
+def test_from_dict_refuses_values_that_are_no_mappings(wrong):
     for kind in (Genome, Network):
         with pytest.raises(RecordError, match="The mapping has the format None"):
             kind.from_dict(wrong)

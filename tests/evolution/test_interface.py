@@ -79,7 +79,7 @@ def test_inputs_are_computed_by_their_names(names, readings, stalled, step):
     assert sense(readings, stalled, step, {}) == [told[name] for name in names]
 
 
-def test_what_a_robot_lacks_is_named_in_one_message():
+def test_one_message_names_all_inputs_that_a_robot_lacks():
     with pytest.raises(ControllerError) as refused:
         ControllerInterface(("range.1", "light.0", "light.1")).check(inputs_of_robot(3), "X", "Y")
     assert str(refused.value).startswith(

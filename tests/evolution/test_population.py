@@ -181,7 +181,7 @@ def test_selection_is_for_the_fitter() -> None:
         ([1.0, 2.0, 3.0, math.inf, 5.0], r"fitness\[3\] is inf"),
     ],
 )
-def test_what_is_no_fitness_is_refused_and_changes_nothing(fitness: list[float], message: str) -> None:
+def test_wrong_fitness_is_refused_and_changes_nothing(fitness: list[float], message: str) -> None:
     population, untouched = (Population(2, 1, NeatSettings(population=5), seed=1) for _ in range(2))
     with pytest.raises(ValueError, match=message):
         population.tell(fitness)
@@ -251,7 +251,7 @@ def test_numpy_s_whole_numbers_are_taken() -> None:
 
 
 @pytest.mark.parametrize("fitness", [["1", "2"], [1j, 2j], object(), {"a": 1.0}, "12", [[1.0], [1.0, 2.0]]])
-def test_what_is_not_made_of_numbers_is_no_fitness(fitness: Any) -> None:
+def test_fitness_that_is_not_made_of_numbers_is_refused(fitness: Any) -> None:
     population = Population(2, 1, NeatSettings(population=2))
     with pytest.raises(TypeError, match="expected 2 real numbers, one for each genome asked"):
         population.tell(fitness)

@@ -97,7 +97,7 @@ def test_correlation_plan_is_enough_for_the_interval_that_gap_prints():
     assert sum(low > 0.7 for low in lows) > 136
 
 
-def test_what_cannot_be_is_refused():
+def test_plans_refuse_goals_that_cannot_be_reached():
     with pytest.raises(ValueError, match="least"):
         plan_correlation(0.5, least=0.6, reliability=1.0, trials=1)
     with pytest.raises(ValueError, match="effect is 0"):
@@ -127,7 +127,7 @@ def test_tiny_effect_needs_more_controllers_than_are_planned_for():
     assert plan_effect(1e-9, spread=0.1, noise=0.1, trials=1).controllers is None
 
 
-def test_spread_and_reliability_by_hand():
+def test_spread_and_reliability_equal_those_by_hand():
     assert spread_of_differences(0.03, 0.1, 50) == pytest.approx((0.0009 + 0.0004) ** 0.5)
     assert trial_reliability(0.1, 0.2, 4) == pytest.approx(0.5)
 

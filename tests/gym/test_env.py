@@ -389,6 +389,6 @@ def test_platforms_have_names_and_noise_of_their_own(tmp_path):
         (SimPlatform(set={"arena.start.x": {"uniform": [0.0, 0.4]}}), "does not fit at the start"),
     ],
 )
-def test_what_is_no_platform_is_refused(platform, message):
+def test_environment_refuses_wrong_platforms(platform, message):
     with pytest.raises(ValueError, match=message):
         realitygap.gym.RobotEnv(platform=platform)

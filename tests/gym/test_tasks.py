@@ -232,7 +232,7 @@ def test_defaults_are_those_of_the_study_of_the_task(kind):
         ({"render_mode": "human"}, ValueError, "render_mode is 'human', expected None or 'rgb_array'"),
     ],
 )
-def test_what_no_environment_can_be_is_refused(settings, error, message):
+def test_environment_refuses_wrong_settings(settings, error, message):
     with pytest.raises(error, match=message):
         realitygap.gym.RobotEnv(**settings)
 

@@ -30,7 +30,7 @@ def ends_of(words, lowest, highest):
         highest[k] = highest_bit(words[k])
 
 
-def test_the_lowest_and_the_highest_bit_of_a_word() -> None:
+def test_the_lowest_and_the_highest_bit_of_a_word_are_found() -> None:
     singles = [1 << k for k in range(32)]
     pairs = [one | other for one in singles for other in singles]
     words = np.array(pairs, np.uint32)

@@ -176,7 +176,9 @@ def test_the_share_of_averaged_children_is_that_of_the_settings(share: float) ->
         ("coin", True, None, 0.0),
     ],
 )
-def test_how_often_a_gene_is_disabled(rule: str, in_a: bool, in_b: bool | None, chance: float) -> None:
+def test_genes_are_disabled_as_often_as_the_rule_states(
+    rule: str, in_a: bool, in_b: bool | None, chance: float
+) -> None:
     """Four standard errors: 1 in 16,000 by chance."""
     neat = Neat(settings(disabled_rule=rule, stay_disabled=0.75), 10, 4)
     a, b = (neat.first_genome(Stream(k, 0, 0, 0, 2)) for k in (1, 2))

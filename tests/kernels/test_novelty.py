@@ -165,7 +165,7 @@ def test_two_individuals_with_one_behavior_are_compared_with_each_other() -> Non
         (True, [11, 71], True),  # as cell 11, and 12.1 for the cell that no other has
     ],
 )
-def test_who_enters_is_more_novel_than_every_archived_one_or_than_the_least(
+def test_newcomer_enters_if_it_is_more_novel_than_all_or_than_the_least_novel(
     above_all: bool, newcomer: Cells, enters: bool
 ) -> None:
     """Archived are the cells 0, 1 and 10, with mean distances to one another of 5.5, 5 and 9.5."""

@@ -53,7 +53,7 @@ def stream_of(key: int, **fields: int) -> tuple[np.uint32, ...]:
 
 
 @pytest.mark.parametrize(("counter", "key", "result"), KNOWN)
-def test_known_answers(counter: str, key: str, result: str) -> None:
+def test_philox_gives_the_known_answers(counter: str, key: str, result: str) -> None:
     assert reference.philox(words(counter), words(key)) == words(result)
     assert kernel_philox(words(counter), words(key)) == words(result)
 

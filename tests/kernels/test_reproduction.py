@@ -69,7 +69,7 @@ def test_shares_that_are_rounded_up_have_the_largest_remainders(share: list[floa
         assert min(up) > max(down) - Fraction(1, 10**9)
 
 
-def test_of_equal_remainders_the_earlier_is_rounded_up() -> None:
+def test_the_earlier_of_equal_remainders_is_rounded_up() -> None:
     assert rounded([1.0, 1.0, 1.0], 8) == [3, 3, 2]
     assert rounded([1.0, 1.0], 3) == [2, 1]
     assert rounded([1.0, 3.0], 2) == [1, 1]
@@ -127,7 +127,7 @@ def test_positive_fitness_is_not_shifted() -> None:
     assert offspring(settings(negative_fitness="shift"), [[1.0] * 4, [3.0] * 4]) == [2, 6]
 
 
-def test_where_all_fitness_is_zero_or_equal_and_negative_species_keep_their_sizes() -> None:
+def test_species_keep_their_sizes_if_all_fitness_is_zero_or_equal_and_negative() -> None:
     assert offspring(settings(), [[0.0] * 5, [0.0] * 2, [0.0]]) == [5, 2, 1]
     assert offspring(settings(), [[-3.0] * 5, [-3.0] * 2, [-3.0]]) == [5, 2, 1]
 
@@ -304,7 +304,7 @@ def test_parents_are_the_fittest_part_of_their_species(survival: float, allowed:
 
 
 @pytest.mark.parametrize("crossover", [0.0, 0.75, 1.0])
-def test_as_many_children_as_said_have_two_parents(crossover: float) -> None:
+def test_the_stated_share_of_children_has_two_parents(crossover: float) -> None:
     """With ten possible parents a tenth of the pairs are one and the same: those have one.
 
     Four standard errors: 1 in 16,000 by chance.
@@ -320,7 +320,7 @@ def test_as_many_children_as_said_have_two_parents(crossover: float) -> None:
     assert abs(two.mean() - share) <= 4 * np.sqrt(share * (1 - share) / two.size)
 
 
-def test_as_many_children_of_two_parents_as_said_are_not_mutated() -> None:
+def test_the_stated_share_of_children_of_two_parents_is_not_mutated() -> None:
     """Four standard errors: 1 in 16,000 by chance."""
     untouched = []
     for key in range(cases(100, 20)):

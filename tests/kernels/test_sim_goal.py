@@ -34,7 +34,7 @@ def test_the_goal_is_in_the_quarter_that_its_bearing_says(real):
     assert (seen.sum(axis=0) == 1).all()
 
 
-def test_on_a_border_and_at_the_goal_exactly_one_quarter_has_it():
+def test_exactly_one_quarter_sees_the_goal_on_a_border_and_at_the_goal():
     for x, y in ((1, 1), (-1, 1), (-1, -1), (1, -1), (0, 0)):
         seen = sectors(x, y, 0.0, 0.0, 0.0)
         assert (seen.sum(axis=0) == 1).all()

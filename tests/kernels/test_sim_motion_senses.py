@@ -113,7 +113,7 @@ def test_drift_turns_the_reckoned_heading_by_the_meter_at_any_step() -> None:
         assert driven.reckoned[2, 0] * math.tau == pytest.approx(0.45)
 
 
-def test_without_errors_a_turn_on_the_spot_goes_around_the_axle() -> None:
+def test_a_turn_on_the_spot_without_errors_goes_around_the_axle() -> None:
     driven = Driven(np.float64, axle=0.05)
     quarter = 0.15 * math.pi / 4  # of each wheel
     for _ in range(10):
@@ -121,7 +121,7 @@ def test_without_errors_a_turn_on_the_spot_goes_around_the_axle() -> None:
     assert driven.reckoned[:, 0] == pytest.approx([0.05, -0.05, 0.25])
 
 
-def test_as_an_input_full_speed_is_one() -> None:
+def test_full_speed_is_one_as_an_input() -> None:
     value = row(0.0, np.float64)
     said = row(np.linspace(-0.2, 0.2, LANES), np.float64)
     encoders.as_input(said, row(0.15, np.float64), 0.5, value)

@@ -74,7 +74,7 @@ def test_dropouts_and_outliers_have_the_stated_probabilities(near: float) -> Non
     assert set(np.round(answer, 5)) == {0.0, 0.25, 0.75}
 
 
-def test_where_both_want_more_than_all_dropouts_keep_their_share() -> None:
+def test_dropouts_keep_their_share_if_both_shares_add_up_to_more_than_one() -> None:
     n = cases(1 << 14, 1 << 10)
     choices = (np.arange(n, dtype=np.uint64) * (2**32 // n) + 2**31 // n).astype(np.uint32).reshape(-1, LANES)
     value = np.full(LANES, 0x40000000, np.uint32)

@@ -86,7 +86,7 @@ def test_tables_equal_the_reference_with_another_table_in_each_lane(real: Any) -
             assert answer[lane] == pytest.approx(plain, abs=steepest * TOLERANCE[real])
 
 
-def test_of_two_entries_at_one_distance_the_later_adds_nothing() -> None:
+def test_the_later_of_two_entries_at_one_distance_adds_nothing() -> None:
     near = np.array([[0.1, 0.2, 0.3] + [0.0] * (LANES - 3)])
     answer = respond("table", near, table=[(0.0, 1.0), (0.2, 0.5), (0.2, 0.0), (0.4, 0.0)])
     assert answer[:3].tolist() == [0.75, 0.5, 0.5]
@@ -186,7 +186,7 @@ number = st.floats(0.02, 2.0)
     decay=number,
     kind=st.sampled_from(["linear", "ir", "table", "lorentz"]),
 )
-def test_what_is_farther_never_reads_more(
+def test_a_farther_wall_never_reads_more(
     near: float, far: float, amplitude: float, decay: float, kind: str
 ) -> None:
     near, far = sorted([near, far])

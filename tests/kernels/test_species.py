@@ -35,7 +35,7 @@ def genome(*genes: tuple[int, float], disabled: int = -1) -> Genome:
 COEFFICIENTS = {"excess_coefficient": 2.0, "disjoint_coefficient": 3.0, "weight_coefficient": 0.5}
 
 
-def test_the_distance_of_the_papers_figure() -> None:
+def test_the_distance_of_the_papers_figure_is_reproduced() -> None:
     """EC02, figure 4: genes 1-5 and 8 against 1-7, 9, 10: disjoint 6, 7, 8; excess 9, 10."""
     neat = Neat(settings(**COEFFICIENTS), 1, 1)
     one = genome(*((number, 1.0) for number in (1, 2, 3, 4, 5, 8)))
@@ -68,7 +68,7 @@ def test_genomes_without_a_gene_in_common_are_infinitely_far_apart() -> None:
     assert distance(neat, genome((0, 1.0)), genome((1, 1.0))) == math.inf
 
 
-def test_without_a_gene_in_common_structure_alone_counts_where_weights_do_not() -> None:
+def test_structure_alone_counts_if_no_gene_is_common_and_weights_do_not_count() -> None:
     neat = Neat(settings(**{**COEFFICIENTS, "weight_coefficient": 0.0}), 1, 1)
     assert distance(neat, genome((0, 1.0)), genome((1, 1.0), (2, 1.0))) == 3.0 + 2.0 * 2
 

@@ -206,7 +206,7 @@ def jyro_pairs(n: int) -> Any:
         )
 
 
-def test_with_the_same_commands_a_robot_goes_senses_and_is_blocked_as_jyros() -> None:
+def test_a_robot_with_the_same_commands_moves_senses_and_is_blocked_as_jyros() -> None:
     """Readings within Jyro's rounding; no trial here has a contact that near to a wall."""
     stalls = 0
     for platform, start, found, _ in jyro_pairs(cases(100, 6)):
@@ -221,7 +221,7 @@ def test_with_the_same_commands_a_robot_goes_senses_and_is_blocked_as_jyros() ->
     assert stalls > 50
 
 
-def test_with_the_same_network_most_paths_stay_on_jyros() -> None:
+def test_most_paths_of_the_same_network_stay_on_jyros() -> None:
     """Jyro rounds readings; some networks make that grow, so that a few paths leave the others for good."""
     apart = []
     for platform, start, found, network in jyro_pairs(cases(100, 10)):
@@ -313,7 +313,7 @@ def test_planes_and_segments_give_one_path_where_walls_enclose_the_robot(
     assert stalls > 100
 
 
-def test_which_scenes_are_enclosed() -> None:
+def test_only_a_closed_convex_scene_with_nothing_inside_is_enclosed() -> None:
     paper = paper_arena()
     assert jyro_scene(JyroPlatform(precision="double"), paper).is_enclosed
     assert jyro_scene(

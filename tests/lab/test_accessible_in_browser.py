@@ -33,7 +33,7 @@ def look(visit):
     return lambda path, **options: visit(path, bypass_csp=True, reduced_motion="reduce", **options)
 
 
-def test_pages_without_a_study(lab, look):
+def test_pages_without_a_study_are_accessible(lab, look):
     for path, text in (
         ("", "No studies yet."),
         ("new", "Start study"),
@@ -98,7 +98,7 @@ def test_trials_that_are_counted_from_a_photo(lab, look):
     assert faults(page, lab.root) == []
 
 
-def test_a_robot_in_a_sitting_and_in_the_hand(lab, look):
+def test_pages_of_a_connected_robot_are_accessible(lab, look):
     make_study(lab.root)
     page = look("study/by-robot/trials")
     begin_sitting(page)
@@ -123,7 +123,7 @@ def test_a_robot_in_a_sitting_and_in_the_hand(lab, look):
     assert faults(robot, lab.root) == []
 
 
-def test_a_calibration_whose_plot_grows_and_its_result(lab, look):
+def test_pages_of_a_running_and_of_a_finished_calibration_are_accessible(lab, look):
     page = look("calibrate")
     page.get_by_role("button", name="Next").click()
     assert keyboard(page) == []

@@ -34,7 +34,7 @@ class _Page:
         pass
 
 
-def test_what_the_camera_sees_is_proposed_and_entered_with_its_path_once_somebody_has_looked(tmp_path):
+def test_cells_that_the_camera_saw_are_entered_with_their_path_after_a_person_has_checked_them(tmp_path):
     study, folder = small_study("coverage", steps="6"), tmp_path / "seen"
     operator = PageOperator(_Page(), folder)
     camera = _AboveEmulator(lambda: operator.observer.beside)

@@ -44,7 +44,7 @@ def test_a_missing_extra_is_one_message(tmp_path: Path):
     assert "Traceback" not in done.stderr
 
 
-def test_what_cannot_be_is_told_before_anything_is_served(tmp_path: Path):
+def test_wrong_options_are_refused_before_the_lab_serves_a_page(tmp_path: Path):
     with (
         socket.create_server(("127.0.0.1", 0)) as other,
         pytest.raises(RealityGapError, match="Is a lab running there"),

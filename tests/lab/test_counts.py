@@ -51,7 +51,7 @@ def counts(folder: Path) -> Counts:
     return Counts(folder, ResultsFolder.open(folder).description)
 
 
-def test_what_another_program_writes_is_seen_and_nothing_is_read_twice(folder, counts):
+def test_changes_by_another_program_are_seen_and_nothing_is_read_twice(folder, counts):
     assert counts.look() == []
     with begin(folder) as ledger:
         assert counts.look() == []

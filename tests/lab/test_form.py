@@ -32,7 +32,7 @@ NAMES = st.sampled_from(["study", "arena", "task", "neat", "novelty", "trials", 
     st.lists(st.dictionaries(TEXTS, VALUES | TABLES, max_size=2), max_size=2),
     PLATFORMS,
 )
-def test_what_is_written_is_read_again(rest, conditions, platforms):
+def test_a_written_form_is_read_as_it_was(rest, conditions, platforms):
     data = {**rest, "platform": platforms, **({"condition": conditions} if conditions else {})}
     assert read_form(written_form(data)) == data
 
@@ -49,7 +49,7 @@ def test_every_setting_has_an_explanation():
 
 
 @pytest.mark.parametrize("text", ["a = " + "[" * 5000, "[", "a", 'a = "'])
-def test_what_is_no_study_file_is_a_value_error(text):
+def test_reading_a_wrong_study_file_raises_a_value_error(text):
     with pytest.raises(ValueError):  # noqa: PT011  # of TOML's reader, or ours
         read_form(text)
 

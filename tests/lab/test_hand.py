@@ -93,7 +93,7 @@ def test_a_press_that_began_before_a_stop_and_whose_first_word_comes_after_it_dr
     assert x(hand) == pytest.approx(began, abs=1e-6)
 
 
-def test_what_is_no_number_drives_nowhere(hand):
+def test_commands_that_are_no_numbers_move_nothing(hand):
     hand.drive("fast", float("nan"), 0)  # type: ignore[arg-type]
     hand.drive([], {}, 0)  # type: ignore[arg-type]
     began = x(hand)

@@ -47,7 +47,7 @@ def test_a_part_is_drawn_anew_when_it_has_changed_and_only_then():
     assert (shown, part._refreshable.n_asked) == (["a", "b"], 1)
 
 
-def test_what_changes_while_it_is_drawn_is_drawn_after_it():
+def test_a_change_during_drawing_is_drawn_afterwards():
     state, shown = ["a"], []
 
     def show(now: str) -> None:
@@ -60,7 +60,7 @@ def test_what_changes_while_it_is_drawn_is_drawn_after_it():
     assert part._refreshable.n_asked == 1
 
 
-def test_what_could_not_be_shown_is_tried_again():
+def test_a_failed_drawing_is_tried_again():
     state, shown = ["a"], []
 
     def show(now: str) -> None:

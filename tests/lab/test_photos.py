@@ -64,7 +64,7 @@ def test_the_same_photo_sent_twice_is_read_once(photos):
     assert [each.state for each in kept.photos()] == ["reading"]
 
 
-def test_what_was_being_read_when_the_lab_ended_is_read_anew_and_what_cannot_be_is_forgotten(
+def test_photos_that_were_being_read_when_the_lab_ended_are_read_again_and_all_can_be_forgotten(
     photos, tmp_path
 ):
     kept = photos()

@@ -106,7 +106,7 @@ def test_a_gamepad_drives_while_the_handle_has_the_focus(visit):
     page.get_by_text("Standing", exact=True).wait_for()
 
 
-def test_who_watches_can_stop_it_and_cannot_drive_it(visit):
+def test_a_person_who_watches_can_stop_the_robot_and_cannot_drive_it(visit):
     page = visit("robot")
     connect(page)
     watcher = visit("robot")

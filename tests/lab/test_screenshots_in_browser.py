@@ -84,7 +84,7 @@ def test_studies_and_one_that_is_watched(lab, visit):
     keep(page, "studies")
 
 
-def test_a_robot_driven_by_hand(lab, visit):
+def test_screenshots_show_a_robot_driven_by_hand(lab, visit):
     page = visit("robot", size=PHONE, has_touch=True, **FINE)
     page.get_by_role("button", name="Use an emulated robot").click()
     page.get_by_text("Battery").wait_for()
@@ -93,7 +93,7 @@ def test_a_robot_driven_by_hand(lab, visit):
     keep(page, "robot")
 
 
-def test_a_sitting_on_a_phone(lab, visit):
+def test_screenshots_show_a_sitting_on_a_phone(lab, visit):
     make_study(lab.root, steps=60)
     page = visit("study/by-robot/trials", size=PHONE, has_touch=True, **FINE)
     begin_sitting(page, "emulator://s2?fluke=2&speed=1")
@@ -106,7 +106,7 @@ def test_a_sitting_on_a_phone(lab, visit):
     keep(page, "trial")
 
 
-def test_a_sheet_counted_from_its_photo(lab, visit):
+def test_screenshots_show_a_sheet_counted_from_its_photo(lab, visit):
     lines = drive_sheet(lab.root)
     page = visit("study/by-robot/trials", size=TALL)
     page.get_by_label("Your name").fill("anna")

@@ -101,7 +101,7 @@ def test_messages_are_those_of_ros_with_their_units(tmp_path):
     assert nearest.range == pytest.approx(nearest.max_range * (1 - made.readings[0, 0]), rel=1e-6)
 
 
-def test_without_its_mapping_a_bag_is_guessed(tmp_path):
+def test_a_bag_without_its_mapping_is_guessed(tmp_path):
     made = trial()
     report = write_bag(made, HEAD, tmp_path / "trial.mcap")
     report.mapping.unlink()
@@ -115,7 +115,7 @@ def test_without_its_mapping_a_bag_is_guessed(tmp_path):
     np.testing.assert_allclose(again.readings, made.readings, atol=1e-6)
 
 
-def test_what_nobody_observed_has_no_topic(tmp_path):
+def test_observations_that_were_not_made_have_no_topic(tmp_path):
     made = trial(wheels=np.empty((0, 2)), poses=np.empty((0, 3)), last_readings=np.empty(0))
     report = write_bag(made, HEAD, tmp_path / "trial.mcap")
     assert set(report.n_messages) == {"/cmd_vel"} | {f"/range_{k}" for k in range(made.readings.shape[1])}
@@ -145,7 +145,7 @@ def test_times_of_a_real_robot_are_kept(tmp_path):
     assert found.n_steps == 12
 
 
-def test_what_cannot_be_a_bag_has_one_message(tmp_path):
+def test_wrong_input_for_a_bag_gets_one_message(tmp_path):
     write_bag(trial(), HEAD, tmp_path / "trial.mcap")
     with pytest.raises(LogError, match=r"trial\.mcap exists already"):
         write_bag(trial(), HEAD, tmp_path / "trial.mcap")

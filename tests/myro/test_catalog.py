@@ -40,7 +40,7 @@ def test_every_name_of_myro_is_done_or_left_out():
     assert set(MYRO) - set(names()) == set()
 
 
-def test_what_is_listed_beyond_myro_is_known():
+def test_names_beyond_myro_are_those_of_calico():
     # these are of Calico's Myro 3
     assert set(names()) - set(MYRO) == {"makeRobot", "penUp", "penDown", "joystick", "getKeyPressed"}
 
@@ -55,7 +55,7 @@ def test_a_star_import_gives_every_name():
     assert {*names(), "MyroError"} == set(space) - {"__builtins__"}
 
 
-def test_what_is_left_out_says_why_when_called():
+def test_functions_that_are_left_out_give_a_reason_when_called():
     for name, reason in LEFT_OUT.items():
         assert reason.strip().endswith("."), name
         with pytest.raises(MyroError, match=rf"^{name}\(\) is left out\. "):

@@ -120,7 +120,7 @@ def test_mistakes_with_shapes_are_said_plainly(act, message):
         act()
 
 
-def test_what_is_drawn_twice_or_into_a_closed_window_is_refused():
+def test_drawing_twice_or_into_a_closed_window_is_refused():
     window = GraphWin("Once")
     point = Point(1, 1)
     point.draw(window)
@@ -132,7 +132,7 @@ def test_what_is_drawn_twice_or_into_a_closed_window_is_refused():
         Point(2, 2).draw(window)
 
 
-def test_distances():
+def test_distance_is_the_length_of_a_straight_line():
     assert myro.distance((0, 0), (3, 4)) == 5
 
 

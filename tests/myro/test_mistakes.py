@@ -23,7 +23,7 @@ def test_a_number_may_be_of_any_kind_of_number():
 
 
 @pytest.mark.parametrize("value", ["fast", None, [1], float("nan"), float("inf")])
-def test_what_is_no_number_is_refused_by_name(value):
+def test_values_that_are_no_numbers_are_refused_by_name(value):
     with pytest.raises(MyroError, match=r"^forward: the speed is .*, expected a number"):
         number("forward: the speed", value)
 
@@ -58,7 +58,7 @@ def test_words_are_known_in_any_case_and_numbers_of_any_kind():
     assert choice("it", 1.0, {1: 5}) == 5
 
 
-def test_on_and_off():
+def test_switches_accept_on_and_off_and_refuse_other_words():
     assert [is_on("it", value) for value in ("on", "OFF", 1, 0, True, None)] == [
         True,
         False,

@@ -85,7 +85,7 @@ def test_colors_are_made_compared_and_given(picture):
     assert repr(myro.pink) == "<Color instance (r=255, g=175, b=175, a=255)>"
 
 
-def test_lighter_and_darker_colors():
+def test_colors_become_lighter_and_darker():
     color = makeColor(100, 200, 0)
     makeLighter(color)
     assert color.getRGB() == (154, 219, 89)
@@ -140,7 +140,7 @@ def test_pictures_are_turned_and_scaled(picture):
     assert (picture.width, picture.height) == (3, 3)
 
 
-def test_arrays_and_columns_of_pictures(picture):
+def test_arrays_have_rows_and_pictures_become_arrays(picture):
     array = makeArray(2, 3)
     array[1][2] = 7
     assert (len(array), array[1][2], array[0][2]) == (2, 7, 0)

@@ -82,7 +82,7 @@ def test_times_that_are_none_are_refused(act):
         act()
 
 
-def test_chance():
+def test_functions_of_chance_give_all_their_values():
     random.seed(1)
     assert {myro.flipCoin() for _ in range(40)} == {"heads", "tails"}  # by chance alone fails 1 time in 2^39
     assert {myro.heads() for _ in range(40)} == {myro.tails() for _ in range(40)} == {True, False}
@@ -116,7 +116,7 @@ def answers(monkeypatch):
     return given
 
 
-def test_asking(answers):
+def test_ask_returns_one_answer_or_several_and_remembers_them(answers):
     answers(" Rosa ", "3", "blue", "red")
     assert myro.ask("Your name?") == "Rosa"
     assert myro.ask(["One"]) == "3"
@@ -164,7 +164,7 @@ def test_the_number_game_ends(answers, capsys, monkeypatch):
     assert "did not guess it in 10 tries" in capsys.readouterr().out
 
 
-def test_what_is_spoken_is_printed(capsys):
+def test_speak_prints_its_text(capsys):
     myro.speak("Hello")
     myro.stopSpeaking()
     myro.computer.speak("Again")
@@ -205,7 +205,7 @@ def test_a_mistake_in_one_of_the_functions_comes_out():
         myro.doTogether(wrong, lambda: 1)
 
 
-def test_names_of_files_by_a_pattern(tmp_path, monkeypatch):
+def test_get_filenames_returns_sorted_names_that_match_a_pattern(tmp_path, monkeypatch):
     for name in ("b1.jpg", "a1.jpg", "c.txt"):
         (tmp_path / name).write_text("")
     monkeypatch.chdir(tmp_path)

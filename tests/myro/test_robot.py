@@ -70,7 +70,7 @@ def test_a_connection_is_closed_and_opened_again(robot):
     assert myro.getStall() == 0
 
 
-def test_without_an_argument_the_port_is_asked_for(monkeypatch):
+def test_initialize_without_an_argument_asks_for_the_port(monkeypatch):
     monkeypatch.setattr("builtins.input", lambda prompt="": '"emulator://s1?speed=off"')
     myro.init()
     assert myro.identifyRobot() == "SCRIBBLER-1"
@@ -143,14 +143,14 @@ def test_each_way_of_moving_turns_the_wheels_as_myro_says(robot, witness, move):
 
 
 @pytest.mark.parametrize("name", ["forward", "backward", "turnLeft", "turnRight"])
-def test_with_seconds_a_move_blocks_and_ends(robot, witness, name):
+def test_a_move_with_seconds_blocks_and_ends(robot, witness, name):
     before = robot.clock.now()
     getattr(myro, name)(1, 2)
     assert robot.clock.now() - before == pytest.approx(2, abs=0.1)
     assert witness().motors() == (0, 0)
 
 
-def test_without_seconds_a_move_goes_on(robot, witness):
+def test_a_move_without_seconds_goes_on(robot, witness):
     before = robot.clock.now()
     myro.forward(1)
     assert robot.clock.now() - before < 0.1
@@ -215,7 +215,7 @@ def test_senses_of_the_robot_have_myros_shapes(robot):
     assert myro.getLine("right") == 0
 
 
-def test_all_senses_at_once(robot):
+def test_get_all_returns_all_senses_of_the_robot(robot):
     readings = myro.getAll()
     own = {"light", "ir", "line", "stall"}
     assert set(readings) == (own | {"obstacle", "bright", "blob", "battery"} if has_fluke(robot) else own)
@@ -246,7 +246,7 @@ def test_senses_by_name_are_those_of_the_functions(robot):
         myro.get("lihgt")
 
 
-def test_senses_of_the_fluke(robot):
+def test_senses_of_the_fluke_need_a_fluke(robot):
     if not has_fluke(robot):
         for name in NEED_FLUKE:
             with pytest.raises(RobotError, match="needs a Fluke"):
@@ -287,7 +287,7 @@ def test_a_blocked_robot_stalls(robot):
     assert myro.getStall() == 1
 
 
-def test_what_a_scribbler_2_senses(robot):
+def test_senses_of_a_scribbler_2_need_one(robot):
     if not is_s2(robot):
         for name in NEED_S2:
             with pytest.raises(RobotError, match="needs an S2"):
@@ -349,7 +349,7 @@ def test_a_song_keeps_its_tempo(robot):
         myro.playNote(440)
 
 
-def test_volume(robot):
+def test_volume_and_start_song_are_set(robot):
     myro.setVolume("off")
     assert myro.getVolume() == 0
     myro.setVolume(1)
@@ -365,7 +365,7 @@ def test_volume(robot):
         myro.setS2Volume(101)
 
 
-def test_lights(robot):
+def test_lights_of_the_robot_and_of_its_fluke_are_set(robot):
     for where in ("left", "center", "middle", "right", "all", 0, 1, 2):
         for value in ("on", "off", 1, 0):
             myro.setLED(where, value)
@@ -401,7 +401,7 @@ def test_pictures_of_every_kind_have_the_cameras_size(fluke, mode):
         assert red == green == blue
 
 
-def test_a_large_picture(full):
+def test_a_fluke_2_takes_large_pictures(full):
     assert myro.takePicture().width == 1280
     assert full.get("picture", "gray").width == 1280
     with pytest.raises(MyroError, match=r"takePicture: the mode is 'colour'.*Did you mean 'color'"):
@@ -458,7 +458,7 @@ def test_names_passwords_and_data_are_kept(robot):
         myro.setName("a name that is much too long")
 
 
-def test_which_end_is_ahead(robot):
+def test_the_end_that_is_ahead_is_set_with_a_fluke_only(robot):
     if not has_fluke(robot):
         assert myro.getForwardness() == "scribbler-forward"
         with pytest.raises(RobotError, match="needs a Fluke"):
@@ -478,7 +478,7 @@ def test_which_end_is_ahead(robot):
         myro.setForwardness("left")
 
 
-def test_what_the_robot_says_of_itself(robot):
+def test_the_robot_reports_its_kind_and_its_versions(robot):
     info = myro.getInfo()
     assert info["robot"] == ("Scribbler2" if is_s2(robot) else "Scribbler")
     assert ("fluke" in info) == has_fluke(robot)
@@ -488,11 +488,11 @@ def test_what_the_robot_says_of_itself(robot):
     assert myro.identifyRobot() == ("SCRIBBLER-2" if is_s2(robot) else "SCRIBBLER-1")
 
 
-def test_without_a_robot_only_the_version_is_said():
+def test_version_is_the_only_answer_without_a_robot():
     assert set(myro.getInfo()) == {"myro"}
 
 
-def test_restart_and_update(robot, capsys):
+def test_restart_greets_and_update_does_nothing(robot, capsys):
     myro.restart()
     assert "Hello, I'm Scribby!" in capsys.readouterr().out
     assert myro.update() is None
@@ -543,7 +543,7 @@ def test_driving_to_a_place_goes_on_when_arrived(s2, witness):
     assert myro.getEncoders() == [0, 0]
 
 
-def test_turning_to_and_by_degrees_and_radians(s2, witness):
+def test_turns_go_to_and_by_degrees_and_radians(s2, witness):
     myro.turnTo(90, "deg")
     assert math.degrees(witness().pose().heading) == pytest.approx(90, abs=3)
     myro.turnBy(math.pi / 2, "rad")
@@ -554,7 +554,7 @@ def test_turning_to_and_by_degrees_and_radians(s2, witness):
         myro.turnBy(1, "turns")
 
 
-def test_arcs_paths_and_the_names_of_the_object(s2, witness):
+def test_arcs_and_paths_work_under_both_names(s2, witness):
     myro.arcBy(200, 200, 200)
     start = witness().pose()
     myro.arcTo(0, 0, 300)
@@ -571,7 +571,7 @@ def test_arcs_paths_and_the_names_of_the_object(s2, witness):
         myro.moveTo(1e6, 0)
 
 
-def test_infrared_messages(robot):
+def test_infrared_messages_need_a_fluke_and_plain_letters(robot):
     acts = (
         lambda: myro.setCommunicateLeft(), lambda: myro.setCommunicateCenter(False),
         lambda: myro.setCommunicateRight(True), lambda: myro.setCommunicateAll("off"), lambda: myro.sendIRMessage("hi"),
@@ -602,7 +602,7 @@ def test_messages_go_to_the_sides_that_were_chosen(full, monkeypatch):
     assert all(chosen.values())
 
 
-def test_what_only_a_fluke_2_has(robot, capsys):
+def test_servos_log_and_network_need_a_fluke_2(robot, capsys):
     acts = (lambda: myro.servo(0, 100), lambda: myro.getFlukeLog(), lambda: myro.enablePanNetworking())
     for act in acts:
         if robot.driver.info.fluke == "2":

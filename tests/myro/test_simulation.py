@@ -86,14 +86,14 @@ def test_options_come_behind_a_question_mark_too():
     assert myro.makeRobot("SimScribbler").simulation.speed == 1
 
 
-def test_in_real_time_a_second_takes_a_second_and_ten_times_as_fast_a_tenth():
+def test_a_second_takes_a_second_in_real_time_and_a_tenth_at_ten_times_the_speed():
     open_sim(speed=10)
     begun = time.monotonic()
     myro.forward(1, 5)
     assert 0.5 <= time.monotonic() - begun < 30  # the machine may be busy
 
 
-def test_lamps_and_tape_of_an_arena_of_ones_own(tmp_path):
+def test_a_custom_arena_has_lamps_and_tape(tmp_path):
     arena = tmp_path / "lamp.toml"
     arena.write_text(
         "walls = [[0, 0, 2, 0], [2, 0, 2, 2], [2, 2, 0, 2], [0, 2, 0, 0]]\nstart = [1, 0.5, 0]\n"
@@ -115,7 +115,7 @@ def test_lamps_and_tape_of_an_arena_of_ones_own(tmp_path):
 # shown
 
 
-def test_a_map_of_letters():
+def test_a_simulation_prints_as_a_map_of_letters():
     simulation = open_sim(start="center")
     myro.forward(1, 1)
     lines = str(simulation).splitlines()
@@ -202,7 +202,7 @@ def test_anywidget_gets_each_picture(monkeypatch):
     assert "innerHTML" in str(shown[0]._esm)
 
 
-def test_without_anywidget_a_drawing_is_replaced(monkeypatch):
+def test_a_drawing_is_replaced_without_anywidget(monkeypatch):
     updates = []
 
     class Handle:

@@ -78,7 +78,7 @@ def test_functions_that_run_together_end_with_ctrl_c(served, tmp_path):
     assert stands_within(served, 2)
 
 
-def test_a_robot_on_a_tcp_port():
+def test_a_robot_on_a_tcp_port_drives():
     server = serve_tcp(Emulator("s1", "none"), speed=20.0)
     try:
         myro.initialize(server.name)

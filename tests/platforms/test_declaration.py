@@ -346,7 +346,7 @@ def test_twins_without_light_are_written_as_before(files):
     assert (len(seeing.light.mount), len(seeing.line.mount)) == (3, 2)
 
 
-def test_what_a_robot_lacks_is_one_message_before_it_moves():
+def test_one_message_names_the_inputs_that_a_robot_lacks_before_it_moves():
     with emulated("s1?fluke=none", Pose(0.3, 0.3, 0.0)) as robot:
         assert channels_of(robot) == ("light.0", "light.1", "light.2", "line.0", "line.1")
         assert "encoder.0" not in inputs_of_robot(robot.n_sensors, channels_of(robot))

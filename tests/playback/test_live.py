@@ -140,7 +140,7 @@ def test_a_robot_of_which_nobody_knows_where_it_is_is_shown_alone(heard):
     assert told(heard.messages)[-1]["cells"] == []
 
 
-def test_without_anywidget_it_is_said_what_to_install(monkeypatch):
+def test_live_view_without_anywidget_names_the_package_to_install(monkeypatch):
     from realitygap.playback import _player
 
     _player.player_class.cache_clear()

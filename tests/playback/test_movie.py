@@ -151,7 +151,7 @@ def test_a_small_picture_has_room_for_what_matters():
 
 
 @pytest.mark.parametrize("name", ["goal", "light", "paper-boxes", "maze-hard"])
-def test_what_stands_in_an_arena_is_shown(name):
+def test_obstacles_lights_goal_and_floor_of_an_arena_are_shown(name):
     arena = load_arena(name)
     still = SimpleNamespace(
         step_s=0.1,
@@ -189,7 +189,7 @@ def test_an_mp4_plays_as_long_as_the_trial(tmp_path):
     assert np.abs(frames[-1] - made).mean() < 4
 
 
-def test_without_ffmpeg_an_mp4_is_refused_in_one_sentence(tmp_path, monkeypatch):
+def test_an_mp4_without_ffmpeg_is_refused_in_one_sentence(tmp_path, monkeypatch):
     monkeypatch.setattr(_movie.shutil, "which", lambda name, path=None: None)
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
     with pytest.raises(RealityGapError, match=r"needs the program ffmpeg.*(--extra |\[)video"):

@@ -17,7 +17,7 @@ from realitygap.world import paper_arena
 from .trials import straight, turning
 
 
-def test_between_steps_it_is_between_their_ends_and_afterwards_at_the_end():
+def test_the_robot_is_between_the_ends_of_steps_and_afterwards_at_the_last():
     trial = straight(10)
     assert trial.duration_s == pytest.approx(1.0)
     half = trial.at(0.25)

@@ -61,7 +61,7 @@ def test_a_silent_page_stops_the_robot_once(monkeypatch):
 
 
 @pytest.mark.parametrize("value", [None, "1", math.nan, math.inf, [1]])
-def test_what_is_no_number_is_no_command(value):
+def test_values_that_are_no_numbers_give_no_command(value):
     driven = Driven()
     panel = DrivePanel(driven.drive, driven.stop)
     tell(panel, "drive", ahead=value)
@@ -120,7 +120,7 @@ def test_a_world_without_robots_and_numbers_below_0_are_refused():
         world_panel(speed=0)
 
 
-def test_without_anywidget_the_message_says_what_to_install(monkeypatch):
+def test_panel_without_anywidget_names_the_package_to_install(monkeypatch):
     def refuse(name):
         raise ImportError(name)
 

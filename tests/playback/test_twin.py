@@ -61,7 +61,7 @@ def test_a_picture_shows_where_it_ends(camera, tmp_path):
 
 
 @pytest.mark.parametrize("family", ["close", "same"])
-def test_from_above_it_is_drawn_as_other_trials(family, tmp_path):
+def test_a_twin_from_above_is_drawn_as_other_trials(family, tmp_path):
     trial = TwinDrive(sample_twin(family, 1), paper_arena(), 4)
     with Image.open(save_twin_trial(trial, tmp_path / "a.gif", view="above", width=WIDTH)) as movie:
         assert movie.n_frames > 2

@@ -97,7 +97,7 @@ def test_rows_that_do_not_fit_are_refused(spoil, message):
         check_rows(spoil(make_rows()), "coverage", 0)
 
 
-def test_what_is_not_a_frame_is_refused():
+def test_rows_that_are_not_a_frame_are_refused():
     with pytest.raises(TypeError, match="dict"):
         check_rows({}, "coverage", 0)
 

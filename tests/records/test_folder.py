@@ -155,7 +155,7 @@ def test_missing_lists_the_gaps(tmp_path):
 
 
 @pytest.mark.parametrize(("first", "n"), [(2, 2), (1, 2), (3, 4), (0, 9), (3, 1)])
-def test_what_is_published_is_never_overwritten(tmp_path, first, n):
+def test_a_published_chunk_is_never_overwritten(tmp_path, first, n):
     folder = make_folder(tmp_path / "r", 0)
     chunk = folder.publish("coverage", 2, make_rows(first=2, n=2), HASH)
     before = chunk.path.read_bytes()
@@ -377,7 +377,7 @@ def test_a_parquet_file_of_others_under_a_name_of_ours_is_refused(tmp_path, read
     assert str(path) in str(caught.value)
 
 
-def test_what_the_system_puts_into_folders_is_passed_over(tmp_path):
+def test_files_that_systems_put_into_folders_are_ignored(tmp_path):
     folder = make_folder(tmp_path / "r", 1)
     for name in (".DS_Store", "Thumbs.db", "._coverage.000000000-000000001.parquet", ".nfs000123"):
         (folder.path / "trials" / name).write_bytes(b"x")

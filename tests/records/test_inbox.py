@@ -18,7 +18,7 @@ def leave(inbox, first, n, condition="coverage", condition_hash=HASH):
     return Delivery(condition, first, n, condition_hash)
 
 
-def test_what_is_delivered_and_accepted_is_as_if_it_were_published(tmp_path):
+def test_accepted_chunks_equal_published_ones(tmp_path):
     folder, other = make_folder(tmp_path / "a", 0), make_folder(tmp_path / "b", 0)
     with folder.inbox() as inbox:
         folder.accept(inbox, [leave(inbox, 3, 2), leave(inbox, 0, 3)])
@@ -77,7 +77,7 @@ def test_an_inbox_goes_while_others_still_deliver_into_it(tmp_path):
         assert not list(folder.path.glob(".inbox-*"))
 
 
-def test_what_was_not_accepted_goes_with_the_inbox(tmp_path):
+def test_chunks_that_were_not_accepted_are_removed_with_the_inbox(tmp_path):
     folder = make_folder(tmp_path / "r", 0)
     with folder.inbox() as inbox:
         leave(inbox, 0, 3)

@@ -319,7 +319,7 @@ def test_the_file_itself_lets_nothing_be_deleted(ledger, table):
         ),
     ],
 )
-def test_what_cannot_be_done_changes_nothing(ledger, do, said):
+def test_refused_actions_change_nothing(ledger, do, said):
     before = (ledger.trials(), ledger.events())
     with pytest.raises(LedgerError, match=said):
         do(ledger)
@@ -478,7 +478,7 @@ def test_two_writers_take_turns(ledger):
     assert len(ledger.notes()) == 40
 
 
-def test_what_was_committed_survives_a_copy_of_the_files_at_any_moment(tmp_path):
+def test_committed_rows_survive_a_copy_of_the_files_at_any_moment(tmp_path):
     """As after a loss of power: the database and its log of writes as they lie on the disk, without a proper end."""
     ledger = new_ledger(tmp_path)
     drive(ledger, 1)

@@ -150,7 +150,7 @@ def test_a_target_that_is_known_may_have_another_name_and_not_another_identity(t
         ObservationsFile(path, replace(KNOWN, identity="s1, Fluke 1"))
 
 
-def test_where_one_side_is_not_known_the_name_tells_targets_apart(tmp_path: Path) -> None:
+def test_names_distinguish_targets_if_an_identity_is_unknown(tmp_path: Path) -> None:
     path = tmp_path / "one.jsonl"
     write_observations(path, HEAD, [trial(0)])
     path.write_bytes(path.read_bytes().replace(b',"identity":""', b""))  # as files were before

@@ -40,7 +40,9 @@ def test_the_files_of_a_study_are_never_written_over(results, name):
     assert contents(results) == before
 
 
-def test_nor_by_another_way_to_the_same_file(results, tmp_path, monkeypatch):
+def test_a_file_of_results_is_not_overwritten_through_a_link_or_a_relative_path(
+    results, tmp_path, monkeypatch
+):
     before = contents(results)
     (tmp_path / "link.html").symlink_to(results / "study.json")
     (tmp_path / "door").symlink_to(results, target_is_directory=True)

@@ -201,7 +201,7 @@ def test_the_offset_is_that_of_the_simulated_sensors():
     assert np.mean(values) - 0.5 == pytest.approx(0.8 * 0.5, abs=0.011)
 
 
-def test_table_2_as_numbers():
+def test_table_2_of_the_paper_is_read_as_numbers():
     assert table_2()["Physical robot"].tolist() == [0.431, 0.583, 0.333]
 
 

@@ -104,7 +104,7 @@ def test_holm_is_over_all_comparisons(out):
     assert [each.p_holm for each in found] == pytest.approx(holm(np.array([each.p for each in found])))
 
 
-def test_what_is_not_shown_says_what_would_be_found(out):
+def test_a_difference_that_is_not_shown_states_the_detectable_one(out):
     folder = write_results(
         out,
         [_paired("a", noise=0.1), _paired("b", noise=0.5)],
@@ -187,7 +187,7 @@ def test_random_conditions_that_are_alike_are_rarely_told_apart(out):
     assert claims <= 8
 
 
-def test_numbers_in_words():
+def test_p_values_and_differences_are_written_as_people_read_them():
     assert [p_in_words(p) for p in (1.0, 0.05, 0.001, 4.46e-5, 1e-12)] == [
         "1",
         "0.050",

@@ -143,7 +143,7 @@ def test_trials_of_a_study_are_compared_run_against_run(study):
     assert json.loads(json.dumps(audit.to_dict()))["confounds"][1]["of"] == "novelty"
 
 
-def test_what_an_audit_says_names_what_was_used(study):
+def test_notes_of_an_audit_name_the_data_behind_them(study):
     notes = distance_notes(audit_distance("paper", study, n_walks=60, n_pairs=200))
     assert "low-numbered cells weigh most" in notes[2]
     assert notes[3].startswith("Length, random walks: Spearman's correlation")
@@ -173,7 +173,7 @@ def test_conditions_are_drawn_and_the_file_stands_alone(study, tmp_path):
     assert text == save_distance(audit, tmp_path / "again.svg").read_text("utf-8")
 
 
-def test_what_cannot_be_audited_is_refused(study, tmp_path):
+def test_an_audit_refuses_wrong_input(study, tmp_path):
     with pytest.raises(ValueError, match="Unknown distance 'jacard'"):
         audit_distance("jacard")
     with pytest.raises(ValueError, match="n_walks is 3, expected 10 to"):

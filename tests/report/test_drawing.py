@@ -158,7 +158,7 @@ def test_a_choice_of_how_cells_count_shows_both_counts(out):
     assert "median as its selection counts" in texts(draw_choices(folder).svg)
 
 
-def test_without_baselines_there_is_no_choices_figure(out):
+def test_there_is_no_figure_of_choices_without_baselines(out):
     folder = write_results(out, [describe("c")], {"c": random_runs(2)})
     assert compare_choices(folder) == []
     with pytest.raises(ValueError, match="names a baseline"):

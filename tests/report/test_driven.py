@@ -97,7 +97,7 @@ def test_the_report_shows_the_robots_arm_beside_the_simulated_ones(folder, tmp_p
 
 
 @pytest.mark.slow
-def test_figures_of_a_robots_arm(folder):
+def test_figures_of_conditions_on_a_robot_state_their_label(folder):
     assert "EMULATED and SIM" in draw_coverage(folder).caption
     drawing = draw_individuals(folder, "robot")
     assert "EMULATED, n = 1 run" in drawing.caption
@@ -105,7 +105,7 @@ def test_figures_of_a_robots_arm(folder):
     assert "witness saw" in draw_paths(folder, "robot").caption
 
 
-def test_what_no_program_can_do_again_is_said(folder):
+def test_trials_of_a_robot_are_refused_as_no_program_can_repeat_them(folder):
     with pytest.raises(RecordError, match="driven by a robot, and no program drives them again"):
         draw_trial(folder, "robot")
     problems = {each.condition: each.problem for each in retry_champions(folder)}

@@ -25,7 +25,7 @@ from realitygap.report._permutation import SEED
 SAMPLES = st.lists(st.integers(0, 72).map(lambda k: k / 72), min_size=1, max_size=12).map(np.array)
 
 
-def test_a12_by_hand():
+def test_a12_equals_the_one_by_hand():
     # of the 6 pairs 4 are above, 1 is tied: (4 + 1/2) / 6
     assert a12(np.array([3.0, 5.0]), np.array([1.0, 3.0, 4.0])) == pytest.approx(4.5 / 6)
 

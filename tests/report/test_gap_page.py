@@ -62,7 +62,7 @@ def test_figures_say_platforms_trials_and_intervals(gap):
     assert "jyro (SIM)" in draw_gap_why(WHY, gap.study).caption
 
 
-def test_without_a_camera_there_is_no_replay(tmp_path):
+def test_a_gap_without_a_camera_has_no_replay(tmp_path):
     found = gap_between("sim", "jyro", n_controllers=5, trials=2)
     assert draw_gap_replay(found.study) is None
     assert write_gap_report(found, tmp_path / "gap.html").read_text("utf-8").count("<figure") == 3

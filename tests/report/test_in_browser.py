@@ -539,7 +539,7 @@ def luminance(color: str) -> float:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_contrast(show, scheme):
+def test_colors_of_both_themes_have_enough_contrast(show, scheme):
     page = show(color_scheme=scheme)
 
     def contrast(first: str, second: str) -> float:
@@ -636,7 +636,7 @@ def test_reduced_motion_goes_from_step_to_step(show, trials):
 
 
 @pytest.mark.slow
-def test_without_a_script_the_page_says_so(show):
+def test_the_page_without_a_script_says_so(show):
     page = show(java_script_enabled=False)
     assert page.get_by_text("needs JavaScript, which does not run here").is_visible()
     assert not page.locator("#replay-figure").is_visible()

@@ -20,7 +20,7 @@ def emulated(tmp_path_factory):
     ).folder
 
 
-def test_what_an_emulator_s_witness_saw_moves_as_it_was_seen(emulated, tmp_path):
+def test_a_trial_moves_as_the_emulator_s_witness_saw_it(emulated, tmp_path):
     _, (trial,) = choose_moving([emulated], generation=1, individual=0)
     row = emulated.read("robot").row(3, named=True)
     assert (row["generation"], row["individual"]) == (1, 0)

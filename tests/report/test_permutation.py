@@ -141,7 +141,7 @@ def test_coverages_have_a_unit_and_measurements_have_none():
 
 
 @pytest.mark.parametrize("values", [[], [np.nan], [np.inf]])
-def test_what_is_not_a_number_is_refused(values):
+def test_values_that_are_no_finite_numbers_are_refused(values):
     with pytest.raises(ValueError, match="finite"):
         sign_flip_p(np.array(values))
     with pytest.raises(ValueError, match="finite"):

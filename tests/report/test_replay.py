@@ -126,7 +126,7 @@ def test_json_cannot_end_its_element():
 @pytest.mark.parametrize(
     ("most", "generations", "each"), [(24, 3, 8), (23, 3, 7), (5, 3, 1), (2, 2, 1), (1, 1, 1), (0, 0, 0)]
 )
-def test_of_a_large_run_the_best_of_each_generation_are_embedded(tiny, most, generations, each):
+def test_a_large_run_embeds_the_best_of_each_generation(tiny, most, generations, each):
     rows = rows_of(tiny[0], "coverage")
     chosen = _replay._choose(rows, most, "coverage_line")
     assert chosen["generation"].n_unique() == generations

@@ -82,7 +82,7 @@ def test_the_info_lines_of_all_set_ups_are_plain_and_any_letter_less_is_not(setu
             assert codec.info_line(less) == found, less
 
 
-def test_what_older_boards_call_themselves_is_understood():
+def test_names_of_older_boards_are_understood():
     assert codec.info_line(b"dongle:1.9,api:2.0,robot:scribbler,mode:serial\n") == ("s1", "1", "2.0", "1.9")
     assert codec.info_line(b"Fluke:3.0.5,Robot:Scribbler3,Robot-Version:1,Mode:Serial\n")[:2] == ("s2", "2")
     with pytest.raises(ProtocolError, match="calls itself 'roomba'"):

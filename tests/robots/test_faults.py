@@ -197,7 +197,7 @@ def test_a_robot_that_falls_silent_is_one_error_that_says_all_there_is_to_know()
         ("encoders", lambda robot: robot.encoders(zero=True)),
     ],
 )
-def test_what_is_not_safe_to_repeat_is_sent_once_and_said_to_be_in_doubt(name, call):
+def test_commands_that_are_not_safe_to_repeat_are_sent_once_and_reported_as_in_doubt(name, call):
     port = FakePort(FakeScribbler("s2"))
     with Scribbler(port) as robot:
         robot.motors(*LEFT_RIGHT)

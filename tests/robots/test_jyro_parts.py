@@ -381,7 +381,7 @@ def test_storing_the_paddle_of_another_gripper_takes_its_robot() -> None:
     assert gripper.storage == [other]
 
 
-def test_a_device_of_ones_own() -> None:
+def test_a_custom_device_reads_its_robot_in_each_step() -> None:
     class Compass(Device):
         kind = "compass"
 

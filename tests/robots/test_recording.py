@@ -82,7 +82,7 @@ def varied(command):
     return answer
 
 
-def test_what_deviates_from_a_recording_is_said_with_the_step(tmp_path):
+def test_a_call_that_deviates_from_a_recording_is_refused_with_its_step(tmp_path):
     record(tmp_path / "one.jsonl")
     robot = RecordedRobot(tmp_path / "one.jsonl")
     robot.reset()

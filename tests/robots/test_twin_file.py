@@ -78,7 +78,7 @@ def test_an_alien_has_two_oddities_and_every_one_comes_up():
     assert min(counts.values()) > 10
 
 
-def test_what_every_twin_draws_is_drawn_unless_a_family_says_otherwise():
+def test_every_twin_draws_the_common_numbers_unless_its_family_has_its_own():
     worn = sample_twin("worn", 5)
     assert EVERY["ir.half"].low <= worn.ir.half <= EVERY["ir.half"].high
     assert isinstance(FAMILIES["worn"].numbers["motors.lag"], Range)

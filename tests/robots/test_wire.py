@@ -158,7 +158,7 @@ def test_closing_stops_the_motors_and_then_says_nothing_more():
         (lambda r: r.set_led("middle", 1), r"which is 'middle', expected one of left, center"),
     ],
 )
-def test_what_is_out_of_range_is_refused_and_nothing_is_sent(call, message):
+def test_arguments_out_of_range_are_refused_and_nothing_is_sent(call, message):
     robot, port = opened("s2+fluke1")
     with pytest.raises(ValueError, match=message):
         call(robot)
@@ -228,7 +228,7 @@ def test_a_call_of_a_fluke_sends_exactly_these_bytes(setup, call, script, value)
     port.check_all_said()
 
 
-def test_after_a_reset_the_robot_is_greeted_anew():
+def test_the_robot_is_greeted_again_after_a_reset():
     script = [(bytes([124]), b"IPREScribby\0\0"), *greeting(INFOS["s2+fluke1"])]
     robot, port = opened("s2+fluke1", *script)
     robot.reset_robot()

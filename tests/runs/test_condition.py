@@ -112,7 +112,7 @@ def test_a_condition_on_a_robot_has_the_robots_settings():
     assert Condition(name="a", platform="scribbler", scribbler={"wait_s": 0.4}).hash() != condition.hash()
 
 
-def test_what_means_nothing_on_a_robot_is_refused():
+def test_settings_without_a_meaning_on_a_robot_are_refused():
     with pytest.raises(ValueError, match=r"noise is 0\.1, expected none with platform 'scribbler'"):
         Condition(name="a", platform="scribbler", noise=0.1)
     with pytest.raises(ValueError, match="expected 'line' with platform 'scribbler'"):

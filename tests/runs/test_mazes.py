@@ -119,7 +119,7 @@ def test_single_precision_tells_the_same_but_for_what_rounding_grows_to() -> Non
     assert (apart < 0.01).mean() > 0.9
 
 
-def test_what_a_disc_sees_at_the_start_of_the_hard_maze() -> None:
+def test_a_disc_sees_the_walls_at_the_start_of_the_hard_maze() -> None:
     """The trap of one re-implementation: the pie slices must not overwrite the sixth range finder."""
     _, inputs = driven(load_arena("maze-hard"), constant(0.5, 0.5), 1)
     right, ahead_right, ahead, ahead_left, left, behind = inputs[0, :6]

@@ -22,7 +22,7 @@ pytestmark = pytest.mark.slow
 ARENA = paper_arena()
 
 
-def test_without_trials_a_robot_stays_as_its_file_has_it():
+def test_a_robot_without_trials_stays_as_in_its_file():
     calibration = calibrate_all(SimTarget(SimPlatform(), ARENA), budget=0)
     plain = SimPlatform().robot.numbers()
     assert calibration.trials == 0

@@ -289,7 +289,7 @@ def test_no_name_is_an_unknown_one():
 
 
 @pytest.mark.parametrize("study", [None, 3, {}, ["paper"]])
-def test_what_is_neither_name_nor_path_is_refused(study):
+def test_a_study_that_is_neither_a_name_nor_a_path_is_refused(study):
     with pytest.raises(TypeError, match="expected the name of one, or the path of a study file"):
         load_study(study)
 

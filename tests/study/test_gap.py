@@ -131,7 +131,7 @@ def test_trials_go_round_the_controllers(some):
     assert np.diff(target.asked).tolist() == [4096, 4096, 1 - 2 * 4096, 4096, 4096]
 
 
-def test_what_is_kept_is_not_carried_out_again_and_comes_out_the_same(some, tmp_path):
+def test_saved_trials_are_not_repeated_and_give_the_same_result(some, tmp_path):
     path = tmp_path / "trials.jsonl"
     whole = run_gap(sim(), sim(), some, trials=3)
     with pytest.raises(RecordError, match="power"):

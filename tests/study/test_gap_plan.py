@@ -80,7 +80,7 @@ def test_plan_for_a_tiny_effect_is_a_table_without_controllers():
     assert plan.best is None
 
 
-def test_what_cannot_be_planned_is_refused():
+def test_plan_refuses_goals_that_cannot_be_reached():
     spreads = pilot_spreads(1)
     with pytest.raises(StudyError, match="effect is -1"):
         plan_gap("effect", -1.0, spreads=spreads)

@@ -97,7 +97,7 @@ def test_trials_that_were_kept_are_scored_anew_by_another_task(tmp_path):
         ({"controllers": "avoid"}, ControllerError, r"range\.3 to range\.7 are missing"),
     ],
 )
-def test_what_cannot_be_scored_is_refused_before_a_trial(values, error, text):
+def test_tasks_and_controllers_that_cannot_be_scored_are_refused_before_a_trial(values, error, text):
     with pytest.raises(error, match=text):
         gap_between("sim", "sim", n_controllers=2, trials=1, **values)
 

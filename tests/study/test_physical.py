@@ -196,7 +196,7 @@ class Stops(Unattended):
             raise KeyboardInterrupt
 
 
-def test_what_was_entered_of_a_sheet_is_kept_when_the_program_is_stopped(tmp_path):
+def test_scores_entered_for_a_sheet_are_kept_when_the_program_is_stopped(tmp_path):
     with pytest.raises(KeyboardInterrupt):
         drive(small_study(), tmp_path / "r", operator=Stops())
     with Ledger.open(tmp_path / "r" / LEDGER_NAME) as ledger:

@@ -198,7 +198,7 @@ def test_no_fault_on_the_wire_loses_a_scored_trial_or_leaves_the_motors_running(
 
 @pytest.mark.long
 @pytest.mark.usefixtures("no_waiting_for_the_disk")
-def test_two_thousand_faults_on_the_wire(tmp_path):
+def test_studies_survive_two_thousand_faults_on_the_wire(tmp_path):
     inject(2_000, tmp_path)
 
 

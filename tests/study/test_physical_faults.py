@@ -196,6 +196,6 @@ def test_study_over_a_disturbed_link_completes_and_counts_only_whole_trials(tmp_
 
 @pytest.mark.long
 @pytest.mark.parametrize("setup", [("s1", "none"), ("s1", "1"), ("s2", "none"), ("s2", "1"), ("s2", "2")])
-def test_studies_over_disturbed_links_of_all_robots(tmp_path, setup):
+def test_studies_survive_disturbed_links_of_all_robots(tmp_path, setup):
     for seed in range(4):
         disturb(tmp_path / f"r{seed}", seed, (*KINDS, "cut", *("none",) * 10), setup, n_generations=2)

@@ -73,7 +73,7 @@ def test_digest_does_not_depend_on_threads_chunks_or_interruption(folder, tmp_pa
         run_study(study(changed), out)
 
 
-def test_what_was_drawn_is_in_the_records_under_names_of_the_description(folder):
+def test_sampled_numbers_are_in_the_records_under_names_of_the_description(folder):
     about = {each["name"]: each for each in folder.description["conditions"]}
     assert about["objective"]["drawn"] == ["contact.friction", "drive.track"]
     assert about["novel"]["drawn"] == ["contact.friction"]

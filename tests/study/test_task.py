@@ -102,7 +102,7 @@ def test_settings_are_of_the_set_then_of_the_task_then_changed() -> None:
         ("xor", "default", {"crossover": 2}, "crossover: expected at most 1.0"),
     ],
 )
-def test_what_cannot_be_is_refused_with_a_hint(
+def test_wrong_settings_are_refused_with_a_hint(
     task: str, settings: str, changes: dict[str, object], text: str
 ) -> None:
     with pytest.raises(StudyError) as caught:

@@ -72,7 +72,7 @@ def test_a_task_of_ones_own_is_worth_the_same_as_python_and_compiled_and_names_i
 
 
 @compiled_only
-def test_what_run_prints_and_summarizes_is_fitness_by_the_task(tmp_path: Path, capsys) -> None:
+def test_run_prints_and_summarizes_fitness_by_the_task(tmp_path: Path, capsys) -> None:
     study = load_study(EXAMPLE, replicates=7)
     conditions = tuple(shortened(each, population=5, generations=2) for each in study.conditions)
     result = run_study(

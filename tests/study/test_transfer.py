@@ -143,14 +143,14 @@ def test_a_known_target_may_have_another_name_and_not_another_identity(result, c
 
 
 @pytest.mark.parametrize(("platform", "step_s"), [(SimPlatform(step_s=0.8), 0.8), (JyroPlatform(), 0.5)])
-def test_what_evolves_has_commands_as_long_as_a_robots(platform, step_s, tmp_path):
+def test_controllers_evolve_with_commands_as_long_as_those_of_the_robot(platform, step_s, tmp_path):
     target = SimTarget(platform, paper_arena(), name="other")
     transfer("sim-paper", target, ["plain"], [0], out=tmp_path, **SMALL)
     evolved = json.loads((tmp_path / "transfer.json").read_text())["settings"]["sim"]
     assert (evolved["step_s"] or evolved["robot"]["step_s"]) == step_s
 
 
-def test_what_one_strategy_cannot_do_is_refused_before_another_spends(calibration, tmp_path):
+def test_a_strategy_that_cannot_run_is_refused_before_another_spends(calibration, tmp_path):
     target = CountingTarget()
     target.n_sensors = 1
     with pytest.raises(StudyError, match="other has 1 range sensors and robot"):
@@ -217,7 +217,7 @@ def test_a_calibration_that_cost_more_than_the_budget_is_refused(calibration, tm
         ("paper", "randomized", "platform 'jyro' of condition"),
     ],
 )
-def test_what_cannot_be_transferred_is_refused_in_words(study, strategies, text, tmp_path):
+def test_studies_that_cannot_be_transferred_are_refused_with_a_reason(study, strategies, text, tmp_path):
     with pytest.raises(RealityGapError, match=text):
         transfer(study, CountingTarget(), strategies, 3, out=tmp_path, **SMALL)
 
@@ -257,7 +257,7 @@ def test_all_strategies_carry_over_to_another_task(tmp_path):
     assert seen["transferability"] == "cells"
 
 
-def test_what_evolved_in_the_true_simulator_does_better_than_plain(calibration, tmp_path):
+def test_evolution_in_the_true_simulator_does_better_than_plain(calibration, tmp_path):
     # over 4 replicates; seed fixed, and with these seeds far from chance: 0.1 of coverage and more
     found = transfer(
         "sim-paper", CountingTarget(), ["plain", "calibrated"], 6, out=tmp_path, calibration=calibration,

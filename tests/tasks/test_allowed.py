@@ -96,5 +96,5 @@ def test_answers_are_in_the_users_folder_for_states(monkeypatch, tmp_path):
         ("\ud800\U0001f600", r"\ud800\U0001f600"),
     ],
 )
-def test_what_could_hide_code_is_shown_as_an_escape(text, shown):
+def test_characters_that_could_hide_code_are_shown_as_escapes(text, shown):
     assert visible(text) == shown

@@ -63,7 +63,7 @@ def test_readings_are_enough_for_avoidance():
     assert score_observed(AvoidTask(), seen, arena).tolist() == whole.tolist()
 
 
-def test_what_is_drawn_for_each_trial_is_known_to_nobody_outside():
+def test_score_observed_refuses_arenas_that_are_sampled_for_each_trial():
     from realitygap.world import Distribution
 
     arena = load_arena("light")

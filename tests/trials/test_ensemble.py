@@ -50,7 +50,7 @@ def test_commands_of_a_controller_replayed_give_its_trial(ensemble, genomes):
     assert not np.array_equal(driven.poses[0], driven.poses[1])
 
 
-def test_how_robots_are_parted_among_threads_changes_nothing(genomes, monkeypatch):
+def test_the_number_of_threads_changes_no_result_of_an_ensemble(genomes, monkeypatch):
     values = {"drive.gain_left": np.random.default_rng(0).uniform(0.4, 1.6, 40)}
     play = Play(np.array([START] * 3), 30, genomes=tuple(genomes))
     one = SimEnsemble(SimPlatform(), paper_arena(), threads=1)

@@ -65,14 +65,14 @@ def test_draws_can_hold_for_a_run_or_the_study(calibration):
     assert len(set(by_run)) > 1
 
 
-def test_without_randomize_the_estimate_drives(calibration):
+def test_the_estimate_drives_without_randomize(calibration):
     platform = SimPlatform(robot=calibration)
     assert platform.model.drive.track == 0.153
     assert SimRobot(platform).drawn == {}
     assert "draws" not in platform.model_dump(mode="json")
 
 
-def test_what_is_set_goes_before_what_is_drawn(calibration):
+def test_settings_replace_samples_of_the_posterior(calibration):
     platform = SimPlatform(robot=calibration, randomize="posterior", set={"drive.track": 0.2})
     assert set(SimRobot(platform).drawn) == {"drive.gain_left"}
     assert platform.model.drive.track == 0.2

@@ -103,7 +103,7 @@ def test_numbers_are_drawn_per_trial_run_or_study():
     assert drawn(repeat=2)["drive.track"][0] == here["drive.track"][0]
 
 
-def test_what_is_drawn_of_a_number_does_not_depend_on_the_others():
+def test_samples_of_a_number_do_not_depend_on_the_others():
     arena, population = paper_arena(), genomes(8)
     few = SimPlatform(set={"drive.speed": RANDOM["drive.speed"]}, steps=1)
     many = SimPlatform(set=RANDOM, steps=1)
@@ -113,7 +113,7 @@ def test_what_is_drawn_of_a_number_does_not_depend_on_the_others():
     np.testing.assert_array_equal(one.drawn[:, 0], other.drawn[:, other.drawn_names.index("drive.speed")])
 
 
-def test_what_is_drawn_follows_its_distribution():
+def test_samples_follow_their_distribution():
     """4,000 numbers: their mean is off by more than 4 standard errors once in 16,000 seeds."""
     platform = SimPlatform(set={"drive.speed": {"uniform": [0.1, 0.2]}}, steps=1)
     batch = retry_genomes(

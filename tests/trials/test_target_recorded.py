@@ -44,7 +44,7 @@ def test_no_more_is_seen_than_is_asked_for(recorded):
     assert (trial.observe, len(trial.poses), len(trial.wheels)) == ("cells", 0, 0)
 
 
-def test_what_was_not_recorded_is_refused(recorded, tmp_path):
+def test_trials_that_were_not_recorded_are_refused(recorded, tmp_path):
     path, trials, (one, other) = recorded
     with open_target(f"recorded:{path}", paper_arena()) as target:
         with pytest.raises(RecordError, match="has 1 trials of 6 steps of a controller"):

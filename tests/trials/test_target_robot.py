@@ -93,7 +93,7 @@ def test_a_command_lasts_its_time_whatever_the_readings_take() -> None:
 
 
 @pytest.mark.parametrize("observe", ["cells", "encoders"])
-def test_what_is_not_observed_does_not_come_out(observe: Any) -> None:
+def test_a_trial_of_a_robot_has_no_more_than_is_to_be_observed(observe: Any) -> None:
     with emulated() as target:
         (trial,) = target.carry_out([FORWARD], observe)
     assert trial.observe == observe
@@ -270,7 +270,7 @@ def test_ctrl_c_while_an_observer_is_asked_for_cells_tells_the_trial(asks: bool)
     assert [(trial.end, len(trial.commands)) for trial in told] == [("running", 0), *ends]
 
 
-def test_what_cannot_be_is_said_before_anything_moves() -> None:
+def test_wrong_targets_are_refused_before_a_robot_moves() -> None:
     with pytest.raises(StudyError, match="No operator places the robot of scribbler:/dev/rfcomm0"):
         open_target("scribbler:/dev/rfcomm0", ARENA)
     with pytest.raises(StudyError, match=r"'scribler:x' is no platform. Did you mean 'scribbler:PORT'"):

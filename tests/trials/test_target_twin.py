@@ -71,7 +71,7 @@ def test_trials_are_those_of_the_twin_in_this_process(file: Path, target: TwinTa
     assert (target.label, target.step_s, target.n_sensors) == ("TWIN", robot.step_s, robot.n_sensors)
 
 
-def test_what_is_not_observed_does_not_come_out(target: TwinTarget) -> None:
+def test_a_trial_of_a_twin_has_no_more_than_is_to_be_observed(target: TwinTarget) -> None:
     full = target.carry_out(plans(), "track")
     for observe in ("cells", "encoders"):
         for trial, whole in zip(target.carry_out(plans(), observe), full, strict=True):
@@ -151,7 +151,7 @@ SPY = """
 """
 
 
-def test_who_asks_never_opens_the_file_and_ctrl_c_ends_the_processes(file: Path) -> None:
+def test_the_calling_process_never_opens_the_file_and_ctrl_c_ends_the_processes(file: Path) -> None:
     command = [sys.executable, "-c", textwrap.dedent(SPY), str(file)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None

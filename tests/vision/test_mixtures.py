@@ -30,7 +30,7 @@ def test_ink_that_two_passing_traces_explain_is_no_evidence_of_a_third():
     assert _presence(seen, (0.45, 0.45, 0.4))[2] < 0.3
 
 
-def test_what_is_known_of_a_pens_own_trace_counts_little_for_it():
+def test_knowledge_of_a_pens_own_trace_counts_little_for_that_pen():
     seen = 0.5 * (RED + BLUE)
     sure, unsure = _presence(seen, (0.45, 0.45, 0.45)), _presence(seen, (0.45, 0.45, 0.08))
     assert sure[2] == pytest.approx(unsure[2], rel=1e-3)

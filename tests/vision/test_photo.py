@@ -60,7 +60,7 @@ def _bomb(width: int, height: int) -> bytes:
         (_file(Image.new("RGB", (300, 2000)), "JPEG"), "300 x 2000 pixels, expected 400 to 20000"),
     ],
 )
-def test_what_is_no_photo_is_refused_with_what_to_do(data, said):
+def test_files_that_are_no_photos_are_refused_with_a_remedy(data, said):
     with pytest.raises(SheetError, match=said) as refused:
         read_photo(data)
     assert "\n" not in str(refused.value)
@@ -154,7 +154,7 @@ def test_sixteen_bits_of_gray_keep_their_steps(kind):
     assert (seen == gray[..., None]).all()
 
 
-def test_what_is_clear_is_white():
+def test_transparent_pixels_are_white():
     picture = Image.new("RGBA", (500, 500), (10, 20, 30, 0))
     assert (read_photo(_file(picture, "PNG")) == 255).all()
 
@@ -168,7 +168,7 @@ def test_a_very_large_photo_is_halved():
 
 
 @pytest.mark.slow
-def test_of_a_gray_photo_several_pens_are_refused_and_one_is_read():
+def test_a_gray_photo_is_read_with_one_pen_and_refused_with_several():
     gray = _file(Image.open(io.BytesIO(photo(1, SCAN, n=1).jpeg)).convert("L"), "JPEG", quality=92)
     with pytest.raises(SheetError, match="The picture is gray, and its 8 pens are identified by color"):
         score_sheet(read_photo(gray), LAYOUT)

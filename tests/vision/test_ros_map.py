@@ -49,7 +49,7 @@ def test_a_room_has_four_walls_where_its_free_space_ends(tmp_path, ending):
     assert arena.start.y == pytest.approx((BOTTOM + TOP) / 2, abs=PIXEL)
 
 
-def test_what_stands_in_a_room_has_walls_and_what_is_outside_has_none(tmp_path):
+def test_a_box_in_a_room_has_walls_and_free_places_out_of_reach_have_none(tmp_path):
     gray = room()
     gray[10:20, 20:30] = 0
     gray[0, 0] = 254  # free, and out of reach

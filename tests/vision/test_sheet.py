@@ -49,7 +49,7 @@ def test_tags_and_boxes_lie_in_the_ring_where_no_pen_comes():
     assert boxes[-1][2] < tags[1, :, 0].min()
 
 
-def test_where_cells_reach_the_walls_tags_and_boxes_lie_around_them():
+def test_tags_and_boxes_lie_around_cells_that_reach_the_walls():
     layout = SheetLayout.of(_box_arena(0.6, 0.4, Grid(0.0, 0.0, 0.1, 6, 4)))
     assert not layout.is_ring_free
     for tag in layout.tag_corners():
@@ -103,7 +103,7 @@ def test_unknown_paper_is_refused_with_a_hint():
         sheet_tiles(LAYOUT, "a44")
 
 
-def test_what_is_printed_is_found_at_true_scale(tmp_path):
+def test_printed_tags_and_grids_have_their_true_scale(tmp_path):
     """The PDF's own drawing, as pixels: tags and grid are where the layout says."""
     import cv2
     from matplotlib.backends.backend_agg import FigureCanvasAgg

@@ -59,7 +59,7 @@ def test_a_pen_that_did_not_draw_has_next_to_no_cells():
 
 
 @pytest.mark.slow
-def test_without_tried_pens_colors_come_from_names_and_that_is_said():
+def test_colors_of_untried_pens_come_from_names_and_that_is_reported():
     score = score_sheet(read_photo(photo(4, SCAN, n=3, has_key=False).jpeg), LAYOUT, [0, 1, 2])
     assert not any(trace.is_tried for trace in score.traces)
     assert min(_ious(score)) > 0.9

@@ -195,7 +195,7 @@ def test_a_leap_and_a_misshapen_tag_count_as_not_seen():
     assert track.poses[:, :2] == pytest.approx(poses[:, :2], abs=2e-3)
 
 
-def test_what_was_not_seen_at_the_ends_has_no_poses_and_one_sighting_is_too_few():
+def test_unseen_ends_have_no_poses_and_one_sighting_is_too_few():
     tag = RobotTag()
     poses = np.tile([0.4, 0.4, 0.0], (10, 1))
     seen = np.zeros(10, np.bool_)

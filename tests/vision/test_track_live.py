@@ -57,7 +57,7 @@ def test_pictures_are_followed_as_they_come_and_forgotten_when_a_trial_begins(fi
     assert source.is_closed
 
 
-def test_what_fails_in_the_camera_is_told_to_who_waits(film):
+def test_an_error_of_the_camera_reaches_the_caller_that_waits(film):
     def broken():
         yield next(iter(film))
         raise OSError("the cable is out")

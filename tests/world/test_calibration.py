@@ -84,7 +84,7 @@ def test_the_robot_file_is_found_from_elsewhere_too(read, tmp_path):
     assert SimPlatform(robot=calibration).robot.drive.speed == 0.2
 
 
-def test_what_is_no_calibration_is_told_from_one(tmp_path):
+def test_read_calibration_returns_none_for_other_files(tmp_path):
     plain = tmp_path / "mine.toml"
     plain.write_text('base = "scribbler-s2"\n')
     assert read_calibration(plain) is None

@@ -48,13 +48,13 @@ def test_mean_and_deviation_are_as_stated(values, mean, deviation):
 
 
 @pytest.mark.parametrize("kind", ["uniform", "normal", "log_uniform"])
-def test_what_is_drawn_grows_with_the_uniform_number_and_keeps_its_shape(kind):
+def test_samples_grow_with_the_uniform_number_and_keep_its_shape(kind):
     drawn = Distribution(**{kind: (0.5, 2.0)}).of(EVEN.reshape(100, 200))
     assert drawn.shape == (100, 200)
     assert (np.diff(drawn.ravel()) > 0).all()
 
 
-def test_least_and_most_cut():
+def test_least_and_most_limit_a_distribution():
     cut = Distribution(normal=(0.0, 1.0), least=-0.5, most=1.0)
     drawn = cut.of(EVEN)
     assert (drawn.min(), drawn.max()) == (-0.5, 1.0) == (cut.lowest, cut.highest)
@@ -72,7 +72,7 @@ def test_least_and_most_cut():
         ({"uniform": (1, 3), "most": 1.5}, 1.5),
     ],
 )
-def test_a_center_stands_for_it(values, center):
+def test_a_distribution_has_a_center(values, center):
     assert Distribution(**values).center == center
 
 

@@ -81,7 +81,7 @@ def test_the_scribbler_has_its_firmware_s_figures():
     assert robot.body[0].radius > 0
 
 
-def test_with_a_fluke_the_other_end_is_ahead():
+def test_the_other_end_is_ahead_with_a_fluke():
     alone, with_fluke = load_robot("scribbler-s2"), load_robot("scribbler-s2-fluke2")
     assert alone.looks.caster[0] < 0 < with_fluke.looks.caster[0]
     assert with_fluke.stall.idler == -alone.stall.idler > 0
@@ -248,7 +248,7 @@ def test_a_huge_file_is_not_read(tmp_path):
         load_robot(file)
 
 
-def test_what_is_no_text_is_refused(tmp_path):
+def test_robot_files_that_are_no_text_are_refused(tmp_path):
     file = tmp_path / "binary.toml"
     file.write_bytes(b"name = '\xff'")
     with pytest.raises(DescriptionError, match="not a text file in UTF-8"):

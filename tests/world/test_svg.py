@@ -33,7 +33,7 @@ def test_y_grows_upwards_and_a_line_is_where_the_robot_looks(arena_of):
     assert arena.name == "drawn"
 
 
-def test_what_is_not_filled_is_walls_and_what_is_filled_an_obstacle(arena_of):
+def test_outlines_become_walls_and_filled_shapes_obstacles(arena_of):
     arena = arena_of(
         START
         + '<rect width="800" height="500" fill="none"/>'
@@ -110,7 +110,7 @@ def test_the_scale_may_be_stated(arena_of):
         ('<rect rx="3" width="9" height="9" fill="none"/>', "has round corners, which only obstacles have"),
     ],
 )
-def test_what_cannot_be_used_is_said_by_name(arena_of, shapes, says):
+def test_shapes_that_cannot_be_used_are_refused_by_name(arena_of, shapes, says):
     with pytest.raises(DescriptionError) as caught:
         arena_of(shapes + (START if says != "start: missing" else ""))
     assert says in str(caught.value)

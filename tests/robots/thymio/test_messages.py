@@ -70,7 +70,7 @@ def test_words_are_signed(values):
     assert messages.signed_words(messages.words(values)) == tuple(values)
 
 
-def test_what_does_not_fit_is_refused():
+def test_words_and_messages_that_are_too_large_are_refused():
     with pytest.raises(ValueError, match="expected -32768 to 65535"):
         messages.words([70_000])
     with pytest.raises(ValueError, match="516 or fewer"):

@@ -109,7 +109,7 @@ def test_large_sums_of_identity_nodes_keep_their_place():
 # what a Thymio cannot carry
 
 
-def test_what_a_thymio_lacks_is_refused_with_one_message():
+def test_inputs_and_settings_that_a_thymio_lacks_are_refused_with_one_message():
     network = evolved({}, bias=False)[0].network()
     two = ControllerInterface(("range.0", "range.1"))
     for interface, options, error, said in (

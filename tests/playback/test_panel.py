@@ -125,6 +125,6 @@ def test_panel_without_anywidget_names_the_package_to_install(monkeypatch):
         raise ImportError(name)
 
     panels.panel_class.cache_clear()
-    monkeypatch.setattr(panels, "import_module", refuse)
+    monkeypatch.setattr("realitygap.playback._player.import_module", refuse)
     with pytest.raises(RealityGapError, match=r"(--extra |\[)notebook"):
         world_panel()

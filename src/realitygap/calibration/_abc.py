@@ -23,6 +23,7 @@ from realitygap import _special as special
 from realitygap.world import RobotModel
 
 from ._evidence import Evidence, Vectors
+from ._posterior import N_DRAWS
 from ._prior import Floats, Parameter, numbers_of, values_of
 from ._score import Compression, learn_compression
 
@@ -34,7 +35,6 @@ N_LEARN = {"least": 600, "small": 800, "full": 1500}
 N_REGRESS = {"least": 600, "small": 800, "full": 1500}
 N_LAST = {"least": 1000, "small": 2000, "full": 5000}
 ROUNDS = {"least": 3, "small": 4, "full": 7}
-N_DRAWS = 500
 MOST_OWN = 0.9  # of a prediction, that is taken for a row's own
 END = 4.0  # standard deviations of the prior beyond which nothing is
 MARGIN = 0.3  # share of its width by which the box is larger than the posterior, to each side

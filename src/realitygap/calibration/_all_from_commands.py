@@ -27,6 +27,7 @@ from realitygap.world import Arena, RobotModel
 
 from ._abc import Effort, Posterior
 from ._all_from_poses import own_places, sensors_of
+from ._posterior import N_DRAWS
 from ._prior import Floats, Parameter, numbers_of, standard_of
 from ._shots import shots_of
 from ._single_commands import MOST_OFF, NOISE, PARTS, SLIP, values_at
@@ -48,7 +49,6 @@ PREDICTED = 0.4  # share of the steps whose poses are predicted well enough for 
 N_READINGS = 500  # few, as an error of a pose makes the readings of many steps wrong alike
 SPREAD = 1.4  # times that of reweighted fits: with it, about nine of ten intervals hold the numbers of robots of `sim`
 ALIKE = 30  # differences that noise makes alike, as it moves the robot for all later steps
-N_DRAWS = 500
 N_SHAPE = 400  # places that show the shape of the minimum
 N_NOISY = 40  # robots that show the scatter of observations
 N_NOISE = 200  # draws of noise
@@ -242,24 +242,20 @@ class _Fit:
         self, places: Floats, t: int, scales: NDArray[np.float32], weights: Floats, pull: Floats
     ) -> Floats:
         """(m,) costs of robots at places (m, p) that have no noise; other arguments as of `_descend`."""
-        still = {name: np.zeros(len(places)) for name in self.noise}
         seen, some = self.seen.values[:, :t], self.seen.weights[:, :t]
 
         def of(made: NDArray[np.float32]) -> Floats:
             squares = np.log1p(((made - seen) / scales) ** 2 / FREEDOM) * some
             return np.asarray(squares.sum(axis=(2, 3), dtype=np.float64) @ weights)
 
-        logs = self._made({**values_at(self.free, places), **still}, t, of)
+        logs = self._made(places, t, of)
         from_prior = ((places - pull) ** 2).sum(axis=1)
         return np.asarray(0.5 * (FREEDOM + 1.0) * logs + 0.5 * PRIOR * from_prior)
 
     def _scales(self, center: Floats, t: int) -> NDArray[np.float32]:
         """(k, t, d) typical differences: those that are taken for none, and the scatter by noise."""
-        m = N_NOISY
-        noise = _some_of(self.noise, m, self.rng)
-        made = self._made(
-            {**values_at(self.free, np.tile(center, (m, 1))), **noise}, t, _as_it_is, same_noise=False
-        )
+        noise = _some_of(self.noise, N_NOISY, self.rng)
+        made = self._made(np.tile(center, (N_NOISY, 1)), t, _as_it_is, noise)
         return np.asarray(np.sqrt(made.var(axis=0) + self.seen.finest**2))
 
     def _note_noise(self, center: Floats, t: int) -> None:
@@ -270,16 +266,12 @@ class _Fit:
         parameters = [p for p in self.prior if p.name in NOISE]
         if not parameters:
             return
-        m = N_NOISY
-        values = values_at(self.free, np.tile(center, (m, 1)))
-        still = {name: np.zeros(m) for name in self.noise}
-        own = self._made({**values, **still}, t, _as_it_is)
+        places = np.tile(center, (N_NOISY, 1))
+        own = self._made(places, t, _as_it_is)
         parts = np.empty((len(parameters), own[0].size), np.float32)
         for k, parameter in enumerate(parameters):
             size = PARTS[parameter.name]
-            made = self._made(
-                {**values, **still, parameter.name: np.full(m, size)}, t, _as_it_is, same_noise=False
-            )
+            made = self._made(places, t, _as_it_is, {parameter.name: np.full(N_NOISY, size)})
             parts[k] = (((made - own) ** 2).mean(axis=0) / size**2).reshape(-1)
         squares = ((own[0] - self.seen.values[:, :t]) ** 2).reshape(-1)
         weights = (self.seen.weights[:, :t] / ALIKE).reshape(-1)
@@ -299,32 +291,37 @@ class _Fit:
 
     def poses(self, center: Floats) -> NDArray[np.float32]:
         """(k, t + 1, 3) poses of a robot without noise."""
-        still = {name: np.zeros(1) for name in self.noise}
-        numbers = numbers_of(self.prior, {**values_at(self.free, center[None]), **still}, self.robot)
-        seen = self.seen
+        seen, numbers = self.seen, self._numbers(center[None], {})
         played = self.ensemble.replay(seen.starts, seen.commands, numbers, self.seed, keep=("poses",))
         return np.asarray(played.poses[0])
 
+    def _numbers(self, places: Floats, noise: Mapping[str, Floats]) -> dict[str, Floats]:
+        """Return the numbers of m robots at places (m, p). Kinds of noise that are not given are 0."""
+        still = {name: np.zeros(len(places)) for name in self.noise}
+        return numbers_of(self.prior, {**values_at(self.free, places), **still, **noise}, self.robot)
+
     def _made(
         self,
-        values: Mapping[str, Floats],
+        places: Floats,
         t: int,
         of: Callable[[NDArray[np.float32]], NDArray[F]],
-        *,
-        same_noise: bool = True,
+        noise: Mapping[str, Floats] | None = None,
     ) -> NDArray[F]:
-        """Return the results of `of` for the observations of m robots in t steps, (m, ...)."""
-        self.n_simulated += len(next(iter(values.values())))
+        """Return the results of `of` for the observations of m robots at places (m, p) in t steps, (m, ...).
+
+        The robots have no noise, or noise of their own of the given sizes, (m,) of each kind.
+        """
+        self.n_simulated += len(places)
         seen = self.seen
         play = Play(seen.starts, t, np.ascontiguousarray(seen.commands[:, :t]))
         keep = ("readings", "stalled", "wheels") if seen.has_wheels else ("readings", "stalled")
         return self.ensemble.summarize(
             play,
-            numbers_of(self.prior, values, self.robot),
+            self._numbers(places, noise or {}),
             self.seed,
             lambda rehearsal: of(_values(rehearsal, t, seen.has_wheels)),
             keep=keep,
-            same_noise=same_noise,
+            same_noise=noise is None,
         )
 
 

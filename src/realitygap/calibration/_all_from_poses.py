@@ -16,6 +16,7 @@ from realitygap.records import TrialRecord
 from realitygap.world import Arena, Distribution, RobotModel
 
 from ._abc import Posterior
+from ._posterior import N_DRAWS
 from ._prior import Floats, Parameter, standard_of
 from ._rays import rays_of
 from ._shots import Shooter, Shots, shots_of
@@ -25,7 +26,6 @@ from .infrared._mixture import MixtureReadings
 from .infrared._pulses import PulseReadings
 from .infrared._readings import Placement
 
-N_DRAWS = 500
 N_READINGS = 3000  # of all that were made
 N_PARTICLES = 150
 FINEST_PLACE = 1e-3  # of a parameter of sensors: likelihoods of pulses have steps

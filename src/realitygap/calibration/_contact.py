@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from functools import partial
 from itertools import product
 
@@ -46,10 +45,8 @@ def fit_contact(
     robot: RobotModel,
     arena: Arena,
     *,
-    motion: Mapping[str, float] | None = None,
     observe: Observe | None = None,
     prior: Sequence[Parameter] | None = None,
-    window: int = WINDOW,
     seed: int = 0,
 ) -> MotionFit:
     """Fit contact to windows of trials in which the robot was near a wall.
@@ -61,10 +58,8 @@ def fit_contact(
         simulate: Simulator of trials in the arena, such as `SimEnsemble(...).replay`.
         robot: Robot with the numbers that are not fitted.
         arena: Arena of the trials.
-        motion: Numbers of the drive by dotted name, such as those of `fit_motion`; the robot's own when not given.
         observe: Use no more than this of the trials; without poses nothing is identified.
         prior: Prior of each parameter. Default: `scribbler_prior`.
-        window: Commands from one observed pose to the next that is compared.
         seed: Seed of the draws.
 
     Raises:
@@ -74,15 +69,15 @@ def fit_contact(
     seen = observed_as(trials, observe)
     if not any(len(trial.poses) for trial in seen):
         return nothing_known(CONTACT, known, robot, METHOD)
-    windows = make_windows(seen, robot, arena, window)
+    windows = make_windows(seen, robot, arena, WINDOW)
     windows = windows.only(windows.touching & np.isfinite(windows.seen[1]).all(axis=1))
     if not len(windows.trial):
         raise ValueError(
             "In no trial the robot was seen to meet a wall, expected some. Record trials of contact_plans."
         )
-    own, given = plain_numbers(robot), dict(motion or {})
-    noise = {name: given.pop(name, own[name]) for name in motor_noise(robot)}
-    problem = replace(make_problem(simulate, robot, known, windows, CONTACT), fixed=given)
+    own = plain_numbers(robot)
+    noise = {name: own[name] for name in motor_noise(robot)}
+    problem = make_problem(simulate, robot, known, windows, CONTACT)
     return _report(problem, noise, np.random.default_rng(seed), encounters_of(seen, robot, arena))
 
 

@@ -18,9 +18,7 @@ AROUND = (0.35, 0.6, 0.9)  # turns between two walls, as commands
 Commands = list[tuple[float, float]]
 
 
-def contact_plans(
-    arena: Arena, robot: RobotModel, n: int = N_PLANS, *, first_number: int = 0
-) -> list[TrialPlan]:
+def contact_plans(arena: Arena, robot: RobotModel, n: int = N_PLANS) -> list[TrialPlan]:
     """Trials to fit contact to: pushes head on and slantwise, scrapes to both sides, with either end.
 
     The result of an encounter is not known beforehand, so angles are random. Each trial begins at another heading, and
@@ -30,7 +28,6 @@ def contact_plans(
         arena: Arena. Trials begin at the place with the most room.
         robot: Robot with the numbers of its file.
         n: Number of trials.
-        first_number: Number of the first trial.
 
     Raises:
         ValueError: There is no room for the robot to turn in place.
@@ -46,9 +43,7 @@ def contact_plans(
         while len(commands) < STEPS:
             commands += _encounter(rng)
         given = np.array(commands[:STEPS])
-        plans.append(
-            TrialPlan(start, commands=given, steps=STEPS, number=first_number + k, purpose="contact")
-        )
+        plans.append(TrialPlan(start, commands=given, steps=STEPS, number=k, purpose="contact"))
     return plans
 
 

@@ -44,9 +44,7 @@ def _clearance(arena: Arena, x: float, y: float) -> float:
     return min(gaps, default=math.inf)
 
 
-def excitation(
-    arena: Arena, radius: float, n: int, steps: int, rng: np.random.Generator, *, number: int = 0
-) -> list[TrialPlan]:
+def excitation(arena: Arena, radius: float, n: int, steps: int, rng: np.random.Generator) -> list[TrialPlan]:
     """N trials of commands: straight at full speed, in place, slow, and arcs, each for 1 to 8 steps, from anywhere.
 
     Args:
@@ -55,14 +53,13 @@ def excitation(
         n: Number of trials.
         steps: Commands in each.
         rng: Random numbers.
-        number: Number of the first trial.
     """
     return [
         TrialPlan(
             start=random_start(arena, radius, rng),
             commands=_commands(steps, rng),
             steps=steps,
-            number=number + k,
+            number=k,
             purpose="excitation",
         )
         for k in range(n)

@@ -64,12 +64,7 @@ class MotionFit:
 
 def observed_as(trials: Sequence[TrialRecord], observe: Observe | None) -> list[TrialRecord]:
     """Trials of which no more than this is known."""
-    shown = []
-    for trial in trials:
-        if observe in ("cells", "encoders"):
-            trial = replace(trial, poses=np.empty((0, 3)))
-        shown.append(replace(trial, wheels=np.empty((0, 2))) if observe == "cells" else trial)
-    return shown
+    return [trial if observe is None else trial.seen_as(observe) for trial in trials]
 
 
 def fit_motion(

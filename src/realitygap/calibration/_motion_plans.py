@@ -22,9 +22,7 @@ SLOW = (0.02, 0.04, 0.06, 0.08, 0.1, 0.12, 0.15, 0.18, 0.22, 0.26, 0.3)
 Commands = list[tuple[float, float]]
 
 
-def motion_plans(
-    arena: Arena, robot: RobotModel, n: int = N_PLANS, *, first_number: int = 0
-) -> list[TrialPlan]:
+def motion_plans(arena: Arena, robot: RobotModel, n: int = N_PLANS) -> list[TrialPlan]:
     """Trials to fit a drive to: straight runs, turns in place, arcs, steps of the command, slow commands, mixed.
 
     The robot drives each part back immediately, so that it stays in the free space even if it differs from its file.
@@ -36,7 +34,6 @@ def motion_plans(
         arena: Trials begin in the middle of the largest free place on a grid in it, along its longer side.
         robot: Robot with the numbers of its file.
         n: Number of trials. Each of the first five is of another kind.
-        first_number: Number of the first trial.
 
     Raises:
         ValueError: There is no room for the robot to turn in place.
@@ -66,7 +63,7 @@ def motion_plans(
                 start,
                 commands=np.array(commands[:STEPS]),
                 steps=STEPS,
-                number=first_number + k,
+                number=k,
                 purpose="motion",
             )
         )

@@ -19,6 +19,7 @@ from realitygap.records import TrialRecord
 from realitygap.trials import TrialPlan
 from realitygap.world import Arena, Fitted, Pose, RobotModel
 
+from ._posterior import N_DRAWS
 from ._ruler import EXACT, Moved, moved_in
 
 Array = NDArray[np.float64]
@@ -97,8 +98,6 @@ def fit_path(
     simulate: Simulate,
     robot: RobotModel,
     rng: np.random.Generator,
-    *,
-    n_draws: int = 500,
 ) -> PathFit:
     """Fit the gains of the wheels and the track from the ends of paths.
 
@@ -107,7 +106,6 @@ def fit_path(
         simulate: The robot on whose numbers the fit builds.
         robot: Description of the simulated robot.
         rng: Random numbers.
-        n_draws: Number of draws from the posterior.
 
     Returns:
         The fit: the wheels' gains and the track, as scale factors of the simulated distance and turn. So the lag and
@@ -131,12 +129,12 @@ def fit_path(
             "are its batteries full, and do its wheels turn?"
         )
     ways = [moved.way for moved in straight.moved]
-    way = _mean(ways, straight.length_step, GAIN_SPREAD * abs(ways[0]), n_draws, rng)
+    way = _mean(ways, straight.length_step, GAIN_SPREAD * abs(ways[0]), N_DRAWS, rng)
     unknown = UNEVEN_SPREAD * abs(ways[0]) / robot.drive.track
-    veer = _mean([moved.turned for moved in straight.moved], straight.angle_step, unknown, n_draws, rng)
+    veer = _mean([moved.turned for moved in straight.moved], straight.angle_step, unknown, N_DRAWS, rng)
     expected, base = simulate(straight.trials[0]), (robot.drive.gain_left + robot.drive.gain_right) / 2
     gain = base * way / expected.way
-    track, turn = np.full(n_draws + 1, robot.drive.track), None
+    track, turn = np.full(N_DRAWS + 1, robot.drive.track), None
     if turning.moved and not straight.by_encoders:
         if all(abs(moved.turned) < STANDS / robot.drive.track for moved in turning.moved):
             raise ValueError(
@@ -144,7 +142,7 @@ def fit_path(
                 "turn in opposite directions."
             )
         turns = [moved.turned for moved in turning.moved]
-        turn = _mean(turns, turning.angle_step, TRACK_SPREAD * abs(turns[0]), n_draws, rng)
+        turn = _mean(turns, turning.angle_step, TRACK_SPREAD * abs(turns[0]), N_DRAWS, rng)
         track = robot.drive.track * (gain / base) * simulate(turning.trials[0]).turned / turn
     uneven = robot.drive.gain_right - robot.drive.gain_left
     uneven = uneven + (veer - expected.turned) * track * base / expected.way

@@ -11,6 +11,8 @@ from realitygap import _special as special
 from ._scatter import NoisePrior
 from ._simulate import Floats, Ints
 
+N_DRAWS = 500
+"""Draws that a calibration keeps."""
 SWEEPS, BURN_IN = 600, 150
 HEATS = (0.02, 0.06, 0.2, 0.5, 1.0, 1.0, 1.0)  # parts of the log likelihood that count, round by round
 WIDER = 2.0  # times the covariance found, to look around in

@@ -159,7 +159,7 @@ def _bench_task(
 ) -> None:
     from realitygap.study import measure_task
 
-    from ._study import RunsBar
+    from ._progress import RunsBar
 
     seeds = DEFAULT_SEEDS if seeds is None else seeds
     with RunsBar(quiet=as_json) as bar:
@@ -194,7 +194,7 @@ def _bench_maze(
 ) -> None:
     from realitygap.study import MAZE_SEEDS, measure_maze
 
-    from ._study import RunsBar
+    from ._progress import RunsBar
 
     with RunsBar(quiet=as_json) as bar:
         figures = measure_maze(

@@ -377,14 +377,9 @@ def _print(made: Calibration, out: Path, figure: Path | None, *, as_json: bool) 
         found = made.model_dump(exclude={"draws", "evidence"})
         typer.echo(json.dumps({"file": str(out), **found}, indent=2))
         return
-    from rich.console import Console
+    from ._tables import calibration_table, held_out_table, wide_console
 
-    from ._study import NARROWEST
-    from ._tables import calibration_table, held_out_table
-
-    console = Console()
-    if console.width < NARROWEST:
-        console = Console(width=NARROWEST)
+    console = wide_console()
     console.print(calibration_table(made))
     if "held_out" in made.evidence:
         console.print(held_out_table(made.evidence["held_out"], made.label))

@@ -170,9 +170,11 @@ def gap(
         from realitygap.report import refuse_gap_page
 
         refuse_gap_page(report)
+    from ._progress import TrialsBar
+
     try:
         with (
-            _TrialsBar(quiet=as_json) as bar,
+            TrialsBar(quiet=as_json) as bar,
             under_camera(camera, load_arena(arena or "paper"), _observer(target, witness)) as observer,
         ):
             found = gap_between(
@@ -279,49 +281,6 @@ def _print_why(why: Why) -> None:
         ends = "" if fall.low is None else f"[{fall.low:.3f}, {fall.high:.3f}]"
         typer.echo(f"  {why.parts[k]:16}{fall.estimate:>8.3f}  {ends:17} {n} number{'s' if n != 1 else ''}")
     typer.echo(why.advice)
-
-
-class _TrialsBar:
-    """A display of the finished trials on each platform, on standard error if that is a terminal."""
-
-    def __init__(self, *, quiet: bool) -> None:
-        from rich.console import Console
-        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-        self._console = Console(stderr=True, quiet=quiet)
-        self._progress = Progress(
-            TextColumn("{task.description}"),
-            BarColumn(),
-            MofNCompleteColumn(),
-            TextColumn("trials"),
-            TimeRemainingColumn(),
-            console=self._console,
-            transient=True,
-        )
-        self._tasks: dict[tuple[str, int], Any] = {}
-
-    def __enter__(self) -> _TrialsBar:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        if self._progress.live.is_started:  # else it would print an empty line
-            self._progress.stop()
-
-    def show(self, name: str, done: int, total: int) -> None:
-        """Show the number of finished trials."""
-        if not self._console.is_terminal:
-            return
-        if not self._progress.live.is_started:
-            self._progress.start()
-        key = (name, total)
-        if key not in self._tasks or self._progress.tasks[self._tasks[key]].completed > done:
-            self._tasks[key] = self._progress.add_task(name, total=total)
-        self._progress.update(self._tasks[key], completed=done)
-
-    def say(self, text: str) -> None:
-        """Print other progress, on a terminal."""
-        if self._console.is_terminal:
-            self._console.print(text, highlight=False, markup=False)
 
 
 def plan(

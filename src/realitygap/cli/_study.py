@@ -20,12 +20,10 @@ from ._results import written_report
 
 if TYPE_CHECKING:
     from realitygap.records import ResultsFolder
-    from realitygap.study import Progress, StudyResult
+    from realitygap.study import StudyResult
 
 
 _COMPUTING = "Computing"
-# Below it a summary's numbers would be cut; a narrower terminal wraps the lines instead.
-NARROWEST = 78
 
 
 def run(
@@ -102,6 +100,8 @@ def run(
     if study == CLOSING:
         raise StudyError(f"{CLOSING} is a command: realitygap {CLOSING}")
     from realitygap.study import load_study, run_study
+
+    from ._progress import RunsBar
 
     if threads is not None and cluster is not None:
         raise StudyError(
@@ -183,71 +183,6 @@ def _as_name(stem: str) -> str:
     return name.lstrip(".-_") or "my-study"
 
 
-class RunsBar:
-    """Finished runs, rate, and remaining time, on standard error if that is a terminal."""
-
-    def __init__(self, *, quiet: bool) -> None:
-        from rich.console import Console
-        from rich.progress import (
-            BarColumn,
-            MofNCompleteColumn,
-            Progress,
-            SpinnerColumn,
-            TextColumn,
-            TimeRemainingColumn,
-        )
-
-        self._console = Console(stderr=True, quiet=quiet)
-        self._progress = Progress(
-            SpinnerColumn(),
-            TextColumn("{task.description}"),
-            BarColumn(),
-            MofNCompleteColumn(),
-            TextColumn("runs"),
-            TextColumn("{task.fields[rate]}"),
-            TimeRemainingColumn(),
-            console=self._console,
-            transient=True,
-        )
-        self._task = self._progress.add_task("compiling or loading the kernels", total=None, rate="")
-
-    def __enter__(self) -> RunsBar:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        if self._progress.live.is_started:  # else it would print an empty line
-            self._progress.stop()
-
-    def show(self, progress: Progress) -> None:
-        """Show the progress of the study; nothing if all runs are finished."""
-        if progress.n_done == progress.n_runs and not self._progress.live.is_started:
-            return
-        if not self._progress.live.is_started:
-            if not self._console.is_terminal:
-                self._console.print(
-                    "Compiling or loading the kernels (compiling takes up to a minute, once per version) ..."
-                )
-            self._progress.start()
-        if progress.waiting_for and not self._console.is_terminal:
-            self._console.print(f"Waiting for {progress.waiting_for} ...", highlight=False)
-        started = progress.n_computed > 0
-        rate = (
-            f"{progress.n_computed / progress.seconds:,.0f} runs/s"
-            if started and progress.seconds > 0
-            else ""
-        )
-        description = "running" if started else "compiling or loading the kernels"
-        if progress.waiting_for:
-            description = f"waiting for {progress.waiting_for}"
-        self._progress.update(
-            self._task,
-            description=description,
-            completed=progress.n_done,
-            total=progress.n_runs,
-            rate=rate,
-        )
-
-
 def print_result(result: StudyResult, *, as_json: bool) -> None:
     """Print the summary of a study, and how many runs are complete."""
     from realitygap.report import summarize, summarize_tasks
@@ -272,13 +207,9 @@ def print_result(result: StudyResult, *, as_json: bool) -> None:
         typer.echo(json.dumps(found, indent=2))
         _print_physical(result, to_stderr=True)
         return
-    from rich.console import Console
+    from ._tables import summary_table, task_table, wide_console
 
-    from ._tables import summary_table, task_table
-
-    console = Console()
-    if console.width < NARROWEST:
-        console = Console(width=NARROWEST)
+    console = wide_console()
     title = result.folder.description["title"]
     if len(tasks):
         console.print(task_table(tasks, title))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from rich import box
+from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
@@ -12,6 +13,15 @@ if TYPE_CHECKING:
     import polars as pl
 
     from realitygap.world import Calibration
+
+NARROWEST = 78
+"""Width below which numbers of a table would be cut; on a narrower terminal, lines wrap."""
+
+
+def wide_console() -> Console:
+    """Return a console that is wide enough for tables."""
+    console = Console()
+    return console if console.width >= NARROWEST else Console(width=NARROWEST)
 
 
 def summary_table(summary: pl.DataFrame, title: str) -> Table:

@@ -266,8 +266,9 @@ def _list(ledger: Ledger, *, as_json: bool) -> None:
         ]
         typer.echo(json.dumps(rows, indent=2))
         return
-    from rich.console import Console
     from rich.table import Table
+
+    from ._tables import wide_console
 
     table = Table(box=None, padding=(0, 2, 0, 0))
     for head in ("trial", "code", "sheet", "state", "cells", "description"):
@@ -284,7 +285,7 @@ def _list(ledger: Ledger, *, as_json: bool) -> None:
             *(str(each.trial), each.code, str(each.sheet), each.state),
             *("" if each.cells is None else str(len(each.cells)), more),
         )
-    Console(width=max(78, Console().width), highlight=False).print(table)
+    wide_console().print(table, highlight=False)
     states = [each.state for each in found]
     counts = ", ".join(f"{states.count(state)} {state}" for state in dict.fromkeys(states))
     typer.echo(f"{len(found)} trials: {counts}." if found else "No trial is planned yet.")

@@ -7,13 +7,14 @@ import math
 import threading
 from collections.abc import Callable
 from functools import cache
-from importlib import import_module, resources
 from typing import Any
 
 from realitygap._how_to_run import install_command
 from realitygap.drawing import theme_rules, themed
 from realitygap.errors import RealityGapError
 from realitygap.robots.jyro import Camera, JyroWorld, SceneRobot
+
+from ._player import FILES, widget_modules
 
 HOLD_S = 0.6
 """Time without a message from the page after which a robot is stopped [s]; the page sends ten in a second."""
@@ -35,20 +36,16 @@ def panel_class() -> type:
     Raises:
         RealityGapError: anywidget is not installed.
     """
-    try:
-        anywidget, traitlets = import_module("anywidget"), import_module("traitlets")
-    except ImportError as error:
-        raise RealityGapError(
-            f"A panel needs anywidget, which is not installed: {install_command('notebook')}. Without a notebook, "
-            "drive on the page Robot of `realitygap lab`."
-        ) from error
-    files = resources.files("realitygap.playback")
+    anywidget, traitlets = widget_modules(
+        f"A panel needs anywidget, which is not installed: {install_command('notebook')}. Without a notebook, "
+        "drive on the page Robot of `realitygap lab`."
+    )
 
     class Panel(anywidget.AnyWidget):  # type: ignore[name-defined, misc]  # anywidget is an extra
         """A panel in a notebook."""
 
-        _esm = files.joinpath("panel.js").read_text("utf-8")
-        _css = theme_rules(".rg-panel") + files.joinpath("panel.css").read_text("utf-8")
+        _esm = FILES.joinpath("panel.js").read_text("utf-8")
+        _css = theme_rules(".rg-panel") + FILES.joinpath("panel.css").read_text("utf-8")
         title = traitlets.Unicode().tag(sync=True)
         svg = traitlets.Unicode().tag(sync=True)
         camera = traitlets.Unicode().tag(sync=True)

@@ -60,6 +60,22 @@ def check_speed(speed: float) -> float:
     return float(speed)
 
 
+FILES = resources.files("realitygap.playback")
+"""Files of the pages of the widgets."""
+
+
+def widget_modules(missing: str) -> tuple[Any, Any]:
+    """Return the modules anywidget and traitlets, which are an extra.
+
+    Raises:
+        RealityGapError: They are not installed.
+    """
+    try:
+        return import_module("anywidget"), import_module("traitlets")
+    except ImportError as error:
+        raise RealityGapError(missing) from error
+
+
 @cache
 def player_class() -> type:
     """The class of the widget; made when it is first needed, because anywidget is an extra.
@@ -67,20 +83,16 @@ def player_class() -> type:
     Raises:
         RealityGapError: anywidget is not there.
     """
-    try:
-        anywidget, traitlets = import_module("anywidget"), import_module("traitlets")
-    except ImportError as error:
-        raise RealityGapError(
-            f"Trials are shown in a notebook by anywidget, which is not installed: {install_command('notebook')}. "
-            "realitygap.write_movie needs none."
-        ) from error
-    files = resources.files("realitygap.playback")
+    anywidget, traitlets = widget_modules(
+        f"Trials are shown in a notebook by anywidget, which is not installed: {install_command('notebook')}. "
+        "realitygap.write_movie needs none."
+    )
 
     class Player(anywidget.AnyWidget):  # type: ignore[name-defined, misc]  # anywidget is an extra
         """Trials in motion in a notebook."""
 
-        _esm = files.joinpath("player.js").read_text("utf-8")
-        _css = theme_rules(".rg-player") + files.joinpath("player.css").read_text("utf-8")
+        _esm = FILES.joinpath("player.js").read_text("utf-8")
+        _css = theme_rules(".rg-player") + FILES.joinpath("player.css").read_text("utf-8")
         scene = traitlets.Dict().tag(sync=True)
         trials = traitlets.List().tag(sync=True)
         speed = traitlets.Float(1.0).tag(sync=True)

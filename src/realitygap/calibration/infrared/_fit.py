@@ -12,6 +12,7 @@ from realitygap.calibration._level import level_ends
 from realitygap.calibration._tempering import sample_posterior
 from realitygap.world import Fitted, RobotModel
 
+from .._posterior import N_DRAWS
 from ._checks import Independence, independence, predictive_check
 from ._lorentz import LorentzReadings
 from ._mixture import MixtureReadings
@@ -67,8 +68,6 @@ def fit_sensor(
     number: int,
     placements: list[Placement],
     rng: np.random.Generator,
-    *,
-    n_draws: int = 500,
 ) -> SensorFit:
     """Fit a sensor to its readings at placements of the robot.
 
@@ -77,7 +76,6 @@ def fit_sensor(
         number: Number of its range sensor.
         placements: Placements with readings, at least one.
         rng: Random numbers.
-        n_draws: Number of draws from the posterior.
 
     Raises:
         ValueError: No readings, or a sensor whose response is no infrared one.
@@ -98,7 +96,7 @@ def fit_sensor(
     places = sample_posterior(log_likelihood, len(model.scales), rng)
     ends = _ends(places, level_ends(log_likelihood, places, rng))
     values = _values(model, places)
-    chosen = rng.choice(len(values), n_draws, replace=n_draws > len(values))
+    chosen = rng.choice(len(values), N_DRAWS, replace=len(values) < N_DRAWS)
     name = f"range.{number}"
     centers = {scale.name: scale.center(values[:, k]) for k, scale in enumerate(model.scales)}
     advice = "" if np.any(model.places.near < sensor.reach) else NO_WALL.format(name)

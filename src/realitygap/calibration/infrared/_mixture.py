@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from realitygap import _special as special
 from realitygap.world import RangeSensor
 
-from ._readings import Array, Placement, Places, logistic
-from ._scales import AMPLITUDE, BATTERY, DECAY, DROP, GAIN, INCIDENCE, OUTLIER, Scale, column, scaled
+from ._readings import Array, Placement, Places, Readings, logistic
+from ._scales import AMPLITUDE, DECAY, DROP, GAIN, OUTLIER
 
 Parts = tuple[Array, Array, Array, Array]
 
@@ -42,7 +42,7 @@ def step_of(readings: Array) -> float:
     return step if is_coarse else FINEST
 
 
-class MixtureReadings:
+class MixtureReadings(Readings):
     """Infrared readings at placements.
 
     Args:
@@ -60,13 +60,7 @@ class MixtureReadings:
         weight: float = 1.0,
         sensor: RangeSensor | None = None,
     ) -> None:
-        self.places = Places.of(placements, reach)
-        self.weight = weight
-        self.scales: tuple[Scale, ...] = (AMPLITUDE, DECAY, GAIN, *DROP, *OUTLIER)
-        self.scales += (BATTERY,) * self.places.battery_varied + (INCIDENCE,) * self.places.slants_varied
-        if sensor is not None:
-            self.scales = tuple(scaled(scale, sensor) for scale in self.scales)
-        self._incidence = 0.0 if sensor is None else sensor.incidence
+        super().__init__(placements, reach, (AMPLITUDE, DECAY, GAIN, *DROP, *OUTLIER), weight, sensor)
         self._compression = 0.0 if sensor is None else sensor.compression
         self.step = step_of(np.concatenate([placement.readings for placement in placements]))
         self._edges = _inner_edges(self.step)
@@ -96,14 +90,6 @@ class MixtureReadings:
         """Return the number of readings in each bin, (b,)."""
         place = np.searchsorted(self._edges, np.clip(readings, 0.0, 1.0))
         return np.bincount(place, minlength=len(self._edges) + 1)
-
-    def probabilities(self, values: Array) -> Array:
-        """Return the probability of each bin at each placement, (m, p, b).
-
-        Args:
-            values: (m, d) values of the parameters, in the order of `scales`.
-        """
-        return self._at(self.places, values)
 
     def _light(self, readings: Array) -> Array:
         """Return the light of readings: noise is on it, before it is compressed."""
@@ -142,24 +128,11 @@ class MixtureReadings:
 
     def parts(self, places: Places, values: Array) -> Parts:
         """Return (m, p) each: response, standard deviation, and probability of nothing and of anything."""
-        amplitude, decay, gain = values[:, :3].T
-        per_volt = column(self.scales, values, BATTERY)
-        incidence = column(self.scales, values, INCIDENCE, self._incidence)
-        back, dim = places.response(amplitude, decay, per_volt, incidence)
-        spread = np.maximum(gain[:, None] * back, 1e-9)
+        back, dim = self._response(places, values)
+        spread = np.maximum(values[:, 2, None] * back, 1e-9)
         drop = logistic(dim, *values[:, 3:6].T)
         out = np.minimum(logistic(dim, *values[:, 6:9].T), 1.0 - drop)
         return back, spread, drop, out
-
-    def quantiles(
-        self, values: Array, distances: Array, cosines: Array, shares: Array
-    ) -> tuple[Array, Array]:
-        """Return means (q,) and quantiles (s, q) of readings at distances (q, rays) [m], over parameters (m, d)."""
-        blank = [Placement(each, np.empty(0), cosines=c) for each, c in zip(distances, cosines, strict=True)]
-        chances = self._at(Places.of(blank, self.places.reach), values).mean(axis=0)
-        summed = np.cumsum(chances, axis=1)
-        place = np.array([(summed < share).sum(axis=1) for share in shares])
-        return chances @ self.bins, self.bins[np.minimum(place, len(self.bins) - 1)]
 
 
 def _inner_edges(step: float) -> Array:

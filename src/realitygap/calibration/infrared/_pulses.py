@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from realitygap import _special as special
 from realitygap.world import RangeSensor
 
-from ._readings import Array, Placement, Places, logistic
-from ._scales import AMPLITUDE, BATTERY, BURST, DECAY, DROP, INCIDENCE, Scale, column, scaled
+from ._readings import Array, Placement, Places, Readings, logistic
+from ._scales import AMPLITUDE, BURST, DECAY, DROP
 
 STRAY = 1e-6
 """Probability of any count, so that one that the model cannot make is unlikely and not impossible."""
@@ -18,7 +18,7 @@ ROWS = 16
 """Sets of parameters whose probabilities are computed together: their arrays fit into a processor's cache."""
 
 
-class PulseReadings:
+class PulseReadings(Readings):
     """Counts of pulses at placements.
 
     Args:
@@ -37,14 +37,8 @@ class PulseReadings:
         weight: float = 1.0,
         sensor: RangeSensor | None = None,
     ) -> None:
-        self.places = Places.of(placements, reach)
+        super().__init__(placements, reach, (AMPLITUDE, DECAY, *DROP, BURST), weight, sensor)
         self.pulses = pulses
-        self.weight = weight
-        self.scales: tuple[Scale, ...] = (AMPLITUDE, DECAY, *DROP, BURST)
-        self.scales += (BATTERY,) * self.places.battery_varied + (INCIDENCE,) * self.places.slants_varied
-        self._incidence = 0.0 if sensor is None else sensor.incidence
-        if sensor is not None:
-            self.scales = tuple(scaled(scale, sensor) for scale in self.scales)
         self.counts = np.array([self.binned(placement.readings) for placement in placements])
 
     @property
@@ -57,14 +51,6 @@ class PulseReadings:
         counts = np.clip(np.rint(np.asarray(readings) * self.pulses), 0, self.pulses).astype(np.int64)
         return np.bincount(counts, minlength=self.pulses + 1)
 
-    def probabilities(self, values: Array) -> Array:
-        """Return the probability of each count at each placement, (m, p, b).
-
-        Args:
-            values: (m, d) values of the parameters, in the order of `scales`.
-        """
-        return self._at(self.places, values)
-
     def _at(self, places: Places, values: Array, stray: float = STRAY) -> Array:
         sent_back, missed = self._pulses(places, values)
         counts = np.arange(self.pulses + 1)
@@ -73,12 +59,9 @@ class PulseReadings:
 
     def _pulses(self, places: Places, values: Array) -> tuple[NDArray[np.int64], Array]:
         """Return pulses that return if none is missed, and the probability that one is missed, (m, p) each."""
-        amplitude, decay, most, at, width = values[:, :5].T
-        per_volt = column(self.scales, values, BATTERY)
-        incidence = column(self.scales, values, INCIDENCE, self._incidence)
-        back, dim = places.response(amplitude, decay, per_volt, incidence)
+        back, dim = self._response(places, values)
         back = np.clip(back, 0.0, 1.0)
-        missed = np.clip(logistic(dim, most, at, width), 1e-12, 1.0 - 1e-12)
+        missed = np.clip(logistic(dim, *values[:, 2:5].T), 1e-12, 1.0 - 1e-12)
         return np.floor(back * self.pulses + 0.5).astype(np.int64), missed
 
     def _chances(
@@ -111,16 +94,6 @@ class PulseReadings:
             chances = self._chances(sent_back[:, which], missed[:, which], counts, burst, stray)
             logs[part] = np.einsum("mr,r->m", np.log(chances), self.counts[which, counts])
         return np.asarray(self.weight * logs)
-
-    def quantiles(
-        self, values: Array, distances: Array, cosines: Array, shares: Array
-    ) -> tuple[Array, Array]:
-        """Return means (q,) and quantiles (s, q) of readings at distances (q, rays) [m], over parameters (m, d)."""
-        blank = [Placement(each, np.empty(0), cosines=c) for each, c in zip(distances, cosines, strict=True)]
-        chances = self._at(Places.of(blank, self.places.reach), values).mean(axis=0)
-        summed = np.cumsum(chances, axis=1)
-        place = [(summed < share).sum(axis=1) for share in shares]
-        return chances @ self.bins, np.minimum(np.array(place), self.pulses) / self.pulses
 
 
 def _ways(pulses: int) -> Array:

@@ -8,7 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from realitygap.world import RobotModel
+from realitygap.world import RangeSensor, RobotModel
+
+from ._scales import BATTERY, INCIDENCE, Scale, column, scaled
 
 Array = NDArray[np.float64]
 
@@ -134,3 +136,56 @@ def logistic(far: Array, most: Array, at: Array, width: Array) -> Array:
     """Return a probability that rises with distance, (m, p), at distances (m, p) or (1, p) [m]."""
     past = (far - at[:, None]) / width[:, None]
     return np.asarray(most[:, None] / (1.0 + np.exp(-np.clip(past, -500.0, 500.0))))
+
+
+class Readings:
+    """Base of the likelihoods of readings at places."""
+
+    def __init__(
+        self,
+        placements: list[Placement],
+        reach: float,
+        scales: tuple[Scale, ...],
+        weight: float,
+        sensor: RangeSensor | None,
+    ) -> None:
+        self.places = Places.of(placements, reach)
+        self.weight = weight
+        self.scales = scales
+        self.scales += (BATTERY,) * self.places.battery_varied + (INCIDENCE,) * self.places.slants_varied
+        if sensor is not None:
+            self.scales = tuple(scaled(scale, sensor) for scale in self.scales)
+        self._incidence = 0.0 if sensor is None else sensor.incidence
+
+    @property
+    def bins(self) -> Array:
+        """Value of each bin of readings, (b,)."""
+        raise NotImplementedError
+
+    def _at(self, places: Places, values: Array) -> Array:
+        """Return the probability of each bin at each of the places, (m, q, b)."""
+        raise NotImplementedError
+
+    def _response(self, places: Places, values: Array) -> tuple[Array, Array]:
+        """Return `Places.response` for parameters (m, d), of which the first are amplitude and decay."""
+        per_volt = column(self.scales, values, BATTERY)
+        incidence = column(self.scales, values, INCIDENCE, self._incidence)
+        return places.response(values[:, 0], values[:, 1], per_volt, incidence)
+
+    def probabilities(self, values: Array) -> Array:
+        """Return the probability of each bin at each placement, (m, p, b).
+
+        Args:
+            values: (m, d) values of the parameters, in the order of `scales`.
+        """
+        return self._at(self.places, values)
+
+    def quantiles(
+        self, values: Array, distances: Array, cosines: Array, shares: Array
+    ) -> tuple[Array, Array]:
+        """Return means (q,) and quantiles (s, q) of readings at distances (q, rays) [m], over parameters (m, d)."""
+        blank = [Placement(each, np.empty(0), cosines=c) for each, c in zip(distances, cosines, strict=True)]
+        chances = self._at(Places.of(blank, self.places.reach), values).mean(axis=0)
+        summed = np.cumsum(chances, axis=1)
+        place = np.array([(summed < share).sum(axis=1) for share in shares])
+        return chances @ self.bins, self.bins[np.minimum(place, len(self.bins) - 1)]

@@ -1,0 +1,114 @@
+"""Progress on standard error, if that is a terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, Self
+
+from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    ProgressColumn,
+    SpinnerColumn,
+    TextColumn,
+    TimeRemainingColumn,
+)
+
+if TYPE_CHECKING:
+    from realitygap.study import Progress as StudyProgress
+
+
+class ProgressBar:
+    """A bar of finished units of work and the remaining time.
+
+    Args:
+        unit: Units, in the plural.
+        first: Columns before the description.
+        more: Columns after the unit.
+        quiet: True to show nothing.
+    """
+
+    def __init__(
+        self,
+        unit: str,
+        *,
+        first: Sequence[ProgressColumn] = (),
+        more: Sequence[ProgressColumn] = (),
+        quiet: bool,
+    ) -> None:
+        self._console = Console(stderr=True, quiet=quiet)
+        counted = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn(unit))
+        columns = (*first, *counted, *more, TimeRemainingColumn())
+        self._progress = Progress(*columns, console=self._console, transient=True)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._progress.live.is_started:  # else it would print an empty line
+            self._progress.stop()
+
+
+class RunsBar(ProgressBar):
+    """Finished runs, rate, and remaining time, on standard error if that is a terminal."""
+
+    def __init__(self, *, quiet: bool) -> None:
+        super().__init__(
+            "runs", first=[SpinnerColumn()], more=[TextColumn("{task.fields[rate]}")], quiet=quiet
+        )
+        self._task = self._progress.add_task("compiling or loading the kernels", total=None, rate="")
+
+    def show(self, progress: StudyProgress) -> None:
+        """Show the progress of the study; nothing if all runs are finished."""
+        if progress.n_done == progress.n_runs and not self._progress.live.is_started:
+            return
+        if not self._progress.live.is_started:
+            if not self._console.is_terminal:
+                self._console.print(
+                    "Compiling or loading the kernels (compiling takes up to a minute, once per version) ..."
+                )
+            self._progress.start()
+        if progress.waiting_for and not self._console.is_terminal:
+            self._console.print(f"Waiting for {progress.waiting_for} ...", highlight=False)
+        started = progress.n_computed > 0
+        rate = (
+            f"{progress.n_computed / progress.seconds:,.0f} runs/s"
+            if started and progress.seconds > 0
+            else ""
+        )
+        description = "running" if started else "compiling or loading the kernels"
+        if progress.waiting_for:
+            description = f"waiting for {progress.waiting_for}"
+        self._progress.update(
+            self._task,
+            description=description,
+            completed=progress.n_done,
+            total=progress.n_runs,
+            rate=rate,
+        )
+
+
+class TrialsBar(ProgressBar):
+    """A display of the finished trials on each platform, on standard error if that is a terminal."""
+
+    def __init__(self, *, quiet: bool) -> None:
+        super().__init__("trials", quiet=quiet)
+        self._tasks: dict[tuple[str, int], Any] = {}
+
+    def show(self, name: str, done: int, total: int) -> None:
+        """Show the number of finished trials."""
+        if not self._console.is_terminal:
+            return
+        if not self._progress.live.is_started:
+            self._progress.start()
+        key = (name, total)
+        if key not in self._tasks or self._progress.tasks[self._tasks[key]].completed > done:
+            self._tasks[key] = self._progress.add_task(name, total=total)
+        self._progress.update(self._tasks[key], completed=done)
+
+    def say(self, text: str) -> None:
+        """Print other progress, on a terminal."""
+        if self._console.is_terminal:
+            self._console.print(text, highlight=False, markup=False)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import bisect
 import functools
 from dataclasses import dataclass
 from typing import Literal
@@ -85,13 +86,14 @@ def interval_ranks(n: int, confidence: float = CONFIDENCE) -> IntervalRanks | No
     if n == 0:
         return None
     may_miss = (1.0 - confidence) / 2.0
-    # the largest rank r with P(X <= r - 1) <= may_miss; P(X <= k) by the incomplete beta function
-    k = np.arange((n + 1) // 2)
-    misses = special.betainc(n - k, k + 1, 0.5)
-    lower = int(np.searchsorted(misses, may_miss, "right"))
+
+    def misses(k: int) -> float:  # P(X <= k)
+        return float(special.betainc(n - k, k + 1, 0.5))
+
+    lower = bisect.bisect_right(range((n + 1) // 2), may_miss, key=misses)
     if lower < 1:
         return None
-    return IntervalRanks(lower, n + 1 - lower, 1.0 - 2.0 * float(misses[lower - 1]))
+    return IntervalRanks(lower, n + 1 - lower, 1.0 - 2.0 * misses(lower - 1))
 
 
 def median_interval(values: npt.NDArray[np.float64], confidence: float = CONFIDENCE) -> Interval | None:

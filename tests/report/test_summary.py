@@ -1,9 +1,10 @@
 from __future__ import annotations
 
+import polars as pl
 import pytest
 
 from realitygap.errors import RecordError
-from realitygap.report import SUMMARY_SCHEMA, summarize
+from realitygap.report import SUMMARY_SCHEMA, median_interval, quartiles, summarize
 from tests.report.results import describe, random_runs, write_results
 
 
@@ -44,6 +45,23 @@ def test_interval_bounds_are_two_of_the_runs(out):
     row = summarize(out).row(0, named=True)
     assert (row["line_low"], row["line_high"]) == (2 / 72, 9 / 72)
     assert row["interval_coverage"] == pytest.approx(1 - 22 / 1024)
+
+
+@pytest.mark.parametrize("n", [1, 2, 5, 6, 7, 12, 41])
+def test_summary_equals_quartiles_and_interval_of_all_runs(out, n):
+    folder = write_results(out, [describe("coverage")], {"coverage": random_runs(n, seed=n)}, chunk=4)
+    (row,) = summarize(folder).iter_rows(named=True)
+    bests = folder.read().group_by("replicate").agg(pl.col("coverage_line", "coverage_ends").max())
+    for measure in ("line", "ends"):
+        values = bests[f"coverage_{measure}"].to_numpy()
+        middle, interval = quartiles(values), median_interval(values)
+        assert [row[f"{measure}_{name}"] for name in ("q25", "median", "q75")] == [
+            middle.q25,
+            middle.median,
+            middle.q75,
+        ]
+        ends = (None, None) if interval is None else (interval.low, interval.high)
+        assert (row[f"{measure}_low"], row[f"{measure}_high"]) == ends
 
 
 def test_conditions_keep_their_order_also_without_runs(out):

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import bisect
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
+from itertools import accumulate
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import polars as pl
 
-from realitygap._medians import interval_ranks, median_interval, quartiles
+from realitygap._medians import IntervalRanks, interval_ranks
 from realitygap.records import ResultsFolder
 from realitygap.report._driven import read_driven
 from realitygap.report._tally import (
@@ -19,11 +21,12 @@ from realitygap.report._tally import (
     label_of,
     labeled_conditions,
     no_trials,
-    run_bests_of,
 )
 
 _STATISTICS = ("median", "q25", "q75", "low", "high")
 _MEASURES: tuple[Measure, ...] = ("line", "ends")
+_Bests = dict[Measure, Counter[float | None]]
+"""How often each best coverage of a run occurs; None if it is unknown. Memory does not grow with the runs."""
 
 SUMMARY_SCHEMA = pl.Schema(
     {
@@ -54,8 +57,8 @@ def summarize(folder: Results) -> pl.DataFrame:
         RecordError: there is no such folder, a file in it is damaged, or it holds no trials yet.
     """
     rows = []
-    for condition, runs in _runs_by_condition(folder):
-        n = len(runs)
+    for condition, bests in _bests_by_condition(folder):
+        n = bests["line"].total()
         ranks = interval_ranks(n)
         row: dict[str, Any] = {
             "condition": condition["name"],
@@ -65,36 +68,62 @@ def summarize(folder: Results) -> pl.DataFrame:
             "published": condition.get("published"),
         }
         for measure in _MEASURES if n else ():
-            row |= {f"{measure}_{key}": value for key, value in _describe(runs[measure].to_numpy()).items()}
+            row |= {f"{measure}_{key}": value for key, value in _describe(bests[measure], ranks).items()}
         rows.append(row)
     return pl.DataFrame(rows, schema=SUMMARY_SCHEMA)
 
 
-def _runs_by_condition(folder: Results) -> Iterator[tuple[Mapping[str, Any], pl.DataFrame]]:
-    """Yield each condition with the best coverage of its runs, of which only those of one are in memory."""
+def _bests_by_condition(folder: Results) -> Iterator[tuple[Mapping[str, Any], _Bests]]:
+    """Yield each condition with the best coverage of its runs."""
     if isinstance(folder, Tally):
         for condition in folder.conditions:
-            yield condition, folder.runs.filter(pl.col("condition") == condition["name"])
+            yield condition, _counted([folder.runs.filter(pl.col("condition") == condition["name"])])
         return
     folder = folder if isinstance(folder, ResultsFolder) else ResultsFolder.open(folder)
     is_empty = True
     for condition in labeled_conditions(folder):
-        runs = run_bests_of(folder, condition["name"])
-        is_empty &= runs.is_empty()
-        yield condition, runs
+        frames = folder.frames(condition["name"], ["replicate", "coverage_line", "coverage_ends"])
+        bests = _counted(
+            frame.group_by("replicate").agg(
+                pl.col("coverage_line").max().alias("line"), pl.col("coverage_ends").max().alias("ends")
+            )
+            for frame in frames
+        )
+        is_empty &= not bests["line"]
+        yield condition, bests
     if is_empty:
         raise no_trials(folder, read_driven(folder))
 
 
-def _describe(values: npt.NDArray[np.float64]) -> dict[str, float | None]:
-    if np.isnan(values).any():  # a robot's cells were not counted, or the ends of its steps are unknown
+def _counted(parts: Iterable[pl.DataFrame]) -> _Bests:
+    """Count the values of the runs in frames. There are few values, as each is a number of cells."""
+    counts: _Bests = {measure: Counter() for measure in _MEASURES}
+    for part in parts:
+        for measure in _MEASURES:
+            counts[measure].update(part[measure].to_list())
+    return counts
+
+
+def _describe(counts: Counter[float | None], ranks: IntervalRanks | None) -> dict[str, float | None]:
+    """Return the quartiles, and the values at the ranks of the interval."""
+    if None in counts:  # a robot's cells were not counted, or the ends of its steps are unknown
         return dict.fromkeys(_STATISTICS)
-    middle = quartiles(values)
-    interval = median_interval(values)
+    values = sorted(value for value in counts if value is not None)
+    up_to = list(accumulate(counts[value] for value in values))
+    n = up_to[-1]
+
+    def at(rank: int) -> float:
+        return values[bisect.bisect_left(up_to, rank)]
+
+    def quantile(share: float) -> float:  # as `quartiles` of all values
+        below = int((n - 1) * share)
+        ends = [at(below + 1), at(min(below + 2, n))]
+        return float(np.quantile(ends, (n - 1) * share - below))
+
     return {
-        "median": middle.median,
-        "q25": middle.q25,
-        "q75": middle.q75,
-        "low": None if interval is None else interval.low,
-        "high": None if interval is None else interval.high,
+        "median": quantile(0.5),
+        "q25": quantile(0.25),
+        "q75": quantile(0.75),
+        "low": None if ranks is None else at(ranks.lower),
+        "high": None if ranks is None else at(ranks.upper),
     }

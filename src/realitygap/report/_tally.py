@@ -224,20 +224,6 @@ def settings_of(condition: Mapping[str, Any]) -> Mapping[str, Any]:
     return settings if isinstance(settings, dict) else {}
 
 
-def run_bests_of(folder: ResultsFolder, condition: str) -> pl.DataFrame:
-    """Return the best coverage of each run of a condition, with a row of `replicate`, `line` and `ends` for each run.
-
-    Memory holds one chunk, and these rows.
-    """
-    parts = [
-        frame.group_by("replicate", maintain_order=True).agg(
-            pl.col("coverage_line").max().alias("line"), pl.col("coverage_ends").max().alias("ends")
-        )
-        for frame in folder.frames(condition, ["replicate", "coverage_line", "coverage_ends"])
-    ]
-    return pl.concat(parts) if parts else pl.DataFrame(schema=["replicate", "line", "ends"])
-
-
 def bests_of(folder: ResultsFolder, condition: str) -> npt.NDArray[np.float64]:
     """Return the best fitness by the task in each generation of each run, (n, g)."""
     parts = [

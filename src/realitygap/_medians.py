@@ -61,7 +61,7 @@ class Quartiles:
 
 @functools.lru_cache
 def interval_ranks(n: int, confidence: float = CONFIDENCE) -> IntervalRanks | None:
-    """The innermost pair of symmetric ranks whose interval covers the median with at least `confidence`.
+    """Return the innermost pair of symmetric ranks whose interval covers the median with at least `confidence`.
 
     The number of n independent values below the median is Binomial(n, 1/2), so the interval between the
     values of rank r and n + 1 - r misses it with probability 2 P(X <= r - 1), exactly.
@@ -97,7 +97,7 @@ def interval_ranks(n: int, confidence: float = CONFIDENCE) -> IntervalRanks | No
 
 
 def median_interval(values: npt.NDArray[np.float64], confidence: float = CONFIDENCE) -> Interval | None:
-    """The order-statistic interval of the median: no distribution is assumed and nothing is resampled.
+    """Return the order-statistic interval of the median: no distribution is assumed and nothing is resampled.
 
     Args:
         values: (n,) independent observations in any order and unit, all finite.
@@ -119,7 +119,7 @@ def median_interval(values: npt.NDArray[np.float64], confidence: float = CONFIDE
 
 
 def quartiles(values: npt.NDArray[np.float64]) -> Quartiles:
-    """Lower quartile, median and upper quartile, with straight lines between ordered values.
+    """Return the lower quartile, median and upper quartile, with straight lines between ordered values.
 
     Args:
         values: (n,) values in any order and unit, n >= 1, all finite.

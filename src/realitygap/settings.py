@@ -129,7 +129,7 @@ def is_hidden(info: FieldInfo) -> bool:
 
 
 def shown(value: object) -> str:
-    """A value as it came, short enough for a message."""
+    """Return a value as it came, short enough for a message."""
     text = repr(value)
     return text if len(text) <= 60 else text[:57] + "..."
 
@@ -143,7 +143,7 @@ def visible(text: str) -> str:
 
 
 def _place(model: type[BaseModel], loc: tuple[int | str, ...]) -> tuple[str, str, type[BaseModel]]:
-    """A problem's place as text, the last name in it, and the model that this belongs to.
+    """Return a problem's place as text, the last name in it, and the model that this belongs to.
 
     Tables in a list are counted from 0, as in the names of their numbers: range.0.cone. Numbers by name have theirs:
     draws.drive.track[2]. Any other part after a setting that is no table is an entry of a list, or one of the possible
@@ -171,7 +171,7 @@ def _place(model: type[BaseModel], loc: tuple[int | str, ...]) -> tuple[str, str
 
 
 def table_in(annotation: Any) -> tuple[type[BaseModel] | None, bool]:
-    """The model that a setting's type is, may be or lists, if any, and whether it lists it."""
+    """Return the model that a setting's type is, may be or lists, if any, and whether it lists it."""
     parts = [part for part in get_args(annotation) if part not in (type(None), Ellipsis)]
     is_list = get_origin(annotation) is tuple
     if parts:

@@ -68,7 +68,7 @@ def fit_all(
     effort: Effort = "full",
     tell: Callable[[str], None] | None = None,
 ) -> Posterior:
-    """The posterior of all parameters together.
+    """Return the posterior of all parameters together.
 
     Args:
         evidence: Observations, and trials to simulate.
@@ -119,7 +119,7 @@ def fit_all(
 
 
 def mixed(one: Posterior, other: Posterior, prior: Sequence[Parameter], *, share: int) -> Posterior:
-    """Draws of two posteriors by turns, `share` of the first for each of the other, together as many as either has."""
+    """Return draws of two posteriors by turns, `share` of the first for each of the other, as many as either has."""
     n, p = min(len(one.places), len(other.places)) // (share + 1), len(prior)
     turns = [one.places[: share * n].reshape(n, share, p), other.places[:n].reshape(n, 1, p)]
     places = np.concatenate(turns, axis=1).reshape(-1, p)
@@ -155,7 +155,7 @@ def _adjusted(
     observed: Floats,
     groups: Sequence[NDArray[np.int64]],
 ) -> tuple[Floats, Floats]:
-    """Draws from the posterior: parameters moved by their regression on the summaries to what was observed.
+    """Return draws from the posterior: parameters moved by their regression on the summaries to what was observed.
 
     First all simulations say which combination of summaries tells of each parameter; then, for each group of
     parameters, those nearest in these combinations say how parameters scatter around.
@@ -182,7 +182,7 @@ def _adjusted(
 
 
 def _predict(summaries: Floats, places: Floats, here: Floats) -> tuple[Floats, Floats]:
-    """Ridge regression of places on summaries and their curvature: for the simulations, and for the observed.
+    """Return the ridge regression of places on summaries and their curvature, for the simulations and for the observed.
 
     Each simulation is predicted by the regression without it, which follows from the whole one (Allen 1974). A
     regression overfits its own data, which the observations are not part of. Means and the first predictions, whose
@@ -205,7 +205,7 @@ def _predict(summaries: Floats, places: Floats, here: Floats) -> tuple[Floats, F
 
 
 def _ridge(design: Floats, wanted: Floats) -> tuple[Floats, Floats]:
-    """Slopes, and (n,) how much of what is predicted of each row is its own."""
+    """Return slopes, and (n,) how much of what is predicted of each row is its own."""
     gram = design.T @ design
     gram = gram + 1e-3 * np.diag(np.diag(gram) + 1e-9)
     own = (design * np.linalg.solve(gram, design.T).T).sum(axis=1)

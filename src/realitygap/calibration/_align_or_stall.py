@@ -41,7 +41,7 @@ class Encounters:
 
 
 def encounters_of(trials: Sequence[TrialRecord], robot: RobotModel, arena: Arena) -> Encounters:
-    """All first touches in trials with poses, on which another step of the same command follows."""
+    """Return all first touches in trials with poses, on which another step of the same command follows."""
     outline = np.array([point for part in robot.body for point in part.outline()])
     axle = plain_numbers(robot)["drive.axle"]
     margins, aligned = [], []
@@ -62,7 +62,7 @@ def encounters_of(trials: Sequence[TrialRecord], robot: RobotModel, arena: Arena
 
 
 def _straight_rows(trial: TrialRecord) -> list[int]:
-    """Rows before which and after which the same straight command was given."""
+    """Return rows before which and after which the same straight command was given."""
     if not len(trial.poses):
         return []
     move, turn = trial.commands.T

@@ -148,7 +148,7 @@ def _sensors(
 
 
 def _some_of(draws: Mapping[str, Floats], n: int, rng: np.random.Generator) -> dict[str, Floats]:
-    """(n,) of the draws of each parameter; those of one length are joint draws."""
+    """Return n of the draws of each parameter, (n,); draws of one length are joint."""
     which = {k: rng.integers(k, size=n) for k in sorted({len(value) for value in draws.values()})}
     return {name: value[which[len(value)]] for name, value in draws.items()}
 
@@ -173,7 +173,7 @@ class _Fit:
         self.n_simulated = 0
 
     def grown(self) -> tuple[Floats, Floats]:
-        """(p,) places of the fit, from the robot's own numbers on, and (p, p) the shape of its minimum."""
+        """Return (p,) places of the fit, from the robot's own numbers on, and (p, p) the shape of its minimum."""
         center = own_places(self.robot, self.free)
         p = len(center)
         strategy = self._strategy(center, WIDE, np.eye(p))
@@ -190,7 +190,7 @@ class _Fit:
         )
 
     def draws(self, center: Floats, shape: Floats, n: int) -> Floats:
-        """(N_DRAWS, p) places around the fit, from n reweighted fits."""
+        """Return (N_DRAWS, p) places around the fit, from n reweighted fits."""
         t, k = self.seen.commands.shape[1], len(self.seen.starts)
         scales = self._scales(center, t)
         spread = NARROW / np.sqrt(np.diag(shape).mean())
@@ -241,7 +241,7 @@ class _Fit:
     def _costs(
         self, places: Floats, t: int, scales: NDArray[np.float32], weights: Floats, pull: Floats
     ) -> Floats:
-        """(m,) costs of robots at places (m, p) that have no noise; other arguments as of `_descend`."""
+        """Return (m,) costs of robots at places (m, p) that have no noise; other arguments as of `_descend`."""
         seen, some = self.seen.values[:, :t], self.seen.weights[:, :t]
 
         def of(made: NDArray[np.float32]) -> Floats:
@@ -253,7 +253,7 @@ class _Fit:
         return np.asarray(0.5 * (FREEDOM + 1.0) * logs + 0.5 * PRIOR * from_prior)
 
     def _scales(self, center: Floats, t: int) -> NDArray[np.float32]:
-        """(k, t, d) typical differences: those that are taken for none, and the scatter by noise."""
+        """Return (k, t, d) typical differences: those that are taken for none, and the scatter by noise."""
         noise = _some_of(self.noise, N_NOISY, self.rng)
         made = self._made(np.tile(center, (N_NOISY, 1)), t, _as_it_is, noise)
         return np.asarray(np.sqrt(made.var(axis=0) + self.seen.finest**2))
@@ -290,7 +290,7 @@ class _Fit:
         )
 
     def poses(self, center: Floats) -> NDArray[np.float32]:
-        """(k, t + 1, 3) poses of a robot without noise."""
+        """Return (k, t + 1, 3) poses of a robot without noise."""
         seen, numbers = self.seen, self._numbers(center[None], {})
         played = self.ensemble.replay(seen.starts, seen.commands, numbers, self.seed, keep=("poses",))
         return np.asarray(played.poses[0])

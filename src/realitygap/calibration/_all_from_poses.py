@@ -48,7 +48,7 @@ def fit_from_poses(
     seed: int,
     tell: Callable[[str], None] | None = None,
 ) -> Posterior:
-    """The posterior of all parameters.
+    """Return the posterior of all parameters.
 
     Args:
         trials: Trials with poses.

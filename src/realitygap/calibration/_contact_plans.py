@@ -19,7 +19,7 @@ Commands = list[tuple[float, float]]
 
 
 def contact_plans(arena: Arena, robot: RobotModel, n: int = N_PLANS) -> list[TrialPlan]:
-    """Trials to fit contact to: pushes head on and slantwise, scrapes to both sides, with either end.
+    """Return trials to fit contact to: pushes head on and slantwise, scrapes to both sides, with either end.
 
     The result of an encounter is not known beforehand, so angles are random. Each trial begins at another heading, and
     after each push the robot backs off and turns by another angle.

@@ -16,13 +16,13 @@ TRIES = 10_000
 
 
 def random_controllers(n: int, seed: int) -> list[Genome]:
-    """N unrelated networks as NEAT's first generation of the paper's settings has them, with a constant input."""
+    """Return n unrelated networks with a constant input, as in NEAT's first generation with the paper's settings."""
     settings = NeatSettings.named("rosenzweig-remy")
     return [Population(3, 2, settings, seed=seed, replicate=k).ask()[0] for k in range(n)]
 
 
 def random_start(arena: Arena, radius: float, rng: np.random.Generator) -> Pose:
-    """A pose in which a robot of this radius touches nothing, in whole centimeters and twelfths of a turn.
+    """Return a pose in which a robot of this radius touches nothing, in whole centimeters and twelfths of a turn.
 
     Raises:
         ValueError: There seems to be no room for it.
@@ -45,7 +45,7 @@ def _clearance(arena: Arena, x: float, y: float) -> float:
 
 
 def excitation(arena: Arena, radius: float, n: int, steps: int, rng: np.random.Generator) -> list[TrialPlan]:
-    """N trials of commands: straight at full speed, in place, slow, and arcs, each for 1 to 8 steps, from anywhere.
+    """Return n trials of straight, turning, slow, and arc commands, each for 1 to 8 steps, from anywhere.
 
     Args:
         arena: Arena of the trials.

@@ -50,7 +50,7 @@ def place_of(parameter: Parameter, value: float) -> float:
 
 
 def own_values(robot: RobotModel) -> dict[str, float]:
-    """Values of the parameters with the robot's own numbers."""
+    """Return values of the parameters with the robot's own numbers."""
     now = plain_numbers(robot)
     left, right = now["drive.gain_left"], now["drive.gain_right"]
     return {**now, "drive.gain": (left + right) / 2, "drive.asymmetry": left - right}

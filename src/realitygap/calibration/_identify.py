@@ -36,7 +36,7 @@ class Identified:
 
 
 def collinear_groups(sensitivities: Floats, names: Sequence[str]) -> list[tuple[str, ...]]:
-    """Groups of parameters that the observations know only together.
+    """Return groups of parameters that the observations know only together.
 
     Args:
         sensitivities: (n, p) derivatives of what was observed, in standard deviations of its noise, by each parameter

@@ -63,7 +63,7 @@ class MotionFit:
 
 
 def observed_as(trials: Sequence[TrialRecord], observe: Observe | None) -> list[TrialRecord]:
-    """Trials of which no more than this is known."""
+    """Return trials of which no more than this is known."""
     return [trial if observe is None else trial.seen_as(observe) for trial in trials]
 
 
@@ -130,7 +130,7 @@ class DeadBand:
 
 
 def nothing_known(names: Sequence[str], known: Known, robot: RobotModel, method: str) -> MotionFit:
-    """Parameters of which cells alone tell nothing to a fit of windows, with what to record."""
+    """Return parameters of which cells alone tell nothing to a fit of windows, with what to record."""
     own = own_values(robot)
     fitted = []
     for name in names:
@@ -182,7 +182,7 @@ def _first_place(problem: Problem, scatter: Scatter, noise: Floats) -> Floats:
 
 
 def _dead_band(problem: Problem, scatter: Scatter, noise: Floats, place: Floats) -> DeadBand:
-    """Nothing depends on it but which commands move a wheel: a number for each gap between those given."""
+    """Return a dead band between the given commands: results depend only on which commands move a wheel."""
     prior = problem.known["drive.dead_band"].prior
     low, high = prior.lowest, prior.highest
     windows = problem.windows

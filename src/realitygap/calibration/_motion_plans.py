@@ -23,7 +23,7 @@ Commands = list[tuple[float, float]]
 
 
 def motion_plans(arena: Arena, robot: RobotModel, n: int = N_PLANS) -> list[TrialPlan]:
-    """Trials to fit a drive to: straight runs, turns in place, arcs, steps of the command, slow commands, mixed.
+    """Return trials to fit a drive to: straight runs, turns in place, arcs, steps of the command, slow commands, mixed.
 
     The robot drives each part back immediately, so that it stays in the free space even if it differs from its file.
     There are parts for each gain, for both wheels, track and axle (straight and around), lag and delay (steps of the

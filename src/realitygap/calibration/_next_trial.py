@@ -32,7 +32,7 @@ def information_of(places: Floats, vectors: Vectors, finest: Vectors) -> Floats:
 def next_trials(
     places: Floats, informations: Sequence[Floats], n: int, goal: Floats | None = None
 ) -> list[int]:
-    """Indices of the n candidates that together tell most, the one that tells most first.
+    """Return indices of the n candidates that together tell most, the one that tells most first.
 
     Args:
         places: (m, p) parameters of robots from the posterior.

@@ -72,7 +72,7 @@ def drive_on(steps: Floats, poses: Floats, split: int) -> Floats:
 
 
 def _motion(commands: Floats, poses: Floats) -> tuple[Floats, Floats]:
-    """Way ahead [m] and turn [rad] in each step, (n - 1,) each; without headings by the path."""
+    """Return the way ahead [m] and turn [rad] in each step, (n - 1,) each; without headings by the path."""
     steps = np.diff(poses[:, 0] + 1j * poses[:, 1])
     if poses.shape[1] == 3 and np.isfinite(poses[:, 2]).any():
         turn = np.diff(poses[:, 2])

@@ -20,7 +20,7 @@ FLAT = 1e-9  # precision of a direction in which nothing was learned
 
 
 def draw_linear(rng: np.random.Generator, at: Floats, jacobian: Floats, off: Floats) -> Floats:
-    """The next draw of places 0..1 whose differences are off - jacobian @ (place - 0), whitened.
+    """Return the next draw of places 0..1 whose differences are off - jacobian @ (place - 0), whitened.
 
     Along each principal direction of the curvature in turn: there the posterior is a normal one, cut at the ends
     (hit and run within Gibbs sampling).
@@ -51,7 +51,7 @@ def _room(here: Floats, direction: Floats) -> tuple[float, float]:
 
 
 def _cut_normal(rng: np.random.Generator, slope: float, scale: float, room: tuple[float, float]) -> float:
-    """A draw whose logarithm falls as slope * x - scale * x^2 / 2, within its room."""
+    """Return a draw whose logarithm falls as slope * x - scale * x^2 / 2, within its room."""
     low, high = room
     if not high > low:
         return 0.0
@@ -78,7 +78,7 @@ def walk(
     log_likelihood: Callable[[Floats], float],
     reach: Floats,
 ) -> Floats:
-    """The next draw of noise: a round of Metropolis steps, one number after the other, whose reach adapts.
+    """Return the next draw of noise: a round of Metropolis steps, one number after the other, whose reach adapts.
 
     Args:
         rng: Random numbers.

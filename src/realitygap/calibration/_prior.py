@@ -54,13 +54,13 @@ class Parameter:
         return float(self.scale(self.prior.highest) - self.scale(self.prior.lowest))
 
     def scale(self, values: NDArray[np.floating] | float) -> Floats:
-        """Values on the scale on which the prior is even."""
+        """Return values on the scale on which the prior is even."""
         log = self.prior.log_uniform is not None
         return np.log(values) if log else np.asarray(values, np.float64)
 
 
 def standard_of(prior: Sequence[Parameter], values: Mapping[str, Floats]) -> Floats:
-    """(m, p) values on the scale on which each prior is a standard normal distribution; within 4 of 0."""
+    """Return (m, p) values on the scale on which each prior is a standard normal distribution; within 4 of 0."""
     places = [
         (p.scale(np.asarray(values[p.name], np.float64)) - p.scale(p.prior.lowest)) / p.width for p in prior
     ]
@@ -69,7 +69,7 @@ def standard_of(prior: Sequence[Parameter], values: Mapping[str, Floats]) -> Flo
 
 
 def values_of(prior: Sequence[Parameter], standard: Floats) -> dict[str, Floats]:
-    """(m,) values of each parameter from points (m, p) on that scale."""
+    """Return (m,) values of each parameter from points (m, p) on that scale."""
     return {
         p.name: p.prior.of(np.minimum(special.ndtr(z), 1 - 1e-12))
         for p, z in zip(prior, standard.T, strict=True)
@@ -79,7 +79,7 @@ def values_of(prior: Sequence[Parameter], standard: Floats) -> dict[str, Floats]
 def numbers_of(
     prior: Sequence[Parameter], values: Mapping[str, Floats], robot: RobotModel
 ) -> dict[str, Floats]:
-    """(m,) each number of the robot that the parameters decide, by dotted name."""
+    """Return (m,) each number of the robot that the parameters decide, by dotted name."""
     plain = {
         name: value.center if isinstance(value, Distribution) else value
         for name, value in robot.numbers().items()
@@ -100,7 +100,7 @@ def numbers_of(
 
 
 def ranges_of(prior: Sequence[Parameter], robot: RobotModel, n: int = 4096) -> dict[str, tuple[float, float]]:
-    """Least and most of the robot's numbers over the prior."""
+    """Return least and most of the robot's numbers over the prior."""
     corners = np.random.default_rng(0).choice([-8.0, 8.0], (n, len(prior)))
     numbers = numbers_of(prior, values_of(prior, corners), robot)
     return {name: (float(value.min()), float(value.max())) for name, value in numbers.items()}
@@ -203,7 +203,7 @@ def _corners(numbers: Mapping[str, float], axis: str) -> tuple[Effect, ...]:
 
 
 def _of_ranges(robot: RobotModel) -> tuple[Parameter, ...]:
-    """Those of range sensors whose light falls off with the distance."""
+    """Return the parameters of range sensors whose light falls off with the distance."""
     seen = [k for k, sensor in enumerate(robot.range) if sensor.response in ("ir", "pulses")]
     rows = list(RANGE) if seen else []
     counted = [k for k in seen if robot.range[k].response == "pulses"]

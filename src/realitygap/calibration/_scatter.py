@@ -76,7 +76,7 @@ class Scatter:
         return np.asarray(-0.5 * np.einsum("cw,cw->w", white, white) - np.log(sizes).sum(axis=0))
 
     def whitened(self, rows: Floats, noise: Floats) -> Floats:
-        """Differences (w, 5) or their derivatives (w, 5, p), made of variance 1 and independent."""
+        """Return differences (w, 5) or their derivatives (w, 5, p), made of variance 1 and independent."""
         deep = np.moveaxis(rows, 0, -1)
         seen = np.where(self.seen.T.reshape(5, *(1,) * (deep.ndim - 2), -1), deep, 0.0)
         return np.asarray(np.moveaxis(_solved(self._root(noise), seen), -1, 0))
@@ -144,7 +144,7 @@ class NoisePrior:
         return -float(np.log(noise[self.is_ratio]).sum())
 
     def inside(self, noise: Floats) -> Floats:
-        """The nearest noise that is possible."""
+        """Return the nearest noise that is possible."""
         return np.clip(noise, self.low, self.high)
 
     def places(self, noise: Floats) -> Floats:

@@ -99,7 +99,7 @@ class Problem:
 def make_problem(
     simulate: Simulate, robot: RobotModel, known: Known, windows: Windows, names: Sequence[str]
 ) -> Problem:
-    """Windows that are to be met by parameters of these names."""
+    """Return windows that are to be met by parameters of these names."""
     own = own_values(robot)
     places = np.array([place_of(known[name], own[name]) for name in names])
     free = tuple(known[name] for name in names)
@@ -166,7 +166,7 @@ def best_place(problem: Problem, scatter: Scatter, noise: Floats, first: Floats)
 
 
 def _step(curvature: Floats, slope: Floats, here: Floats, damping: float) -> Floats:
-    """Damped by each parameter's own curvature; one that would leave through an end that it is at, stays."""
+    """Return a step damped by each parameter's own curvature; one that would leave through its end stays."""
     stays = ((here <= 0.0) & (slope > 0)) | ((here >= 1.0) & (slope < 0))
     goes = np.flatnonzero(~stays)
     step = np.zeros_like(here)

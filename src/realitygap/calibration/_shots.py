@@ -50,7 +50,7 @@ class Shots:
 
 
 def shots_of(trials: Sequence[TrialRecord], robot: RobotModel, arena: Arena) -> Shots:
-    """The commands of trials with poses."""
+    """Return the commands of trials with poses."""
     k, t = len(trials), max(len(trial.commands) for trial in trials)
     commands, poses = np.zeros((k, t, 2)), np.full((k, t + 1, 3), np.nan)
     stalled, readings = np.zeros((k, t), np.bool_), np.zeros((k, t, len(robot.range)))

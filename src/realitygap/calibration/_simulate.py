@@ -75,7 +75,7 @@ class Simulate(Protocol):
 
 
 def plain_numbers(robot: RobotModel) -> dict[str, float]:
-    """The robot's numbers by dotted name; of those that are drawn, the centers."""
+    """Return the robot's numbers by dotted name; of those that are drawn, the centers."""
     return {
         name: value.center if isinstance(value, Distribution) else value
         for name, value in robot.numbers().items()
@@ -83,7 +83,7 @@ def plain_numbers(robot: RobotModel) -> dict[str, float]:
 
 
 def motor_noise(robot: RobotModel) -> tuple[str, ...]:
-    """Names of the numbers that make drive and encoders noisy."""
+    """Return names of the numbers that make drive and encoders noisy."""
     return tuple(
         name
         for name in robot.numbers()

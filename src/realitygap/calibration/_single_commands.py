@@ -88,7 +88,7 @@ class MotionOfCommands:
         return values
 
     def _scanned(self, start: Floats) -> Floats:
-        """Places from which to begin: the best of some of each parameter in turn."""
+        """Return places from which to begin: the best of some of each parameter in turn."""
         places = start.copy()
         for _ in range(SCANS):
             for k in range(len(places)):

@@ -60,7 +60,7 @@ def sample_posterior(
 
 
 def _step(values: Array, most: float) -> float:
-    """The largest step of temperature, up to `most`, that leaves the share KEPT of particles."""
+    """Return the largest step of temperature, up to `most`, that leaves the share KEPT of particles."""
 
     def kept(step: float) -> float:
         logs = step * values
@@ -76,7 +76,7 @@ def _step(values: Array, most: float) -> float:
 
 
 def _resampled(weights: Array, rng: np.random.Generator) -> NDArray[np.int64]:
-    """Places by their weights, systematically."""
+    """Return places by their weights, systematically."""
     m = len(weights)
     points = (rng.random() + np.arange(m)) / m
     return np.minimum(np.searchsorted(np.cumsum(weights), points), m - 1)
@@ -111,6 +111,6 @@ def _move(
 
 
 def _reflected(places: Array) -> Array:
-    """Back into the cube, as from mirrors at its sides."""
+    """Return places moved back into the cube, as by mirrors at its sides."""
     folded = np.mod(places, 2.0)
     return np.where(folded > 1.0, 2.0 - folded, folded)

@@ -68,7 +68,7 @@ def wrapped(angle: Floats) -> Floats:
 
 
 def make_windows(trials: Sequence[TrialRecord], robot: RobotModel, arena: Arena, length: int = 1) -> Windows:
-    """All windows of `length` commands, end to end.
+    """Return all windows of `length` commands, end to end.
 
     Raises:
         ValueError: No trial, or steps of different lengths.

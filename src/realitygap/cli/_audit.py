@@ -46,7 +46,7 @@ def audit_results(
 
 
 def _tell(progress: AuditProgress) -> None:
-    """A line for each two conditions of a table that takes its time."""
+    """Print a line for each two conditions of a table that takes its time."""
     if progress.n_runs >= MANY_RUNS:
         typer.echo(f"Comparing pair {progress.n_done + 1} of {progress.n_pairs} ...", err=True)
 

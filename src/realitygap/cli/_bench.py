@@ -144,7 +144,7 @@ def _changes(texts: list[str]) -> dict[str, Any]:
 
 
 def _changed_setting(text: str) -> tuple[str, Any]:
-    """A setting's name and its value, which is written as in a study file or is a word."""
+    """Return a setting's name and its value, which is written as in a study file or is a word."""
     key, sign, value = text.partition("=")
     if not key or not sign:
         raise StudyError(f"--change {text}: expected KEY=VALUE, such as crossover=0.")

@@ -85,7 +85,7 @@ class CalibrationOperator(Operator):
         return with_ruled_end(trial, ahead, left, turned)
 
     def _number(self, question: str) -> float | None:
-        """The measured number; None has the trial driven again."""
+        """Return the measured number; None has the trial driven again."""
         from realitygap.study import parse_length
 
         while True:

@@ -83,7 +83,7 @@ def operated_under_camera(spec: str | None, study: Study, operator: Operator) ->
 
 
 def parse_camera(spec: str, arena: Arena) -> tuple[int, Marks]:
-    """Number of a camera, and what it looks for.
+    """Return the number of a camera, and what it looks for.
 
     Raises:
         StudyError: Something in it cannot be.

@@ -96,7 +96,7 @@ def _plan(
     observe: str | None,
     seed: int | None,
 ) -> ClosingPlan:
-    """The plan that options describe.
+    """Return the plan that options describe.
 
     Raises:
         StudyError: A plan, family, budget or observation that there is not.

@@ -98,7 +98,7 @@ def export(
 
 
 def _folder(what: str, name: str | None, numbers: Mapping[str, object]) -> str:
-    """The folder after a word, with which the options of an individual mean nothing."""
+    """Return the folder after a word, with which the options of an individual mean nothing."""
     if name is None:
         raise StudyError(
             f"No results folder. Name one: realitygap export {what} results/paper -o {what}.parquet"

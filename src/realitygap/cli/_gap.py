@@ -228,7 +228,7 @@ def gap(
 
 
 def _observer(target: str, witness: str | None) -> PortObserver | None:
-    """A person at the terminal, if there is one and the robot has no witness."""
+    """Return a person at the terminal, if there is one and the robot has no witness."""
     from ._calibrate import _is_led
 
     if not _is_led(target, witness) or not sys.stdin.isatty():

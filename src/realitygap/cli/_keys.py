@@ -40,7 +40,7 @@ class NoKeys:
     """Keys without a terminal: no key is ever pressed."""
 
     def read(self, timeout_s: float | None = None) -> str | None:
-        """Nothing."""
+        """Return None, because no key is ever pressed."""
         return None
 
 
@@ -69,7 +69,7 @@ if sys.platform == "win32":
 
     @contextlib.contextmanager
     def single_keys() -> Iterator[Any]:
-        """Keys as they are pressed, while in the block."""
+        """Yield keys as they are pressed, while in the block."""
         yield Keys() if sys.stdin is not None and sys.stdin.isatty() else NoKeys()
 
 else:
@@ -106,7 +106,7 @@ else:
 
     @contextlib.contextmanager
     def single_keys() -> Iterator[Any]:
-        """Keys as they are pressed, while in the block; the terminal is as it was afterwards."""
+        """Yield keys as they are pressed, while in the block; the terminal is as it was afterwards."""
         if sys.stdin is None or not sys.stdin.isatty():
             yield NoKeys()
             return

@@ -195,7 +195,7 @@ class PersonOperator(Operator):
             return keys.read(0.0) in _ABORTING
 
     def drawn(self, card: Card, record: TrialRecord) -> Score | None:
-        """The score that a camera saw; None without one, because the person has to look first."""
+        """Return the score that a camera saw; None without one, because the person has to look first."""
         self._say("Done; the motors are stopped.")
         return super().drawn(card, record)
 
@@ -248,7 +248,7 @@ class PersonOperator(Operator):
         return None if cells is None else Score(cells, self._answers.name)
 
     def _ask(self, prompt: str, option: str) -> str:
-        """A line from the terminal.
+        """Return a line from the terminal.
 
         Raises:
             StudyError: There is no terminal.
@@ -267,7 +267,7 @@ class PersonOperator(Operator):
 def pick_cells(
     arena: Arena, cells: Sequence[int] = (), *, write: Callable[[str], None] | None = None
 ) -> list[int] | None:
-    """Cells picked in the terminal; None for later."""
+    """Return cells picked in the terminal; None for later."""
 
     def to_stdout(text: str) -> None:
         typer.echo(text, nl=False)
@@ -277,7 +277,7 @@ def pick_cells(
 
 
 def sketch(arena: Arena) -> str:
-    """The arena from above as text: walls, reachable cells, and the start as an arrow."""
+    """Return the arena from above as text: walls, reachable cells, and the start as an arrow."""
     from realitygap.trials import start_words
 
     grid, start = arena.grid, arena.start

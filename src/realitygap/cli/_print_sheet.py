@@ -61,7 +61,7 @@ def print_sheet(
 
 
 def sheet_layout(arena: str, pens: str | None, study: Path | None) -> SheetLayout:
-    """The sheet of an arena, or of a study's.
+    """Return the sheet of an arena, or of a study's.
 
     Raises:
         RealityGapError: There is no such arena or study, a sheet does not fit, or the pens are no list.
@@ -84,7 +84,7 @@ def sheet_layout(arena: str, pens: str | None, study: Path | None) -> SheetLayou
 
 
 def study_sheet(folder: Path, condition: str | None = None) -> tuple[Arena, tuple[str, ...]]:
-    """Arena and pens of a study: of one condition, or of its first that a robot drives.
+    """Return the arena and pens of a study: of one condition, or of its first that a robot drives.
 
     Raises:
         RealityGapError: The folder holds no results.

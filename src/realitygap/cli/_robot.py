@@ -42,7 +42,7 @@ _NO_PORTS = ("sim", "jyro", "enki", "emulator", "scribbler", "thymio")
 
 @contextmanager
 def _opened(port: str, record: Path | None) -> Iterator[tuple[Any, Any]]:
-    """The functions of the robot's family and the robot on a port, stopped and let go of in the end."""
+    """Yield the functions of the robot's family and the robot on a port, stopped and let go of in the end."""
     from realitygap.robots import is_in_this_program
 
     if port in _NO_PORTS:
@@ -66,7 +66,7 @@ def _opened(port: str, record: Path | None) -> Iterator[tuple[Any, Any]]:
 
 @contextmanager
 def _opened_with(part: str, port: str, record: Path | None) -> Iterator[Any]:
-    """The robot on a port, if it has a part that not every robot has."""
+    """Yield the robot on a port, if it has a part that not every robot has."""
     with _opened(port, record) as (_, opened):
         if not hasattr(opened, part):
             raise RobotError(f"The robot on {port} cannot do this: it has no {part}.")

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def sheet_observer(*, asks_for_start: bool) -> SheetObserver:
-    """A person at the terminal as observer.
+    """Return a person at the terminal as observer.
 
     Args:
         asks_for_start: Whether to ask for the robot at the start of each trial; else that was asked before.

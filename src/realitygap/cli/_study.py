@@ -231,7 +231,7 @@ def print_result(result: StudyResult, *, as_json: bool) -> None:
 
 
 def _reading(folder: ResultsFolder) -> str:
-    """The line of Python that reads all rows."""
+    """Return the line of Python that reads all rows."""
     import polars as pl
 
     chunks = [chunks[0].path for name in folder.conditions if (chunks := folder.chunks(name))]

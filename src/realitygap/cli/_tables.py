@@ -25,7 +25,7 @@ def wide_console() -> Console:
 
 
 def summary_table(summary: pl.DataFrame, title: str) -> Table:
-    """Best coverage of a run: one row a condition, along the line and at the ends of steps."""
+    """Return the best coverage of a run: one row a condition, along the line and at the ends of steps."""
     labels = ", ".join(sorted(set(summary["label"].to_list())))
     table = table_of(
         f"{title}\nBest coverage of a run, share of the reachable cells ({labels})",
@@ -54,7 +54,7 @@ def summary_table(summary: pl.DataFrame, title: str) -> Table:
 
 
 def task_table(summary: pl.DataFrame, title: str) -> Table:
-    """Best fitness of a run by its task: one row a condition, and how far evolution brought it."""
+    """Return the best fitness of a run by its task: one row a condition, and how far evolution brought it."""
     labels = ", ".join(sorted(set(summary["label"].to_list())))
     tasks = ", ".join(dict.fromkeys(summary["task"].to_list()))
     table = table_of(
@@ -94,7 +94,7 @@ def calibration_table(calibration: Calibration) -> Table:
 
 
 def table_of(title: str, caption: str = "") -> Table:
-    """A table without columns yet."""
+    """Return a table without columns yet."""
     return Table(
         title=Text(title),
         caption=Text(caption) if caption else None,
@@ -113,7 +113,7 @@ def _number(value: float | None) -> str:
 
 
 def held_out_table(held_out: dict[str, Any], label: str) -> Table:
-    """Errors on what a fit did not see: one row a prediction, the fit first."""
+    """Return errors on what a fit did not see: one row a prediction, the fit first."""
     unit = f" [{held_out['unit']}]" if held_out["unit"] else ""
     table = Table(
         title=Text(f"Not seen by the fit ({label}, n = {held_out['n']:,}){unit}"),

@@ -36,7 +36,7 @@ class TellingOperator(Operator):
         super().place(card)
 
     def drawn(self, card: Card, record: TrialRecord) -> Score | None:
-        """The cells along the driven line."""
+        """Return the cells along the driven line."""
         score = super().drawn(card, record)
         if score is not None and time.monotonic() - self._told > _SILENCE_S:
             self._say(f"Trial {card.trial.trial}, {card.title}: {len(set(score.cells))} cells.")

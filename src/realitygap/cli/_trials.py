@@ -139,7 +139,7 @@ def _needed(value: str | None, what: str) -> str:
 
 
 def _number(ledger: Ledger, text: str) -> int:
-    """A trial's number, from itself or its code."""
+    """Return a trial's number, from itself or its code."""
     if text.isdecimal() and len(text) < _LONGEST_NUMBER:
         return ledger.trial(int(text)).trial
     codes = {each.code: each.trial for each in ledger.trials()}
@@ -185,7 +185,7 @@ def _cells(text: str, where: str) -> list[int]:
 
 
 def _read_file(ledger: Ledger, path: Path) -> dict[int, list[int]]:
-    """The cells of each trial in a file, all of it read before anything is entered."""
+    """Return the cells of each trial in a file, all of it read before anything is entered."""
     try:
         lines = read_file(path, MOST_TABLE_BYTES).decode("utf-8").splitlines()
     except (OSError, UnicodeDecodeError) as error:
@@ -207,7 +207,7 @@ def _read_file(ledger: Ledger, path: Path) -> dict[int, list[int]]:
 
 
 def _pick(ledger: Ledger, folder: Path, trial: str | None, role: ScoreRole) -> Iterator[dict[int, list[int]]]:
-    """Cells picked in the terminal, of one trial or, one after the other, of all that wait."""
+    """Yield cells picked in the terminal, of one trial or, one after the other, of all that wait."""
     import sys
 
     from ._operator import pick_cells

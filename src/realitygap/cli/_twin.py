@@ -63,7 +63,7 @@ def _text(value: object) -> str:
 
 
 def _print_rows(rows: list[dict[str, str]]) -> None:
-    """Columns as wide as they must be."""
+    """Print columns as wide as they must be."""
     widths = {key: max(len(key), *(len(row[key]) for row in rows)) for key in rows[0]}
     for row in [{key: key for key in widths}, *rows]:
         typer.echo("  ".join(row[key].ljust(width) for key, width in widths.items()).rstrip())

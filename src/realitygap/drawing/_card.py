@@ -136,7 +136,7 @@ def _style() -> str:
 
 
 def _printable(value: Any) -> Any:
-    """A text without what HTML may not hold, and not too long; what is HTML already stays."""
+    """Return a text without what HTML may not hold, and not too long; what is HTML already stays."""
     if not isinstance(value, str) or hasattr(value, "__html__"):
         return value
     text = NOT_XML.sub("", value)

@@ -31,7 +31,7 @@ class Ink:
 
     @classmethod
     def names(cls) -> dict[str, str]:
-        """Color by name, lower-case; the page's style sheet has a variable `--ink-NAME` for each."""
+        """Return the color by name, lower-case; the page's style sheet has a variable `--ink-NAME` for each."""
         return {name.lower(): color for name, color in vars(cls).items() if name.isupper()}
 
 

@@ -23,7 +23,7 @@ _POINTS = 480.0
 
 
 def to_image(picture: Picture, width: int = 720) -> Image:
-    """The picture as an RGB image, line widths and letters as large in it as `to_svg` has them in 480 pt.
+    """Return the picture as an RGB image, line widths and letters as large in it as `to_svg` has them in 480 pt.
 
     Args:
         picture: Picture to draw.
@@ -44,7 +44,7 @@ def to_image(picture: Picture, width: int = 720) -> Image:
 
 
 def to_png(picture: Picture, width: int = 720) -> bytes:
-    """The picture as the bytes of a PNG file; see `to_image`."""
+    """Return the picture as the bytes of a PNG file; see `to_image`."""
     file = io.BytesIO()
     to_image(picture, width).save(file, "PNG")
     return file.getvalue()
@@ -112,7 +112,7 @@ class _Pen:
 
 
 def _dashed(path: Sequence[Point], dash: Sequence[float]) -> Iterator[list[Point]]:
-    """The strokes of a dashed line: lengths of strokes and gaps in turn, all above 0."""
+    """Yield the strokes of a dashed line: lengths of strokes and gaps in turn, all above 0."""
     lengths = itertools.cycle(dash)
     is_stroke, left = True, next(lengths)
     for (x1, y1), (x2, y2) in itertools.pairwise(path):

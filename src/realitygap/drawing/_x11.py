@@ -11,7 +11,7 @@ Rgb = tuple[int, int, int]
 
 
 def rgb_of(color: str) -> Rgb:
-    """Red, green and blue, 0 to 255, of an X11 name (any case, spaces or not) or of `#rrggbb`.
+    """Return red, green and blue, 0 to 255, of an X11 name (any case, spaces or not) or of `#rrggbb`.
 
     Raises:
         ValueError: There is no such color.
@@ -30,7 +30,7 @@ def rgb_of(color: str) -> Rgb:
 
 
 def hex_of(color: str) -> str:
-    """A color as `#rrggbb`, which pictures take.
+    """Return a color as `#rrggbb`, which pictures take.
 
     Raises:
         ValueError: There is no such color.
@@ -40,7 +40,7 @@ def hex_of(color: str) -> str:
 
 @functools.cache
 def x11_colors() -> dict[str, Rgb]:
-    """All names, lower-case and without spaces, and what color each is."""
+    """Return all names, lower-case and without spaces, and what color each is."""
     text = resources.files("realitygap.drawing").joinpath("x11-colors.txt").read_text("ascii")
     colors = {}
     for line in text.splitlines():

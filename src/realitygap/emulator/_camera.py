@@ -83,7 +83,7 @@ class Camera:
         self._size = (width, height)
 
     def register(self, number: int) -> int:
-        """A register of the camera."""
+        """Return a register of the camera."""
         return self._registers[number]
 
     def set_register(self, number: int, value: int) -> None:
@@ -101,14 +101,14 @@ class Camera:
     # pictures
 
     def raw(self) -> Bytes:
-        """The picture, (rows, columns), V Y U Y; the same array until the robot or a register changes."""
+        """Return the picture, (rows, columns), V Y U Y; the same array until the robot or a register changes."""
         key = (self._robot.pose, self._size, bytes(self._registers))
         if self._seen is None or self._seen[0] != key:
             self._seen = (key, self._take())
         return self._seen[1]
 
     def window(self, number: int) -> Bytes:
-        """The part of the picture in a window; rows count from below on a Fluke 1, from above on a Fluke 2."""
+        """Return the part of the picture in a window; rows count from below on a Fluke 1, from above on a Fluke 2."""
         window = self._windows[number if number < N_WINDOWS else 0]
         low, high = window.y_low, window.y_high
         if self._model == "1":
@@ -118,7 +118,7 @@ class Camera:
         ]
 
     def window_sum(self, number: int) -> int:
-        """The sum of its bytes, as far as three bytes hold it."""
+        """Return the sum of its bytes, as far as three bytes hold it."""
         return int(self.window(number).sum(dtype=np.int64)) & 0xFFFFFF
 
     def _in_colors(self) -> NDArray[np.bool_]:
@@ -131,7 +131,7 @@ class Camera:
         return np.asarray(((picture >= lows) & (picture <= highs)).all(2))
 
     def runs(self, most: int) -> list[int]:
-        """Lengths of runs of groups, first those outside; after `most` of them one more and no further.
+        """Return lengths of runs of groups, first those outside; after `most` of them one more and no further.
 
         A run begins when as many in a row as chosen with `set_colors` are inside, or outside.
         """
@@ -168,7 +168,7 @@ class Camera:
     # JPEG
 
     def jpeg_header(self, *, in_color: bool) -> bytes:
-        """All of a JPEG file before the compressed data."""
+        """Return all of a JPEG file before the compressed data."""
         width, height = self._size
         if self._model == "1":
             width = 128
@@ -176,7 +176,7 @@ class Camera:
         return _jpeg(blank, blank if in_color else None, blank)[0]
 
     def jpeg_scan(self, *, in_color: bool, careful: bool) -> bytes:
-        """The compressed data and the end mark.
+        """Return the compressed data and the end mark.
 
         To be careful makes no difference here: the tables are those of the header either way.
         """
@@ -201,7 +201,7 @@ class Camera:
         return np.ascontiguousarray(picture[:, :width])
 
     def _exposed(self, image: Floats) -> Bytes:
-        """Brightness and color by the registers: automatic, or as darkenCamera and manualCamera set them."""
+        """Return the brightness and color by the registers: automatic, or as darkenCamera and manualCamera set them."""
         registers = self._registers
         brightness = 1.0
         if self._model == "1" and registers[0x13] == 0xA0:
@@ -300,7 +300,7 @@ def _is_on(line: tuple[float, float, float, float], width: float, x: Floats, y: 
 
 
 def _whole(picture: Bytes) -> tuple[Bytes, Bytes, Bytes]:
-    """Y, U and V at every pixel."""
+    """Return Y, U and V at every pixel."""
     width = picture.shape[1]
     padded = np.pad(picture, ((0, 0), (0, -width % 4)), mode="edge")
     y, u, v = (
@@ -312,7 +312,7 @@ def _whole(picture: Bytes) -> tuple[Bytes, Bytes, Bytes]:
 
 
 def _jpeg(y: Bytes, u: Bytes | None, v: Bytes) -> tuple[bytes, bytes]:
-    """Header and compressed data of a picture; gray without U."""
+    """Return the header and compressed data of a picture; gray without U."""
     from PIL import Image
 
     if u is None:

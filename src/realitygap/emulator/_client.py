@@ -57,7 +57,7 @@ except ImportError:
 
 @contextlib.contextmanager
 def client_environment(port: str) -> Iterator[dict[str, str]]:
-    """The environment of a client program: the port's name in REALITYGAP_PORT, and the patch."""
+    """Yield the environment of a client program: the port's name in REALITYGAP_PORT, and the patch."""
     with tempfile.TemporaryDirectory(prefix="realitygap-client-") as folder:
         (Path(folder) / "sitecustomize.py").write_text(PATCH, encoding="utf-8")
         others = os.environ.get("PYTHONPATH")

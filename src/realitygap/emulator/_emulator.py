@@ -328,6 +328,6 @@ class Emulator:
         return np.vstack([points, (self.now, *pose)]) if points[-1, 0] < self.now else points
 
     def cells(self) -> tuple[int, ...]:
-        """Cells of the arena's grid along the driven line, in order of first visits."""
+        """Return cells of the arena's grid along the driven line, in order of first visits."""
         self.table.advance_to(self._now)
         return self.table.cells()

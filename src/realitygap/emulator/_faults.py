@@ -44,7 +44,7 @@ class Faults:
 
     @classmethod
     def parse(cls, text: str) -> Faults:
-        """Faults as on the command line: drop=0.001,delay=0.05,hangup=60,sag=0.2.
+        """Return faults as on the command line: drop=0.001,delay=0.05,hangup=60,sag=0.2.
 
         Raises:
             RobotError: A name is not known or a value is out of range.

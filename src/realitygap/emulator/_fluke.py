@@ -326,7 +326,7 @@ class Fluke:
         return self._senses.obstacle(emitter, self.ir_power, in_pulses=self.model == "2")
 
     def _get_ir_by_mask(self, given: bytes, now: int) -> bytes:
-        """Emitters by a mask of 1 right, 2 left, 4 center; the largest of what each of them would give."""
+        """Return emitters by a mask of 1 right, 2 left, 4 center; the largest of what each of them would give."""
         chosen = [name for bit, name in ((1, "right"), (2, "left"), (4, "center")) if given[2] & bit]
         return max((self._obstacle(name) for name in chosen), default=0).to_bytes(2, "big")
 
@@ -422,7 +422,7 @@ class Fluke:
         return min(0xFFFF, count).to_bytes(2, "big") + bytes((x & 0xFF, y & 0xFF))
 
     def _scan(self, given: bytes, now: int, *, in_color: bool) -> bytes:
-        """Compressed picture, and three times in microseconds: start, taken, compressed."""
+        """Return the compressed picture, and three times in microseconds: start, taken, compressed."""
         start = (now - (PICTURE_NS if self._timing else 0)) // 1000
         times = (start, now // 1000, now // 1000)
         scan = self._camera.jpeg_scan(in_color=in_color, careful=bool(given[0]))

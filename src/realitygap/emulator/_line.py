@@ -36,7 +36,7 @@ class Line:
         self._n_waiting += len(data)
 
     def take(self, now: int) -> bytes:
-        """The bytes that are out by now."""
+        """Return the bytes that are out by now."""
         taken = []
         while self._chunks and self._chunks[0].due <= now:
             chunk = self._chunks[0]

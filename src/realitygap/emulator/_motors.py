@@ -49,7 +49,7 @@ class S1Motors:
         self._speeds = (speeds[0] * S1_TOP_SPEED, speeds[1] * S1_TOP_SPEED)
 
     def _trimmed(self, byte: int, side: int) -> float:
-        """Speed of a wheel, -1 to 1; side is 1 for the left one."""
+        """Return the speed of a wheel, -1 to 1; side is 1 for the left one."""
         speed = max(-1.0, min(1.0, (byte - 100) / 100))
         ahead, fast = speed > 0, abs(speed) > 0.5
         trim = self._trim[(0 if fast else 1) if ahead else (3 if fast else 2)]
@@ -67,7 +67,7 @@ class S1Motors:
         return self._bytes != (100, 100)
 
     def speeds(self) -> tuple[float, float]:
-        """Left and right [m/s]."""
+        """Return the speeds of the left and the right wheel [m/s]."""
         return self._speeds
 
     def turned(self, now: int, left: float, right: float, *, slipping: bool) -> None:
@@ -173,7 +173,7 @@ class S2Motors:
         return self._step
 
     def speeds(self) -> tuple[float, float]:
-        """Left and right for the next step of the simulation [m/s]."""
+        """Return the speeds of the left and the right wheel for the next step of the simulation [m/s]."""
         counts = self._step / TICK_STEPS
         if self._left is not None and not self._rolls_on:
             counts = min(counts, self._left)
@@ -209,7 +209,7 @@ class S2Motors:
             self._step = min(self._step + 1, self._target, self._still_stoppable())
 
     def _still_stoppable(self) -> int:
-        """The largest step from which the wheels can slow down to the end of a motion, a step in 20 ms."""
+        """Return the largest step from which the wheels can slow down to the end of a motion, a step in 20 ms."""
         if self._left is None or self._rolls_on:
             return TOP_STEP
         return max(1, int((math.sqrt(8 * self._left + 1) - 1) / 2))
@@ -224,7 +224,7 @@ class S2Motors:
             self._start(following)
 
     def statistics(self, now: int) -> bytes:
-        """The answer to GET_MOTOR_STATS.
+        """Return the answer to GET_MOTOR_STATS.
 
         The scale of a byte is known for the first three. The idler's speed is assumed to be half the counts.
         """

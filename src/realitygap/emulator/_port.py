@@ -44,7 +44,7 @@ class EmulatorClock:
         self._port = port
 
     def now(self) -> float:
-        """Seconds since the emulator was switched on."""
+        """Return seconds since the emulator was switched on."""
         return self._port.time()
 
     def sleep(self, seconds: float) -> None:
@@ -127,7 +127,7 @@ class EmulatedPort(SerialBase):  # type: ignore[misc]  # pyserial has no types
             self._robot.advance_to(nanoseconds((time.monotonic() - self._begun) * self._speed))
 
     def time(self) -> float:
-        """Seconds since the emulator was switched on."""
+        """Return seconds since the emulator was switched on."""
         with self._lock:
             self._sync()
             return self._robot.now
@@ -256,7 +256,7 @@ class EmulatedPort(SerialBase):  # type: ignore[misc]  # pyserial has no types
 
 
 def _parse(url: str) -> tuple[str, dict[str, str]]:
-    """Model and options of emulator://s2?fluke=2&seed=1."""
+    """Return the model and options of emulator://s2?fluke=2&seed=1."""
     parts = urlsplit(url)
     options = dict(parse_qsl(parts.query, keep_blank_values=True))
     for key in options:
@@ -266,7 +266,7 @@ def _parse(url: str) -> tuple[str, dict[str, str]]:
 
 
 def make_emulator(model: str, options: dict[str, str]) -> Emulator:
-    """The emulator that text options describe: fluke, arena, seed, timing, faults, state, twin.
+    """Return the emulator that text options describe: fluke, arena, seed, timing, faults, state, twin.
 
     Raises:
         RobotError: One of them is not known or out of range.
@@ -288,7 +288,7 @@ def make_emulator(model: str, options: dict[str, str]) -> Emulator:
 
 
 def _twin(file: str, arena: Arena) -> TwinBody:
-    """A twin's body from its file."""
+    """Return a twin's body from its file."""
     try:
         return TwinBody(load_twin(file), arena)
     except ValueError as error:

@@ -32,7 +32,7 @@ class Battery:
         self.used = min(1.0, self.used + amperes * duration_ns / SECOND / CAPACITY_AS)
 
     def volts(self, load: float) -> float:
-        """The voltage with the motors at a load of 0 to 1."""
+        """Return the voltage with the motors at a load of 0 to 1."""
         if self._own_volts is not None:
             return self._own_volts(load) * (1 - self._sag * load)
         resting = FULL_VOLTS - (FULL_VOLTS - EMPTY_VOLTS) * self.used

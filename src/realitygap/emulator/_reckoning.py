@@ -43,7 +43,7 @@ class Reckoning:
         self._held = []
 
     def move(self, kind: int, x: int, y: int) -> list[Segment]:
-        """The motions of MOVE; none for a kind that does not exist."""
+        """Return the motions of MOVE; none for a kind that does not exist."""
         scale = 2 if kind & METRIC else 1
         x, y = x * scale, y * scale
         kind &= ~METRIC
@@ -60,7 +60,7 @@ class Reckoning:
         return self._in_turn([*turn, self._segment(far, far)])
 
     def arc(self, kind: int, x: int, y: int, radius: int) -> list[Segment]:
-        """The motions of ARC; none for a kind that does not exist, or without a radius."""
+        """Return the motions of ARC; none for a kind that does not exist, or without a radius."""
         scale = 2 if kind & METRIC else 1
         radius *= scale
         kind &= ~METRIC
@@ -84,7 +84,7 @@ class Reckoning:
         return self._in_turn([*turn, segment])
 
     def turn(self, kind: int, angle: int) -> list[Segment]:
-        """The motion of TURN by the shorter way; none for a kind that does not exist."""
+        """Return the motion of TURN by the shorter way; none for a kind that does not exist."""
         units = angle * CIRCLE / 360 if kind & METRIC else float(angle)
         kind &= ~METRIC
         if kind == BY + OTHER:
@@ -113,7 +113,7 @@ class Reckoning:
         return self._segment(-units, units)
 
     def _arc_through(self, radius: float, angle: float) -> Segment:
-        """An arc with its middle to the left for a positive radius; ahead for a positive angle [rad]."""
+        """Return an arc with its middle to the left for a positive radius; ahead for a positive angle [rad]."""
         side = math.copysign(1.0, radius)
         heading = self.angle / CIRCLE * 2 * math.pi
         after = heading + side * angle

@@ -25,11 +25,11 @@ class Scene:
     arena: Arena
 
     def is_dark(self, x: float, y: float) -> bool:
-        """Whether a point of the floor [m] is dark."""
+        """Return whether a point of the floor [m] is dark."""
         return self.arena.floor.brightness(x, y) < DARK
 
     def light(self, x: float, y: float, direction: float) -> float:
-        """The light that a sensor sees which looks from (x, y) [m] in a direction [rad]; the room's own is 1."""
+        """Return the light that a sensor sees which looks from (x, y) [m] in a direction [rad]; the room's own is 1."""
         total = 1.0
         for lamp in self.arena.lights:
             to_x, to_y = lamp.x - x, lamp.y - y

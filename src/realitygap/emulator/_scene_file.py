@@ -9,7 +9,7 @@ from ._scene import Scene
 
 
 def open_scene(name: str) -> Scene:
-    """The scene of that name, or of a file.
+    """Return the scene of that name, or of a file.
 
     Args:
         name: Name of an arena, or the path of its TOML or SVG file.

@@ -327,7 +327,7 @@ class Scribbler:
         return bytes((ir[0] << 4 | ir[1] << 3 | self._table.stalled << 2 | line[0] << 1 | line[1],))
 
     def _state(self) -> bytes:
-        """Input and output pins; on the S2 the levels of the light sensors spoil the former."""
+        """Return input and output pins; on the S2 the levels of the light sensors spoil the former."""
         line = self._line()
         pins = 1 << 3 | line[1] << 4 | line[0] << 5 | 1 << 6 | self._table.stalled << 7
         if self.model == "s2":
@@ -441,7 +441,7 @@ class Scribbler:
         self._idle_since = now
 
     def leds(self, now: int) -> tuple[int, int, int]:
-        """Left, center and right, 1 for on; all blink after an over-current."""
+        """Return left, center and right, 1 for on; all blink after an over-current."""
         if getattr(self._table.motors, "tripped", False):
             on = 1 - now // (SECOND // 2) % 2
             return on, on, on
@@ -499,5 +499,5 @@ def _longs(*values: int) -> bytes:
 
 
 def _halved(half_mm: float) -> int:
-    """Whole millimeters, cut off towards zero as the firmware's division does."""
+    """Return whole millimeters, cut off towards zero as the firmware's division does."""
     return int(round(half_mm) / 2)

@@ -95,7 +95,7 @@ class Senses:
         return 99 if seen >= 1 else int(seen * IR_TESTS) * 99 // IR_TESTS
 
     def light(self, darkest: int) -> tuple[int, int, int]:
-        """Left, center and right, 0 (bright) to `darkest`; twice as bright as the room halves them."""
+        """Return left, center and right, 0 (bright) to `darkest`; twice as bright as the room halves them."""
         x, y, heading = self._robot.pose
         cos, sin = math.cos(heading), math.sin(heading)
         readings = []
@@ -108,7 +108,7 @@ class Senses:
         return readings[0], readings[1], readings[2]
 
     def line(self) -> tuple[bool, bool]:
-        """Whether the floor is dark, left and right."""
+        """Return whether the floor is dark, left and right."""
         if self._scene.arena.floor == BARE_FLOOR:
             return False, False
         x, y, heading = self._robot.pose
@@ -150,7 +150,7 @@ def _ir_reach(threshold: int) -> float:
 
 
 def _returned(far: float, power: int, *, in_pulses: bool) -> float:
-    """The share of emitted light that counts as returned; half of it at a distance that grows with the power."""
+    """Return the share of emitted light that counts as returned; half of it at a distance that grows with the power."""
     more = _stronger(power, in_pulses=in_pulses)
     if not more or far >= OBSTACLE_REACH:
         return 0.0

@@ -203,7 +203,7 @@ Channel = PtyChannel | TcpChannel
 
 
 def listen(port: int) -> socket.socket:
-    """A socket that listens on this machine only.
+    """Return a socket that listens on this machine only.
 
     Raises:
         RobotError: The port cannot be had.
@@ -491,7 +491,7 @@ class Server(ClosedOnExit):
 def serve_pty(
     emulator: Emulator, link: Path | None = None, *, speed: float = 1.0, witness: int | None = None
 ) -> Server:
-    """An emulator on a pseudo-terminal, served by a thread until the server is closed.
+    """Return an emulator on a pseudo-terminal, served by a thread until the server is closed.
 
     Args:
         emulator: The robot.
@@ -503,5 +503,5 @@ def serve_pty(
 
 
 def serve_tcp(emulator: Emulator, port: int = 0, *, speed: float = 1.0, witness: int | None = None) -> Server:
-    """An emulator on a TCP port of this machine, 0 for any, served by a thread until the server is closed."""
+    """Return an emulator on a TCP port of this machine, 0 for any, served by a thread until the server is closed."""
     return Server(emulator, TcpChannel(port), speed=speed, witness=witness).start()

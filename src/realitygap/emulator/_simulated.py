@@ -42,7 +42,7 @@ class SimulatedRobot(Protocol):
         ...
 
     def ranges(self, mounts: Floats, reach: float) -> Floats:
-        """Distances to the nearest obstacle [m], at most `reach`.
+        """Return distances to the nearest obstacle [m], at most `reach`.
 
         Args:
             mounts: (r, 3) forward [m], left [m] of the origin and direction [rad, positive to the left].
@@ -133,7 +133,7 @@ class BoxOnWheels:
         return self.walls.touch(pose.x + cos * xs - sin * ys, pose.y + sin * xs + cos * ys)
 
     def ranges(self, mounts: Floats, reach: float) -> Floats:
-        """Distances to walls and obstacles [m]."""
+        """Return distances to walls and obstacles [m]."""
         x, y, heading = self.pose
         cos, sin = math.cos(heading), math.sin(heading)
         forward, left = mounts[:, 0], mounts[:, 1]

@@ -90,7 +90,7 @@ class Table:
             self._n_followed -= gone
 
     def cells(self) -> tuple[int, ...]:
-        """The cells of the grid along the line since the robot was placed, in order of first visits."""
+        """Return the cells of the grid along the line since the robot was placed, in order of first visits."""
         self._cells = self._cells or VisitedCells(self.arena.grid)
         points = self.points[4 * self._n_followed :]
         self._cells.follow(zip(points[1::4], points[2::4], strict=True))

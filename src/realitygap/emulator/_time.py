@@ -7,5 +7,5 @@ MILLISECOND = 1_000_000  # [ns]
 
 
 def nanoseconds(seconds: float) -> int:
-    """A duration as whole nanoseconds."""
+    """Return a duration as whole nanoseconds."""
     return round(seconds * SECOND)

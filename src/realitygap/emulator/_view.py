@@ -129,7 +129,7 @@ def status(emulator: Emulator) -> list[str]:
 
 
 def describe(packet: bytes) -> str:
-    """A command in words: its name and its bytes."""
+    """Return a command in words: its name and its bytes."""
     if not packet:
         return "none"
     return f"{NAMES.get(packet[0], 'unknown')} {' '.join(map(str, packet))}"

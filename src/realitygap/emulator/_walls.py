@@ -32,7 +32,7 @@ class Walls:
 
     @classmethod
     def of(cls, arena: Arena) -> Walls:
-        """The walls and obstacles of an arena."""
+        """Return the walls and obstacles of an arena."""
         discs = [
             (x, y, obstacle.radius)
             for obstacle in arena.obstacles
@@ -74,7 +74,7 @@ class Walls:
         return bool((far <= self._discs[:, 2]).any())
 
     def ranges(self, xs: Floats, ys: Floats, angles: Floats, reach: float) -> Floats:
-        """Distances [m] along rays from (r,) points at (r,) angles to the first of them, at most `reach`."""
+        """Return distances [m] along rays from (r,) points at (r,) angles to the first of them, at most `reach`."""
         return self.hits(xs, ys, angles, reach)[0]
 
     def hits(self, xs: Floats, ys: Floats, angles: Floats, reach: float) -> tuple[Floats, NDArray[np.intp]]:

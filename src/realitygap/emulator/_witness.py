@@ -54,11 +54,11 @@ class Witness(Protocol):
         ...
 
     def cells(self) -> tuple[int, ...]:
-        """Cells of the arena's grid along the driven line, in order of first visits."""
+        """Return cells of the arena's grid along the driven line, in order of first visits."""
         ...
 
     def cells_at(self, times: Sequence[float]) -> tuple[int, ...]:
-        """Cells of the grid that the pen was in at given times [s], in order of first visits."""
+        """Return cells of the grid that the pen was in at given times [s], in order of first visits."""
         ...
 
 
@@ -118,7 +118,7 @@ class DirectWitness:
             self._emulator.advance(seconds)
 
     def now(self) -> float:
-        """The emulator's time [s]."""
+        """Return the emulator's time [s]."""
         return self._emulator.now
 
     def place(self, pose: Pose, seed: int) -> None:
@@ -150,12 +150,12 @@ class DirectWitness:
             return self._emulator.path()
 
     def cells(self) -> tuple[int, ...]:
-        """Cells along the driven line."""
+        """Return cells along the driven line."""
         with self._lock:
             return self._emulator.cells()
 
     def cells_at(self, times: Sequence[float]) -> tuple[int, ...]:
-        """Cells at given times."""
+        """Return cells at given times."""
         return cells_at_times(self.path(), self._emulator.scene.arena.grid, times)
 
 
@@ -173,7 +173,7 @@ def cells_at_times(path: NDArray[np.float64], grid: Grid, times: Sequence[float]
 
 
 def answer_witness(witness: Witness, line: bytes) -> bytes:
-    """The answer to one request over the wire, a line of JSON: {"do": "place", "pose": [x, y, heading], "seed": 1}."""
+    """Return the answer to a request, a line of JSON: {"do": "place", "pose": [x, y, heading], "seed": 1}."""
     try:
         request = parse_json(line)
         result = _do(witness, request["do"], request)
@@ -259,7 +259,7 @@ class RemoteWitness(ClosedOnExit):
         self._ask("advance", seconds=seconds)
 
     def now(self) -> float:
-        """The emulator's time [s]."""
+        """Return the emulator's time [s]."""
         return float(self._ask("now"))
 
     def place(self, pose: Pose, seed: int) -> None:
@@ -288,11 +288,11 @@ class RemoteWitness(ClosedOnExit):
         return np.array(self._ask("path"), dtype=float).reshape(-1, 4)
 
     def cells(self) -> tuple[int, ...]:
-        """Cells along the driven line."""
+        """Return cells along the driven line."""
         return tuple(self._ask("cells"))
 
     def cells_at(self, times: Sequence[float]) -> tuple[int, ...]:
-        """Cells at given times."""
+        """Return cells at given times."""
         return tuple(self._ask("cells_at", times=list(times)))
 
     def close(self) -> None:
@@ -302,5 +302,5 @@ class RemoteWitness(ClosedOnExit):
 
 
 def connect_witness(address: str) -> RemoteWitness:
-    """The witness that `realitygap emulate --witness PORT` serves, by 127.0.0.1:PORT."""
+    """Return the witness that `realitygap emulate --witness PORT` serves, by 127.0.0.1:PORT."""
     return RemoteWitness(address)

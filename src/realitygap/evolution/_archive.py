@@ -56,7 +56,7 @@ class NoveltyArchive(ShownAsCard):
         return self._archived if self._paper is None else self._paper._archive.behaviors
 
     def update(self, behaviors: Sequence[Cells] | ArrayLike) -> NDArray[np.float64]:
-        """Novelty of one generation, which the archive then takes in.
+        """Return the novelty of one generation, which the archive then takes in.
 
         Args:
             behaviors: n behaviors in the order of individuals, in the form that the distance compares

@@ -124,7 +124,7 @@ def to_aseba(
     reading_max: int = READING_MAX,
     origin: Mapping[str, object] | None = None,
 ) -> str:
-    """The network as a program of Aseba Studio (.aesl), with which a Thymio II drives without a computer.
+    """Return the network as a program of Aseba Studio (.aesl), with which a Thymio II drives without a computer.
 
     The center button starts and stops the robot. The network is computed in 16-bit integers; a comment says how far
     its outputs are from those of `Network.activate`. A network that sees `time` stops after `steps`.

@@ -96,7 +96,7 @@ def to_c(
     name: str = "network",
     origin: Mapping[str, object] | None = None,
 ) -> str:
-    """The network as a header of C99, which any C or C++ program can include.
+    """Return the network as a header of C99, which any C or C++ program can include.
 
     It has a type for the state of the network, a function that resets it, and a function that computes one step. In
     double precision the outputs are those of `Network.activate` but for rounding, below 1e-12; in single precision,
@@ -177,13 +177,13 @@ def _constants(guard: str, kind: str, names: Sequence[str]) -> list[str]:
 
 
 def _number(value: float, single: bool) -> str:
-    """A number of C that has the same value."""
+    """Return a number of C that has the same value."""
     text = str(np.float32(value)) + "f" if single else repr(float(value))
     return text if "." in text or "e" in text else text.replace("f", ".0f")
 
 
 def _body(values: Mapping[str, Any], common: Mapping[str, Any], *, single: bool) -> str:
-    """The statements that compute all nodes in the order of their activation."""
+    """Return the statements that compute all nodes in the order of their activation."""
     constant = values["n_inputs"] - 1 if values["constant"] else -1
     lines = []
     if values["constant"]:

@@ -192,7 +192,7 @@ def measure_of(name: str, columns: int, rows: int, sort: CellOrder) -> Measure:
 def pack_behaviors(
     measure: Measure, behaviors: Sequence[Cells] | ArrayLike, columns: int, rows: int
 ) -> Behaviors:
-    """Behaviors in the form that a measure reads.
+    """Return behaviors in the form that a measure reads.
 
     Raises:
         TypeError: A cell that is not a whole number.

@@ -79,7 +79,7 @@ class Network(_json.Written[_json.NetworkForm]):
         self._values[:] = 0.0
 
     def activate(self, inputs: ArrayLike) -> NDArray[np.float64]:
-        """The outputs for one set of inputs.
+        """Return the outputs for one set of inputs.
 
         Args:
             inputs: (n_inputs,) without the constant input.
@@ -101,7 +101,7 @@ class Network(_json.Written[_json.NetworkForm]):
         return self._values[first : first + self._rules.n_outputs].copy()
 
     def to_dict(self) -> dict[str, Any]:
-        """The network as plain values with a version, as after `reset`.
+        """Return the network as plain values with a version, as after `reset`.
 
         `nodes` lists outputs and hidden nodes in the order of activation. Nodes are numbered inputs (the constant
         one last among them), outputs, hidden nodes.
@@ -258,11 +258,11 @@ class Genome(_json.Written[_json.GenomeForm], ShownAsCard):
         return int(self._genomes.enabled[self._row, :n].sum())
 
     def network(self) -> Network:
-        """The network that this genome decodes to."""
+        """Return the network that this genome decodes to."""
         return Network(decode_all([self]), 0, self.rules, self.bias_value)
 
     def to_dict(self) -> dict[str, Any]:
-        """The genes, `nodes` and `connections`, and what decoding needs, as plain values with a version.
+        """Return the genes, `nodes` and `connections`, and what decoding needs, as plain values with a version.
 
         Names of inputs and outputs are among them where they are not the paper's.
         """
@@ -284,7 +284,7 @@ class Genome(_json.Written[_json.GenomeForm], ShownAsCard):
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
-        """The genome that `save` or `realitygap export` wrote.
+        """Return the genome that `save` or `realitygap export` wrote.
 
         Raises:
             RecordError: The file cannot be read, or holds no genome.
@@ -350,7 +350,7 @@ def _row_of(table: T, row: int) -> T:
 
 
 def decode_all(genomes: Sequence[Genome]) -> Networks:
-    """The networks of n genomes with the same inputs and outputs, as the kernels read them."""
+    """Return the networks of n genomes with the same inputs and outputs, as the kernels read them."""
     room = max(genome._genomes.innovation.shape[1] for genome in genomes)
     hidden_room = max(genome._genomes.hidden.shape[1] for genome in genomes)
     networks: Networks = make_networks(len(genomes), genomes[0].rules, room, hidden_room)
@@ -367,7 +367,7 @@ def decode_all(genomes: Sequence[Genome]) -> Networks:
 def genome_from_record(
     record: Mapping[str, Sequence[Any]], rules: NeatRules, bias_value: float = 1.0
 ) -> Genome:
-    """The genome of a row of results.
+    """Return the genome of a row of results.
 
     Args:
         record: The row's `genome`: lists hidden, biases, innovation, source, target, weight, enabled.
@@ -385,7 +385,7 @@ def genome_from_record(
 
 
 def _arrays_of(record: Mapping[str, Sequence[Any]], rules: NeatRules) -> Genomes:
-    """The genome of a row of results in arrays.
+    """Return the genome of a row of results in arrays.
 
     Raises:
         ValueError: The lists do not fit together, or a gene leads to a node that is not there.

@@ -19,7 +19,7 @@ def to_networkx(
     *,
     disabled: bool = True,
 ) -> Any:
-    """The genome as a `networkx.DiGraph`, a node for each node gene and an edge for each connection gene.
+    """Return the genome as a `networkx.DiGraph`, a node for each node gene and an edge for each connection gene.
 
     Nodes are the ids; they have `kind`, `bias` and `name`. Edges have `innovation`, `weight` and `enabled`. The graph
     has `activation`, `activation_slope`, `recurrent` and `bias_value`. All are plain values, so that any of networkx's

@@ -34,7 +34,7 @@ class _Form(BaseModel):
     bias_value: float
 
     def rules(self, n_inputs: int, n_outputs: int, *, constant: bool, node_bias: bool) -> NeatRules:
-        """The rules that decoding and activating need; all others are the defaults'."""
+        """Return the rules that decoding and activating need; all others are the defaults'."""
         settings = NeatSettings(
             activation=self.activation,
             activation_slope=self.activation_slope,
@@ -160,7 +160,7 @@ def from_text(text: str | bytes, kind: Kind, where: str) -> Any:
 
 
 def from_file(path: Path, kind: Kind) -> Any:
-    """The document in a file.
+    """Return the document in a file.
 
     Raises:
         RecordError: it cannot be read, is no JSON, or cut off.
@@ -173,7 +173,7 @@ def from_file(path: Path, kind: Kind) -> Any:
 
 
 def checked(values: Any, form: type[F], kind: Kind, where: str) -> F:
-    """The values of a document, after its format, version and types were checked.
+    """Return the values of a document, after its format, version and types were checked.
 
     Raises:
         RecordError: they are not those of this kind.

@@ -29,7 +29,7 @@ def to_onnx(
     *,
     precision: Literal["double", "single"] = "double",
 ) -> Any:
-    """The network as an `onnx.ModelProto`, whose `SerializeToString()` is what goes into a file.
+    """Return the network as an `onnx.ModelProto`, whose `SerializeToString()` is what goes into a file.
 
     A feed-forward network maps `inputs` (b, n_inputs) to `outputs` (b, n_outputs), a row for each of b sets of inputs.
     A recurrent one is exported as one step. It also takes `state` (b, m), the activations of its m outputs and hidden
@@ -147,7 +147,7 @@ class _Parts:
 
 
 def _feed_forward(parts: _Parts) -> Ends:
-    """Layer after layer, each seeing all before it; last the outputs are picked."""
+    """Add layer after layer, each of which sees all before it, and pick the outputs last."""
     values = parts.values
     columns = {node: node for node in range(parts.n_given)}
     layers: dict[int, list[dict[str, Any]]] = {}

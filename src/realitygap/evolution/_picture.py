@@ -26,7 +26,7 @@ def network_picture(
     title: str = "Network",
     show_disabled: bool = True,
 ) -> Picture:
-    """The network of a genome: inputs on the left, outputs on the right.
+    """Return the network of a genome: inputs on the left, outputs on the right.
 
     The width of a link shows the size of its weight, which is printed next to it. A positive link is a solid line with
     an arrow, and a negative one is a dashed line with a bar. Disabled genes are faint and dotted.

@@ -129,7 +129,7 @@ class Population:
         return float(self._species.floats[0])
 
     def ask(self) -> list[Genome]:
-        """The genomes of this generation, in the order in which `tell` wants their fitness."""
+        """Return the genomes of this generation, in the order in which `tell` wants their fitness."""
         bias_value = float(self.settings.bias_value)
         return [Genome(self._genomes, row, self._rules, bias_value) for row in range(len(self))]
 
@@ -205,7 +205,7 @@ class Population:
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
-        """The population that `save` wrote.
+        """Return the population that `save` wrote.
 
         Raises:
             RecordError: There is no such file, it is cut off or damaged, or no checkpoint of a population.
@@ -230,7 +230,7 @@ class Population:
         return population
 
     def _arrays(self) -> dict[str, NDArray[Any]]:
-        """All that changes from generation to generation, by name; views."""
+        """Return all that changes from generation to generation, by name; views."""
         tables: dict[str, Any] = {
             "genomes": self._genomes,
             "innovations": self._innovations,

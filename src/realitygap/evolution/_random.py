@@ -6,7 +6,7 @@ import hashlib
 
 
 def random_key(seed: int, name: str | None = None) -> int:
-    """The 64-bit key of a study's random numbers, or of one condition's.
+    """Return the 64-bit key of a study's random numbers, or of one condition's.
 
     Args:
         seed: Seed of the study.

@@ -91,7 +91,7 @@ def _map_between(seen: Values, wanted: Values) -> Values:
 
 
 def _power(matrix: Values, exponent: float) -> Values:
-    """A power of the part of a symmetric matrix above 0."""
+    """Return a power of the part of a symmetric matrix above 0."""
     values, vectors = np.linalg.eigh((matrix + matrix.T) / 2)
     there = values > 1e-12 * max(float(values.max()), 1e-300)
     powers = np.where(there, np.where(there, values, 1.0) ** exponent, 0.0)
@@ -136,7 +136,7 @@ def bootstrap_mean(values: Values, n_resamples: int, rng: np.random.Generator) -
 def interval(
     resamples: Values, n: int, confidence: float = CONFIDENCE
 ) -> tuple[float, float] | tuple[None, None]:
-    """The percentiles of resamples, expanded for few controllers; none below 5.
+    """Return the percentiles of resamples, expanded for few controllers; none below 5.
 
     Args:
         resamples: (b,) a statistic of resamples; nan is left out.

@@ -57,7 +57,7 @@ def energy_test(
 
 
 def smallest_energy_p(n: int, r: int, q: int) -> float:
-    """The smallest p that n controllers with r and q trials can give: one of all ways to share out trials.
+    """Return the smallest p that n controllers with r and q trials can give: one of all ways to share out trials.
 
     With as many trials on both sides, two ways that are each other's mirror image give the same distance.
     """

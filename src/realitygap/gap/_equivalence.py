@@ -107,7 +107,7 @@ def controllers_for_margin(margin: float, spread: float, power: float = POWER) -
 def fewest(
     power_of: Callable[[int], float], power: float, smallest: int = 2, most: int = MOST_CONTROLLERS
 ) -> int | None:
-    """The smallest n, from `smallest` on, of which a growing function reaches a power; None if above `most`."""
+    """Return the smallest n, from `smallest` on, of which a growing function reaches a power; None if above `most`."""
     low, high = smallest - 1, smallest
     while power_of(high) < power:
         low, high = high, 2 * high

@@ -32,7 +32,7 @@ class Estimate:
 
     @classmethod
     def refusal(cls, n: int, why: str, **more: Any) -> Estimate:
-        """No number, and why."""
+        """Return an estimate without a number, with the reason."""
         return cls(None, None, None, n, why, dict(more))
 
     def to_dict(self) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from ._side import Values
 
 
 def mean_of(values: Values) -> Estimate:
-    """The mean of (n,) values and its interval by t; no interval below 5."""
+    """Return the mean of (n,) values and its interval by t; no interval below 5."""
     n = len(values)
     mean = float(values.mean())
     if n < SMALLEST_N:
@@ -24,7 +24,7 @@ def mean_of(values: Values) -> Estimate:
 
 
 def difference_of_groups(one: Values, other: Values) -> Estimate:
-    """Mean of the other group less that of the one, with its interval; n is the smaller group's.
+    """Return the mean of the other group less that of the one, with its interval; n is the smaller group's.
 
     Source: Welch (1947), Biometrika 34(1-2), 28-35.
     """

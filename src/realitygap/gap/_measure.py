@@ -102,7 +102,7 @@ class _Work:
             self._draw_orders()
 
     def _draw_orders(self) -> None:
-        """Statistics of ranks, and reliability of both sides of the same resamples."""
+        """Add statistics of ranks, and the reliability of both sides of the same resamples."""
         ranks: dict[str, _bootstrap.Statistic] = {"srcc": _srcc}
         if _mmrv(*self.pair)[0] == 0:  # any other violation has an interval without resamples
             ranks["mmrv"] = _mmrv

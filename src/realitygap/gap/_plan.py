@@ -52,7 +52,7 @@ class Needed:
 
 
 def spread_of_differences(spread: float, noise: float, trials: int) -> float:
-    """Standard deviation over controllers of the difference of means.
+    """Return the standard deviation over controllers of the difference of means.
 
     Args:
         spread: Standard deviation of the true differences.
@@ -65,7 +65,7 @@ def spread_of_differences(spread: float, noise: float, trials: int) -> float:
 def plan_effect(
     effect: float, *, spread: float, noise: float, trials: int, power: float = 0.8, seed: int = 1
 ) -> Needed:
-    """Controllers with which a paired t test at 5 % finds a mean difference.
+    """Return controllers with which a paired t test at 5 % finds a mean difference.
 
     Args:
         effect: Mean difference to find, in units of quality.
@@ -130,7 +130,7 @@ def plan_margin(
 def plan_correlation(
     correlation: float, *, least: float, reliability: float, trials: int, power: float = 0.8, seed: int = 1
 ) -> Needed:
-    """Controllers with which a rank correlation is shown to be above a least one.
+    """Return controllers with which a rank correlation is shown to be above a least one.
 
     It is shown if the correlation of means is above the one that `least` gives with this noise, one-sided at 5 %. The
     normal formula gives a first number of controllers. Then studies of normal controllers with noise on both platforms
@@ -218,12 +218,12 @@ def _z_power(seen: float, floor: float, n: int) -> float:
 
 
 def _reach(power: float) -> float:
-    """Distance of a correlation from the floor for a power, in standard errors; it grows with the root of n."""
+    """Return the distance of a correlation from the floor for a power, in standard errors; it grows with sqrt(n)."""
     return float(special.ndtri(max(power, 2 * ALPHA)) + special.ndtri(1 - ALPHA))
 
 
 def _simulated(mean: float, sd: float, n: int, seed: int) -> tuple[Values, Values]:
-    """Means and standard errors of simulated studies of n controllers."""
+    """Return means and standard errors of simulated studies of n controllers."""
     rng = np.random.default_rng(seed)
     means = rng.normal(mean, sd / math.sqrt(n), SIMULATED)
     spreads = sd * np.sqrt(rng.chisquare(n - 1, SIMULATED) / (n - 1))
@@ -247,7 +247,7 @@ def _simulated_correlations(
 
 
 def _share(found: NDArray[np.bool_]) -> tuple[float, float, float]:
-    """A share with its interval of 95 %: Wilson (1927)."""
+    """Return a share with its interval of 95 %: Wilson (1927)."""
     n, share = len(found), float(found.mean())
     z = float(special.ndtri(0.975))
     center = (share + z * z / (2 * n)) / (1 + z * z / n)

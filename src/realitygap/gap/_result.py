@@ -164,7 +164,7 @@ class GapResult(ShownAsCard):
         return _verdict_of(self)
 
     def to_dict(self) -> dict[str, Any]:
-        """The measures, `misspecified`, `verdict`, and what they are of; `score` if that is not coverage."""
+        """Return the measures, `misspecified`, `verdict`, and what they are of; `score` if that is not coverage."""
         named = {name: getattr(self, name).to_dict() for name in MEASURES}
         about = {
             "source": self.source,

@@ -53,7 +53,7 @@ def rms_interval(
 
 
 def _variance_if_normal(differences: Values) -> float:
-    """Variance of the square of a normal number with the mean and the variance of these."""
+    """Return the variance of the square of a normal number with the mean and the variance of these."""
     variance = float(differences.var(ddof=1))
     return 4 * float(differences.mean()) ** 2 * variance + 2 * variance**2
 

@@ -104,7 +104,7 @@ def explain_gap(
     *,
     seed: int = 7,
 ) -> Why:
-    """Share out the fall of the RMS gap among parts of the model.
+    """Return the share out the fall of the RMS gap among parts of the model.
 
     Args:
         differences: (1 + d, 2^g, c) difference of each controller's means, with each choice of g parts taken from the
@@ -143,7 +143,7 @@ def _falls(worth: Values) -> Values:
 
 
 def _rms(value: float, differences: Values, squares: Values, drawn: Values) -> Estimate:
-    """An RMS gap, of (1 + d, c) as in `explain_gap` and (b,) mean squares of its resamples."""
+    """Return an RMS gap, of (1 + d, c) as in `explain_gap` and (b,) mean squares of its resamples."""
     draws = squares[1:].mean(axis=1)
     more_variance = float(draws.var(ddof=1)) if len(draws) > 1 else 0.0
     ends = rms_interval(differences[0], squares[0], drawn, more_variance=more_variance)

@@ -51,7 +51,7 @@ def draw_robot(
 
 
 def _placed(points: Points, pose: Pose) -> Points:
-    """Points of a robot in the arena."""
+    """Return points of a robot in the arena."""
     return tuple(pose.point(*point) for point in points)
 
 

@@ -84,12 +84,12 @@ class Robots:
         return self._step == self._fleet.n_steps
 
     def observation_space(self) -> Any:
-        """The Box of what one robot's controller sees."""
+        """Return the Box of what one robot's controller sees."""
         low, high = self._fleet.bounds().astype(self._dtype)
         return spaces.Box(low, high, dtype=self._dtype.type)
 
     def action_space(self) -> Any:
-        """The Box of what it answers: move and turn, or two wheel speeds."""
+        """Return the Box of what it answers: move and turn, or two wheel speeds."""
         return spaces.Box(-1.0, 1.0, (2,), self._dtype.type)
 
     def keep_paths(self) -> None:
@@ -166,7 +166,7 @@ class Robots:
         return {**facts, "coverage_line": counts[:, 0], "coverage_ends": counts[:, 1]}
 
     def cells(self, k: int) -> tuple[int, ...]:
-        """The cells that robot k visited along its line, in order of first visit, columns * row + column."""
+        """Return the cells that robot k visited along its line, in order of first visit, columns * row + column."""
         return tuple(self._fleet.cells[k, : self._fleet.counts[k, 0]].tolist())
 
     def picture(self, k: int) -> NDArray[np.uint8]:
@@ -247,7 +247,7 @@ def maze_robots(n: int, maze: str, dtype: RealType) -> Robots:
 
 
 def _task(kind: str, settings: Mapping[str, Any]) -> Any:
-    """The task of a kind."""
+    """Return the task of a kind."""
     if isinstance(kind, str) and kind.startswith(PYTHON):
         raise ValueError(
             f"kind is {kind!r}, expected one of {', '.join(TASKS)}: a Python task scores whole trials. Use it in a "

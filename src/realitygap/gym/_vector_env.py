@@ -49,7 +49,7 @@ class _ManyRobots(VectorEnv[Array, Array, NDArray[Any]]):
         return self._robots.noise_key
 
     def visited_cells(self, k: int) -> tuple[int, ...]:
-        """Cells that robot k visited along its line, in order of first visit, columns * row + column."""
+        """Return cells that robot k visited along its line, in order of first visit, columns * row + column."""
         return self._robots.cells(k)
 
     def reset(

@@ -107,7 +107,7 @@ def _controller(log_map: LogMap) -> str:
 
 
 def _known(log: Log, poses: Floats) -> list[tuple[int, int]]:
-    """First step and end of each stretch in which everything is known."""
+    """Return the first step and end of each stretch in which everything is known."""
     known = np.ones(len(log.commands) + 1, bool)
     known[:-1] &= np.isfinite(log.commands).all(1)
     for rows in (poses, log.wheels, log.readings):

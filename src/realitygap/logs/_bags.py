@@ -40,7 +40,7 @@ class BagSource:
         self._columns: list[str] | None = None
 
     def columns(self) -> list[str]:
-        """The names of the columns that the first message on each topic has."""
+        """Return the names of the columns that the first message on each topic has."""
         if self._columns is None:
             found: dict[str, None] = {}
             for topic in self._messages.topics():
@@ -77,7 +77,7 @@ class BagSource:
             yield _batch(first, names, table)
 
     def _by_topic(self, names: Sequence[str]) -> dict[str, list[str]]:
-        """The columns of each topic, in order."""
+        """Return the columns of each topic, in order."""
         topics = sorted(self._messages.topics(), key=len, reverse=True)
         found: dict[str, list[str]] = {}
         for name in names:
@@ -189,7 +189,7 @@ def _damaged(path: Path, error: Exception) -> LogError:
 
 
 def _flat(place: str, value: Any) -> dict[str, float]:
-    """The numbers of a message by the path of their fields."""
+    """Return the numbers of a message by the path of their fields."""
     if isinstance(value, bool | int | float | np.number):
         return {place: float(value)}
     if isinstance(value, dict):

@@ -35,7 +35,7 @@ class ClockOffset:
     correlation: float
 
     def __str__(self) -> str:
-        """The offset with its interval."""
+        """Return the offset with its interval."""
         at, low, high = (round(value, 2) + 0.0 for value in (self.seconds, self.low, self.high))
         return f"{at:.2f} s ({low:.2f} to {high:.2f})"
 
@@ -100,7 +100,7 @@ def _score(sums: Floats) -> Floats:
 
 
 def _peak(lags: np.ndarray, score: Floats) -> float:
-    """The lag of the peak, between the lags by a parabola."""
+    """Return the lag of the peak, between the lags by a parabola."""
     if not np.isfinite(score).any():
         return float("nan")
     k = int(np.nanargmax(score))

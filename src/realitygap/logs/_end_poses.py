@@ -25,11 +25,11 @@ class EndPoses:
     table: pl.DataFrame
 
     def platforms(self) -> list[str]:
-        """The platforms, in the order of the table."""
+        """Return the platforms, in the order of the table."""
         return self.table["platform"].unique(maintain_order=True).to_list()
 
     def of(self, platform: str) -> pl.DataFrame:
-        """The trials of a platform that have an end.
+        """Return the trials of a platform that have an end.
 
         Raises:
             LogError: There is none of this name.

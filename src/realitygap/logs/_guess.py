@@ -90,7 +90,7 @@ def guess_log_map(path: str | Path) -> LogMap:
 
 
 def tokens_of(name: str) -> list[str]:
-    """The words of a name, in lower case: leftSpeed_mm_s has left, speed, mm, s."""
+    """Return the words of a name, in lower case: leftSpeed_mm_s has left, speed, mm, s."""
     name = re.sub(r"([a-z])([A-Z])", r"\1 \2", name)
     return [part for part in re.split(r"[^a-zA-Z0-9]+", name.lower()) if part]
 
@@ -102,7 +102,7 @@ def _pick(names: Iterable[str], wanted: Callable[[list[str]], bool]) -> str:
 
 
 def unit_in(name: str, default: str) -> str:
-    """The unit in a name, without that of the time."""
+    """Return the unit in a name, without that of the time."""
     return next((UNITS[token] for token in reversed(tokens_of(name)[1:]) if token in UNITS), default)
 
 
@@ -198,7 +198,7 @@ def _poses(names: Sequence[str]) -> dict[str, Any] | None:
 
 
 def _readings(names: Sequence[str]) -> dict[str, Any] | None:
-    """The largest family of columns with a number at the end, such as ir0 to ir7."""
+    """Return the largest family of columns with a number at the end, such as ir0 to ir7."""
     families: dict[str, list[tuple[int, str]]] = {}
     for name in names:
         match = SENSOR.match(name)
@@ -211,7 +211,7 @@ def _readings(names: Sequence[str]) -> dict[str, Any] | None:
 
 
 def _ranges(source: Source, names: Sequence[str]) -> dict[str, Any] | None:
-    """Messages of the type sensor_msgs/Range, by the fields that they have: lengths, of which 0 is the nearest."""
+    """Return the messages of type sensor_msgs/Range, by their fields: lengths, of which 0 is the nearest."""
     sensors = [name for name in names if name.endswith("/range") and f"{name[:-5]}max_range" in names]
     if not sensors:
         return None

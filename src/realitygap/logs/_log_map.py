@@ -14,7 +14,7 @@ from realitygap.world import toml_table
 
 
 def _column(value: Any) -> Any:
-    """A column by its number, counted from 1, as the name that columns without names have."""
+    """Return a column by its number, counted from 1, as the name that columns without names have."""
     return str(value) if isinstance(value, int) and not isinstance(value, bool) else value
 
 
@@ -50,7 +50,7 @@ class Part(Settings):
     offset_s: float = Field(0.0, description="Added to the time, for a clock that is off [s].")
 
     def columns(self) -> list[str]:
-        """The columns that hold its values, in order."""
+        """Return the columns that hold its values, in order."""
         raise NotImplementedError
 
 
@@ -91,7 +91,7 @@ class Commands(WheelPart):
         return self
 
     def columns(self) -> list[str]:
-        """The columns that hold its values, in order."""
+        """Return the columns that hold its values, in order."""
         return [self.left, self.right] if self.left else [self.forward, self.turn]
 
 
@@ -114,7 +114,7 @@ class Wheels(WheelPart):
         return self
 
     def columns(self) -> list[str]:
-        """The columns that hold its values, in order."""
+        """Return the columns that hold its values, in order."""
         return [self.left, self.right]
 
 
@@ -152,7 +152,7 @@ class Poses(Part):
         return self
 
     def columns(self) -> list[str]:
-        """The columns that hold its values, in order."""
+        """Return the columns that hold its values, in order."""
         return [self.x, self.y, *([self.heading] if self.heading else self.quaternion)]
 
 
@@ -166,7 +166,7 @@ class Readings(Part):
     )
 
     def columns(self) -> list[str]:
-        """The columns that hold its values, in order."""
+        """Return the columns that hold its values, in order."""
         return list(self.sensors)
 
 

@@ -92,7 +92,7 @@ def diagnose(log: Log, speed: float, track: float) -> Diagnosis:
 
 
 def _begin(log: Log) -> Log:
-    """The first part of a log, which shows its mistakes as well as all of it."""
+    """Return the first part of a log, which shows its mistakes as well as all of it."""
     n = MOST_STEPS
     if len(log.commands) <= n:
         return log
@@ -116,7 +116,7 @@ def _clock(offset: ClockOffset) -> Mistake:
 
 
 def _shifted(ways: Floats, shift: int) -> Floats:
-    """The ways of the wheels as much later."""
+    """Return the ways of the wheels as much later."""
     if not shift:
         return ways
     moved = np.zeros_like(ways)
@@ -147,7 +147,7 @@ def _wrapped(angle: Floats, period: float = 2 * math.pi) -> Floats:
 def _checked_headings(
     xy: Floats, raw: Floats, headings: Floats, ways: Floats
 ) -> tuple[Floats, list[Mistake]]:
-    """The headings as they are meant, and what is wrong with them: they have to be the direction of the path."""
+    """Return the headings as they are meant, which are along the path, and the mistakes in them."""
     steps = np.diff(xy, axis=0) * np.sign(ways.sum(1, keepdims=True))
     way = np.hypot(*steps.T)
     moves = np.isfinite(way) & (way > 0.3 * np.nanmax(way, initial=0.0)) & np.isfinite(raw[:-1])
@@ -199,7 +199,7 @@ def _checked_headings(
 def _compare_wheels(
     xy: Floats, headings: Floats, ways: Floats, step_s: float, track: float
 ) -> tuple[list[Mistake], float, float]:
-    """Mistakes in signs and units of the wheels, the gain, and the track [m]."""
+    """Return mistakes in signs and units of the wheels, the gain, and the track [m]."""
     width = max(1, min(round(WINDOW_S / step_s), len(ways) // FEWEST_WINDOWS))
     at = np.arange(0, len(ways) + 1 - width, width)
     sums = np.concatenate([np.zeros((1, 2)), np.cumsum(ways, 0)])

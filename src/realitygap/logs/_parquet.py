@@ -49,7 +49,7 @@ class ParquetSource:
         self._columns = _expressions(self._files[0], names or {})
 
     def columns(self) -> list[str]:
-        """The names of all columns with numbers."""
+        """Return the names of all columns with numbers."""
         return list(self._columns)
 
     def batches(self, names: Sequence[str], rows: str = "") -> Iterator[Batch]:
@@ -96,7 +96,7 @@ def lerobot_source(folder: Path) -> ParquetSource:
 
 
 def _entry_names(feature: dict[str, Any]) -> list[str]:
-    """The names of the entries of a feature, which may be listed in a table of groups."""
+    """Return the names of the entries of a feature, which may be listed in a table of groups."""
     names = feature.get("names")
     if isinstance(names, dict):
         names = [name for group in names.values() if isinstance(group, list) for name in group]

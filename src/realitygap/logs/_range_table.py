@@ -54,7 +54,7 @@ class RangeTable:
         return int(self.sensor.max()) + 1
 
     def bearing_left(self, *, clockwise: bool) -> Floats:
-        """Bearings, positive to the left of the heading, (n,) [rad]."""
+        """Return bearings, positive to the left of the heading, (n,) [rad]."""
         return -self.bearing if clockwise else self.bearing
 
 
@@ -100,7 +100,7 @@ def read_range_table(path: str | Path, table_map: TableMap | None = None) -> Ran
 
 
 def _scaled(path: Path, raw: Floats, table_map: TableMap) -> tuple[Floats, list[str]]:
-    """Readings from 0 to 1, and which full scale that took."""
+    """Return readings from 0 to 1, and which full scale that took."""
     notes = []
     full = table_map.full
     if not full:
@@ -120,7 +120,7 @@ def _scaled(path: Path, raw: Floats, table_map: TableMap) -> tuple[Floats, list[
 def _sample(
     path: Path, data: bytes, head: Sequence[float]
 ) -> tuple[NDArray[np.int64], Floats, Floats, Floats]:
-    """Sensor, distance, bearing and reading of each cell of a `.sample` file."""
+    """Return the sensor, distance, bearing and reading of each cell of a `.sample` file."""
     if any(part != int(part) or part < 1 for part in head[:3]) or head[4] <= 0 or head[3] < 0:
         shown = " ".join(f"{part:g}" for part in head)
         raise LogError(
@@ -155,7 +155,7 @@ def _sample(
 
 
 def _text(path: Path, table_map: TableMap) -> tuple[NDArray[np.int64], Floats, Floats, Floats]:
-    """Sensor, distance, bearing and reading of each cell of a text table."""
+    """Return the sensor, distance, bearing and reading of each cell of a text table."""
     source = TextSource(path, table_map.text)
     columns = table_map.columns or _guessed(path, source.columns())
     distance_m = unit_factor("columns.distance_unit", columns.distance_unit, LENGTHS)
@@ -191,7 +191,7 @@ def _text(path: Path, table_map: TableMap) -> tuple[NDArray[np.int64], Floats, F
 
 
 def _guessed(path: Path, names: Sequence[str]) -> TableColumns:
-    """Columns by their names."""
+    """Return columns by their names."""
 
     def find(words: set[str]) -> str:
         return next((name for name in names if words & set(tokens_of(name))), "")

@@ -238,7 +238,7 @@ class _Assembler:
 
 
 def _step_of(stream: _Stream, times: Floats) -> float:
-    """The step that the times of the commands have."""
+    """Return the step that the times of the commands have."""
     intervals = np.diff(times)
     if not len(intervals):
         raise LogError(f"[{stream.name}] has one row, expected a robot that drives.")
@@ -254,7 +254,7 @@ def _step_of(stream: _Stream, times: Floats) -> float:
 
 
 def _streams(path: Path, log_map: LogMap, robot: RobotModel, *, drop: bool) -> list[_Stream]:
-    """The parts of the mapping with their sources; the one that lays the grid first."""
+    """Return the parts of the mapping with their sources; the one that lays the grid first."""
     speed, track = log_map.speed or robot.drive.speed, log_map.track or robot.drive.track
     sources: dict[Path, Source] = {}
     streams = []
@@ -278,7 +278,7 @@ def _is_number_of(name: str, known: list[str]) -> bool:
 
 
 def _groups(streams: list[_Stream]) -> list[list[_Stream]]:
-    """Streams that are read together: of one table, and rows of one kind."""
+    """Return streams that are read together: of one table, and rows of one kind."""
     groups: list[list[_Stream]] = []
     for stream in streams:
         same = [

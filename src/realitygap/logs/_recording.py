@@ -39,7 +39,7 @@ class RecordingSource:
                 self._rows.setdefault(topic, []).append(numbers)
 
     def columns(self) -> list[str]:
-        """The names of all columns with numbers."""
+        """Return the names of all columns with numbers."""
         return list(dict.fromkeys(name for rows in self._rows.values() for row in rows for name in row))
 
     def batches(self, names: Sequence[str], rows: str = "") -> Iterator[Batch]:

@@ -47,7 +47,7 @@ class Grid:
         return max(n, 0)
 
     def times(self, first: int, last: int) -> Floats:
-        """The points from one to before another [s]."""
+        """Return the points from one to before another [s]."""
         return np.arange(first, last, dtype=np.float64) * self.step_s + self.start_s
 
 
@@ -141,7 +141,7 @@ class Held(_AtPoints):
 
 
 def _gap_of(times: Floats, step_s: float) -> float:
-    """Time between two samples beyond which nothing is known in between [s]."""
+    """Return the time between two samples beyond which nothing is known in between [s]."""
     usual = float(np.median(np.diff(times))) if len(times) > 1 else step_s
     return max(GAP_INTERVALS * usual, 2 * step_s)
 

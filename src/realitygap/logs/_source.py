@@ -44,7 +44,7 @@ class Source(Protocol):
     rate_hz: float
 
     def columns(self) -> list[str]:
-        """The names of all columns with numbers."""
+        """Return the names of all columns with numbers."""
 
     def batches(self, names: Sequence[str], rows: str = "") -> Iterator[Batch]:
         """Yield the rows of columns, in order.

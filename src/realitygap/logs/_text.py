@@ -112,7 +112,7 @@ class TextSource:
         return names
 
     def columns(self) -> list[str]:
-        """The names of all columns; their numbers, counted from 1, are names as well."""
+        """Return the names of all columns; their numbers, counted from 1, are names as well."""
         return list(self._names)
 
     def batches(self, names: Sequence[str], rows: str = "") -> Iterator[Batch]:
@@ -220,7 +220,7 @@ def _is_number(cell: str, decimal: str) -> bool:
 
 
 def _separator_of(lines: list[bytes]) -> str:
-    """The separator that cuts most lines into as many cells as most others."""
+    """Return the separator that cuts most lines into as many cells as most others."""
     texts = [line.decode("utf-8", "replace") for line in lines]
     for separator in ("\t", ";", ","):
         counts = [text.count(separator) for text in texts]

@@ -184,13 +184,13 @@ class _Messages:
         )
 
     def commands(self, trial: TrialRecord, robot: RobotModel) -> list[Any]:
-        """The command of each step, and a stop."""
+        """Return the command of each step, and a stop."""
         twists = [*twists_of(trial.commands, robot), (0.0, 0.0)]
         kind = "geometry_msgs/msg/TwistStamped"
         return [self._make(kind, self._header("base_link"), self._twist(*twist)) for twist in twists]
 
     def poses(self, trial: TrialRecord, at: Floats) -> list[Any]:
-        """The pose at the begin of each step and at the end; speeds are those of the step before."""
+        """Return the pose at the begin of each step and at the end; speeds are those of the step before."""
         if not len(trial.poses):
             return []
         steps, lasted = np.diff(trial.poses, axis=0), np.diff(at)
@@ -219,7 +219,7 @@ class _Messages:
         )
 
     def wheels(self, trial: TrialRecord, wheel_diameter_mm: float) -> list[Any]:
-        """The angles of the wheels at the begin of each step and at the end."""
+        """Return the angles of the wheels at the begin of each step and at the end."""
         angles = trial.wheels / (wheel_diameter_mm / 2000)
         names, none = ["left_wheel_joint", "right_wheel_joint"], np.empty(0)
         kind = "sensor_msgs/msg/JointState"
@@ -228,7 +228,7 @@ class _Messages:
         ]
 
     def ranges(self, trial: TrialRecord, robot: RobotModel) -> dict[str, list[Any]]:
-        """The reading of each range sensor before each command and, if the robot looked, after the last."""
+        """Return the reading of each range sensor before each command and, if the robot looked, after the last."""
         readings = trial.readings
         if len(trial.last_readings):
             readings = np.vstack([readings, trial.last_readings])

@@ -80,7 +80,7 @@ class Base:
         return self._driver
 
     def now(self) -> float:
-        """The time on the robot's clock [s]."""
+        """Return the time on the robot's clock [s]."""
         if self.simulation is not None and not self.simulation.is_timed:
             self.pause(_GLANCE_S)
         return self.clock.now()

@@ -134,5 +134,5 @@ LEFT_OUT: dict[str, str] = {
 
 
 def names() -> list[str]:
-    """Every name that is done or left out."""
+    """Return every name that is done or left out."""
     return [name for group in DONE.values() for name in group] + list(LEFT_OUT)

@@ -13,12 +13,12 @@ _LARGEST = 2**53
 
 
 def randomNumber() -> float:
-    """A number by chance, from 0 up to but not including 1."""
+    """Return a number by chance, from 0 up to but not including 1."""
     return random.random()
 
 
 def flipCoin() -> str:
-    """Heads or tails, as "heads" or "tails", each half of the time."""
+    """Return heads or tails, as "heads" or "tails", each half of the time."""
     return random.choice(("heads", "tails"))
 
 
@@ -51,7 +51,7 @@ def pickOne(*items: Any) -> Any:
 
 
 def pickOneInRange(start: int, stop: int) -> int:
-    """A whole number by chance, from `start` up to but not including `stop`.
+    """Return a whole number by chance, from `start` up to but not including `stop`.
 
     Raises:
         MyroError: There is none between them.

@@ -42,7 +42,7 @@ class Color:
         return Color(*(mine - theirs for mine, theirs in zip(self.getRGB(), other.getRGB(), strict=True)))
 
     def getColor(self) -> Color:
-        """A copy of the color."""
+        """Return a copy of the color."""
         return Color(*self.getRGBA())
 
     def setColor(self, color: Any) -> None:
@@ -50,7 +50,7 @@ class Color:
         self.setRGBA(color.getRGBA())
 
     def getRGB(self) -> tuple[int, int, int]:
-        """Red, green and blue, each 0 to 255."""
+        """Return red, green and blue, each 0 to 255."""
         return self.rgb
 
     def setRGB(self, rgb: Sequence[float]) -> None:
@@ -58,7 +58,7 @@ class Color:
         self.rgb = Color(rgb).rgb
 
     def getRGBA(self) -> tuple[int, int, int, int]:
-        """Red, green, blue and alpha, each 0 to 255."""
+        """Return red, green, blue and alpha, each 0 to 255."""
         return (*self.rgb, self.alpha)
 
     def setRGBA(self, rgba: Sequence[float]) -> None:
@@ -125,7 +125,7 @@ def lighter(rgb: tuple[int, int, int]) -> tuple[int, int, int]:
 
 
 def darker(rgb: tuple[int, int, int]) -> tuple[int, int, int]:
-    """65 % of red, green and blue."""
+    """Return 65 % of red, green and blue."""
     red, green, blue = (int(part * 0.65) for part in rgb)
     return (red, green, blue)
 
@@ -145,7 +145,7 @@ cyan = Color(0, 255, 255)
 
 
 def makeColor(red: float, green: float, blue: float, alpha: float = 255) -> Color:
-    """A color from red, green and blue, each 0 to 255, perhaps see-through (alpha 0 to 255).
+    """Return a color from red, green and blue, each 0 to 255, perhaps see-through (alpha 0 to 255).
 
     Raises:
         MyroError: A part is not a number.
@@ -154,7 +154,7 @@ def makeColor(red: float, green: float, blue: float, alpha: float = 255) -> Colo
 
 
 def color_rgb(r: int, g: int, b: int) -> str:
-    """The color as text for graphics: `color_rgb(255, 128, 0)` is "#ff8000".
+    """Return the color as text for graphics: `color_rgb(255, 128, 0)` is "#ff8000".
 
     Raises:
         MyroError: A part is not a whole number from 0 to 255.
@@ -164,7 +164,7 @@ def color_rgb(r: int, g: int, b: int) -> str:
 
 
 def rgb_color(color: str) -> tuple[int, int, int]:
-    """Red, green and blue from text as "#ff8000".
+    """Return red, green and blue from text as "#ff8000".
 
     Raises:
         MyroError: It is no such text.
@@ -173,37 +173,37 @@ def rgb_color(color: str) -> tuple[int, int, int]:
 
 
 def rgb2hsv(red: float, green: float, blue: float) -> tuple[float, float, float]:
-    """Hue, saturation and value; hue and saturation 0 to 1, value in the unit of red, green and blue."""
+    """Return the hue, saturation and value; hue and saturation 0 to 1, value in the unit of red, green and blue."""
     return colorsys.rgb_to_hsv(red, green, blue)
 
 
 def hsv2rgb(h: float, s: float, v: float) -> tuple[float, float, float]:
-    """Red, green and blue from hue and saturation (0 to 1) and value, in the unit of the value."""
+    """Return red, green and blue from hue and saturation (0 to 1) and value, in the unit of the value."""
     return colorsys.hsv_to_rgb(h, s, v)
 
 
 def rgb2hls(red: float, green: float, blue: float) -> tuple[float, float, float]:
-    """Hue, lightness and saturation, from red, green and blue of 0 to 1."""
+    """Return the hue, lightness and saturation, from red, green and blue of 0 to 1."""
     return colorsys.rgb_to_hls(red, green, blue)
 
 
 def hls2rgb(h: float, l: float, s: float) -> tuple[float, float, float]:  # noqa: E741
-    """Red, green and blue of 0 to 1, from hue, lightness and saturation."""
+    """Return red, green and blue of 0 to 1, from hue, lightness and saturation."""
     return colorsys.hls_to_rgb(h, l, s)
 
 
 def rgb2yiq(red: float, green: float, blue: float) -> tuple[float, float, float]:
-    """Y, I and Q, from red, green and blue of 0 to 1."""
+    """Return Y, I and Q, from red, green and blue of 0 to 1."""
     return colorsys.rgb_to_yiq(red, green, blue)
 
 
 def yiq2rgb(y: float, i: float, q: float) -> tuple[float, float, float]:
-    """Red, green and blue of 0 to 1, from Y, I and Q."""
+    """Return red, green and blue of 0 to 1, from Y, I and Q."""
     return colorsys.yiq_to_rgb(y, i, q)
 
 
 def rgb2yuv(R: float, G: float, B: float) -> list[int]:
-    """[Y, U, V], each 0 to 255, from red, green and blue of 0 to 255: what `configureBlob` compares with."""
+    """Return [Y, U, V], each 0 to 255, from red, green and blue of 0 to 255: what `configureBlob` compares with."""
     return [
         _channel(0.299 * R + 0.587 * G + 0.114 * B),
         _channel(-0.14713 * R - 0.28886 * G + 0.436 * B + 128),
@@ -212,7 +212,7 @@ def rgb2yuv(R: float, G: float, B: float) -> list[int]:
 
 
 def yuv2rgb(Y: float, U: float, V: float) -> list[int]:
-    """[red, green, blue], each 0 to 255, from Y, U and V of 0 to 255."""
+    """Return [red, green, blue], each 0 to 255, from Y, U and V of 0 to 255."""
     return [
         _channel(Y + 1.4075 * (V - 128)),
         _channel(Y - 0.3455 * (U - 128) - 0.7169 * (V - 128)),

@@ -60,7 +60,7 @@ class GraphWin:
         self.redraw()
 
     def toScreen(self, x: float, y: float) -> tuple[float, float]:
-        """Pixels from coordinates."""
+        """Return pixels from coordinates."""
         x1, y1, x2, y2, upwards = self._corners
         down = (y2 - y) / (y2 - y1) if upwards else (y - y1) / (y2 - y1)
         return (x - x1) / (x2 - x1) * self.width, down * self.height
@@ -84,7 +84,7 @@ class GraphWin:
                 print(f"{' '.join(given)!r} is no place, expected two numbers as 100 50.")
 
     def checkMouse(self) -> Point | None:
-        """None: no click can reach a program here."""
+        """Return None, because no click can reach a program here."""
         return None
 
     def getHeight(self) -> int:
@@ -116,7 +116,7 @@ class GraphWin:
     flush = redraw
 
     def to_svg(self) -> str:
-        """The window as SVG."""
+        """Return the window as SVG."""
         shapes = "".join(item._svg(self) for item in self.items)
         return (
             f'<svg xmlns="http://www.w3.org/2000/svg" width="{self.width}" height="{self.height}" role="img" '
@@ -185,14 +185,14 @@ class GraphicsObject:
         self._changed()
 
     def clone(self) -> Self:
-        """A copy that is not drawn."""
+        """Return a copy that is not drawn."""
         other = copy.copy(self)
         other.points = [point.clone() for point in self.points]
         other.window = None
         return other
 
     def getCenter(self) -> Point:
-        """The middle of its first and its last point."""
+        """Return the middle of its first and its last point."""
         first, last = self.points[0], self.points[-1]
         return Point((first.x + last.x) / 2, (first.y + last.y) / 2)
 
@@ -237,7 +237,7 @@ class Point(GraphicsObject):
         return self.y
 
     def getCenter(self) -> Point:
-        """Itself."""
+        """Return itself."""
         return self.clone()
 
     getP1 = getP2 = getCenter
@@ -420,7 +420,7 @@ class Image(GraphicsObject):
 
 
 def _tip(tail: tuple[float, float], head: tuple[float, float], size: float, color: str) -> str:
-    """The tip of an arrow from tail to head."""
+    """Return the tip of an arrow from tail to head."""
     length = math.dist(tail, head) or 1.0
     along = ((head[0] - tail[0]) / length * size, (head[1] - tail[1]) / length * size)
     wings = [
@@ -431,7 +431,7 @@ def _tip(tail: tuple[float, float], head: tuple[float, float], size: float, colo
 
 
 def _color(color: Any) -> str:
-    """A color as SVG has it, from a name, from text as "#ff8000", or from a color of Myro."""
+    """Return a color as SVG has it, from a name, from text as "#ff8000", or from a color of Myro."""
     if hasattr(color, "getRGB"):
         return "#{:02x}{:02x}{:02x}".format(*color.getRGB())
     if not isinstance(color, str) or not color.lstrip("#").isalnum():

@@ -18,7 +18,7 @@ class Identity(Base):
     """Name, password, eight bytes of data, and the end that is ahead. The robot stores them when it is switched off."""
 
     def getName(self) -> str:
-        """The robot's name."""
+        """Return the robot's name."""
         return self.driver.name
 
     def setName(self, name: str) -> None:
@@ -26,7 +26,7 @@ class Identity(Base):
         self.driver.set_name(_short("setName: the name", name))
 
     def getPassword(self) -> str:
-        """The robot's password."""
+        """Return the robot's password."""
         return self.driver.password
 
     def setPassword(self, password: str) -> None:
@@ -34,7 +34,7 @@ class Identity(Base):
         self.driver.set_password(_short("setPassword: the password", password))
 
     def getData(self, *position: int) -> Any:
-        """The eight bytes that the robot keeps, or those at positions 0 to 7; the first four correct its motors."""
+        """Return the eight bytes that the robot keeps, or those at positions 0 to 7. Four correct its motors."""
         data = [int(value) for value in self.driver.data]
         picked = [data[whole("getData: the position", place, 0, 7)] for place in position]
         return data if not picked else picked[0] if len(picked) == 1 else picked

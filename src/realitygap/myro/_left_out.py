@@ -10,7 +10,7 @@ from ._mistakes import MyroError
 
 
 def left_out(name: str) -> Callable[..., NoReturn]:
-    """A function of this name that refuses with its reason.
+    """Return a function of this name that refuses with its reason.
 
     Raises:
         KeyError: Nothing of that name is left out.

@@ -26,7 +26,7 @@ class MyroError(RealityGapError):
 
 
 def number(name: str, value: object, least: float | None = None, most: float | None = None) -> float:
-    """A number that a learner gave, checked.
+    """Return a number that a learner gave, checked.
 
     Args:
         name: Name of function and argument, for the message.
@@ -62,7 +62,7 @@ def _hint(value: object) -> str:
 
 
 def whole(name: str, value: object, least: int, most: int) -> int:
-    """A whole number that a learner gave; 3.0 counts as 3.
+    """Return a whole number that a learner gave; 3.0 counts as 3.
 
     Raises:
         MyroError: It is not one, or out of range.
@@ -112,7 +112,7 @@ def is_on(name: str, value: object) -> bool:
 
 
 def explanation(error: BaseException, trace: TracebackType | None) -> str:
-    """The line of the learner's program that went wrong, and why, as text.
+    """Return the line of the learner's program that went wrong, and why, as text.
 
     Args:
         error: Raised error.
@@ -166,7 +166,7 @@ def _in_notebook(
 
 
 def notebook_shell() -> Any:
-    """IPython's running shell, or None; IPython is not imported for it."""
+    """Return IPython's running shell, or None; IPython is not imported for it."""
     module = sys.modules.get("IPython")
     get: Callable[[], Any] | None = getattr(module, "get_ipython", None)
     return None if get is None else get()

@@ -83,15 +83,15 @@ class Paths(Base):
         )
 
     def setMove(self, x: int, y: int, moveType: str = "to") -> None:
-        """`moveTo` or `moveBy`, as the type says: "to" or "by"."""
+        """Move as `moveTo` or `moveBy`, as the type says: "to" or "by"."""
         (self.moveTo if choice("setMove: the type", moveType, _HOW) == "to" else self.moveBy)(x, y)
 
     def setTurn(self, angle: float, turnType: str = "to", radOrDeg: str = "rad") -> None:
-        """`turnTo` or `turnBy`, as the type says: "to" or "by"."""
+        """Turn as `turnTo` or `turnBy`, as the type says: "to" or "by"."""
         (self.turnTo if choice("setTurn: the type", turnType, _HOW) == "to" else self.turnBy)(angle, radOrDeg)
 
     def setArc(self, x: int, y: int, radius: int, arcType: str = "to") -> None:
-        """`arcTo` or `arcBy`, as the type says: "to" or "by"."""
+        """Drive an arc as `arcTo` or `arcBy`, as the type says: "to" or "by"."""
         (self.arcTo if choice("setArc: the type", arcType, _HOW) == "to" else self.arcBy)(x, y, radius)
 
     def getEncoders(self, zeroEncoders: bool = False) -> list[int]:

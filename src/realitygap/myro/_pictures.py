@@ -42,7 +42,7 @@ class Picture:
 
     @classmethod
     def from_array(cls, array: np.ndarray[Any, Any]) -> Picture:
-        """A picture from a camera.
+        """Return a picture from a camera.
 
         Args:
             array: (h, w, 3) uint8 colors, or (h, w) uint8 grays.
@@ -75,7 +75,7 @@ class Picture:
         return (Pixel(x, y, self) for x in range(self.width) for y in range(self.height))
 
     def getPixel(self, x: int, y: int) -> Pixel:
-        """The pixel in column x and row y, both from 0.
+        """Return the pixel in column x and row y, both from 0.
 
         Raises:
             MyroError: There is none.
@@ -91,7 +91,7 @@ class Picture:
         )
 
     def getColor(self, x: int, y: int) -> Color:
-        """The color of a pixel."""
+        """Return the color of a pixel."""
         return self.getPixel(x, y).getColor()
 
     def setColor(self, x: int, y: int, newColor: Any) -> None:
@@ -99,7 +99,7 @@ class Picture:
         self.getPixel(x, y).setColor(newColor)
 
     def getRGB(self, x: int, y: int) -> tuple[int, int, int]:
-        """Red, green and blue of a pixel."""
+        """Return red, green and blue of a pixel."""
         return self.getPixel(x, y).getRGB()
 
     def setRGB(self, x: int, y: int, rgb: Sequence[float]) -> None:
@@ -107,7 +107,7 @@ class Picture:
         self.getPixel(x, y).setRGB(rgb)
 
     def getRGBA(self, x: int, y: int) -> tuple[int, int, int, int]:
-        """Red, green, blue and alpha of a pixel."""
+        """Return red, green, blue and alpha of a pixel."""
         return self.getPixel(x, y).getRGBA()
 
     def getAlpha(self, x: int, y: int) -> int:
@@ -174,7 +174,7 @@ class Pixel:
         return self.y
 
     def getPixel(self, x: int, y: int) -> Pixel:
-        """Another pixel of the same picture."""
+        """Return another pixel of the same picture."""
         return self.picture.getPixel(x, y)
 
     def getColor(self) -> Color:
@@ -190,7 +190,7 @@ class Pixel:
         self.picture.pixels[self.x, self.y] = newColor.getRGBA()
 
     def getRGB(self) -> tuple[int, int, int]:
-        """Red, green and blue, each 0 to 255."""
+        """Return red, green and blue, each 0 to 255."""
         return self.picture.pixels[self.x, self.y][:3]  # type: ignore[no-any-return]
 
     def setRGB(self, rgb: Sequence[float]) -> None:
@@ -198,7 +198,7 @@ class Pixel:
         self.setColor(Color(rgb))
 
     def getRGBA(self) -> tuple[int, int, int, int]:
-        """Red, green, blue and alpha, each 0 to 255."""
+        """Return red, green, blue and alpha, each 0 to 255."""
         return self.picture.pixels[self.x, self.y]  # type: ignore[no-any-return]
 
     def setRGBA(self, rgba: Sequence[float]) -> None:
@@ -236,7 +236,7 @@ def _side(name: str, value: object) -> int:
 
 
 def makePicture(*args: Any) -> Picture:
-    """A picture: empty, from a file, or of a size and perhaps a color.
+    """Return a picture: empty, from a file, or of a size and perhaps a color.
 
     `makePicture()`, `makePicture("photo.jpg")`, `makePicture(width, height)` (white),
     `makePicture(width, height, color)`, `makePicture(width, height, gray)`, `makePicture(width, height, data)`
@@ -290,7 +290,7 @@ def _from_bytes(width: object, height: object, data: Any, mode: str = "color") -
 
 
 def loadPicture(filename: str) -> Picture:
-    """The picture in a file.
+    """Return the picture in a file.
 
     Raises:
         MyroError: It cannot be read.
@@ -299,7 +299,7 @@ def loadPicture(filename: str) -> Picture:
 
 
 def copyPicture(picture: Picture) -> Picture:
-    """A copy, which can be changed while the picture stays."""
+    """Return a copy, which can be changed while the picture stays."""
     return Picture(_a_picture("copyPicture", picture))
 
 
@@ -346,7 +346,7 @@ def _flat(image: PIL.Image.Image, filename: str) -> PIL.Image.Image:
 
 
 def _a_picture(function: str, value: object) -> Picture:
-    """The picture that a function was given.
+    """Return the picture that a function was given.
 
     Raises:
         MyroError: It was given something else.
@@ -367,7 +367,7 @@ def _a_pixel(function: str, value: object) -> Pixel:
 
 
 def _colored(function: str, value: object) -> Pixel | Color:
-    """The pixel or color that a function was given."""
+    """Return the pixel or color that a function was given."""
     if isinstance(value, (Pixel, Color)):
         return value
     raise MyroError(
@@ -386,7 +386,7 @@ def getHeight(picture: Picture) -> int:
 
 
 def getPixel(picture: Picture, x: int, y: int) -> Pixel:
-    """The pixel in column x and row y, both from 0 at the upper left.
+    """Return the pixel in column x and row y, both from 0 at the upper left.
 
     Raises:
         MyroError: There is none.
@@ -405,12 +405,12 @@ def setPixel(picture: Picture, x: int, y: int, color: Any) -> None:
 
 
 def getX(pixel: Pixel) -> int:
-    """The column of a pixel, from 0 at the left."""
+    """Return the column of a pixel, from 0 at the left."""
     return _a_pixel("getX", pixel).x
 
 
 def getY(pixel: Pixel) -> int:
-    """The row of a pixel, from 0 at the top."""
+    """Return the row of a pixel, from 0 at the top."""
     return _a_pixel("getY", pixel).y
 
 
@@ -440,17 +440,17 @@ def getAlpha(pixel: Pixel | Color) -> int:
 
 
 def getColor(pixel: Pixel | Color) -> Color:
-    """The color of a pixel."""
+    """Return the color of a pixel."""
     return _colored("getColor", pixel).getColor()
 
 
 def getRGB(pixel_or_color: Pixel | Color) -> tuple[int, int, int]:
-    """Red, green and blue of a pixel or a color, each 0 to 255."""
+    """Return red, green and blue of a pixel or a color, each 0 to 255."""
     return _colored("getRGB", pixel_or_color).getRGB()
 
 
 def getRGBA(pixel_or_color: Pixel | Color) -> tuple[int, int, int, int]:
-    """Red, green, blue and alpha of a pixel or a color, each 0 to 255."""
+    """Return red, green, blue and alpha of a pixel or a color, each 0 to 255."""
     return _colored("getRGBA", pixel_or_color).getRGBA()
 
 
@@ -537,5 +537,5 @@ def _nested(sizes: tuple[int, ...], value: Any) -> list[Any]:
 
 
 def makeArray(*sizes: Any, value: Any = 0) -> Array:
-    """An array of one or more sizes, filled with a value: `makeArray(2, 3)[0][1]`; or the columns of a picture."""
+    """Return an array of one or more sizes, filled with a value: `makeArray(2, 3)[0][1]`; or a picture's columns."""
     return Array(*sizes, value=value)

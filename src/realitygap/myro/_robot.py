@@ -165,7 +165,7 @@ class Scribbler(Driving, Senses, Sound, Lights, Camera, Identity, Paths, Fluke, 
 
 
 def robot_or_none() -> Scribbler | None:
-    """The robot in use; None before `initialize` and after it was closed."""
+    """Return the robot in use; None before `initialize` and after it was closed."""
     return _in_use
 
 
@@ -183,7 +183,7 @@ def set_limit(seconds: float | None) -> None:
 
 
 def robot_for(function: str) -> Scribbler:
-    """The robot in use.
+    """Return the robot in use.
 
     Raises:
         MyroError: There is none; the text says how to get one.
@@ -210,7 +210,7 @@ def sleep(seconds: float) -> None:
 
 
 def of_robot(method: Callable[Concatenate[Scribbler, P], T]) -> Callable[P, T]:
-    """Myro's function of the name of a method: it does the same with the robot in use."""
+    """Return Myro's function of the name of a method: it does the same with the robot in use."""
     name = method.__name__
 
     @functools.wraps(method)
@@ -253,7 +253,7 @@ def simulator(id: object = None, **options: Any) -> None:
 
 
 def makeRobot(kind: str, port: str | int | None = None) -> Scribbler:
-    """A robot: `robot = makeRobot("Scribbler", "/dev/rfcomm0")`, or `makeRobot("SimScribbler")` for a simulated one.
+    """Return a robot: `makeRobot("Scribbler", "/dev/rfcomm0")`, or `makeRobot("SimScribbler")` for a simulated one.
 
     Raises:
         MyroError: It is another kind of robot, or cannot be opened.
@@ -265,7 +265,7 @@ def makeRobot(kind: str, port: str | int | None = None) -> Scribbler:
 
 
 def SimScribbler(id: object = None, **options: Any) -> Scribbler:
-    """A simulated robot as an object: `robot = SimScribbler()`."""
+    """Return a simulated robot as an object: `robot = SimScribbler()`."""
     return Scribbler("sim", **options)
 
 

@@ -61,12 +61,12 @@ class Senses(Base):
         return self._one_or_all("getBright", "bright", None if position == "all" else position)
 
     def getBlob(self) -> tuple[int, int, int]:
-        """The pixels of the color that `configureBlob` set: how many, and their mean column and row."""
+        """Return the pixels of the color that `configureBlob` set: how many, and their mean column and row."""
         count, x, y = self._driven("blob")
         return (int(count), int(x), int(y))
 
     def getBattery(self) -> float:
-        """The voltage of the cells [V]; six fresh ones have about 9."""
+        """Return the voltage of the cells [V]; six fresh ones have about 9."""
         return float(self._driven("battery"))
 
     def getDistance(self, *position: str | int) -> Any:
@@ -82,7 +82,7 @@ class Senses(Base):
         return int(self._driven("mic_envelope"))
 
     def getAll(self) -> dict[str, Any]:
-        """All readings by name: light, ir, line, stall; with a Fluke also obstacle, bright, blob and battery."""
+        """Return all readings by name: light, ir, line, stall; with a Fluke also obstacle, bright, blob and battery."""
         block = self._driven("sensors")
         readings = {
             "light": list(block.light),
@@ -100,7 +100,7 @@ class Senses(Base):
         }
 
     def getLastSensors(self) -> dict[str, Any]:
-        """Light, ir, line and stall as the robot sent them with the last command, without asking again."""
+        """Return light, ir, line and stall as the robot sent them with the last command, without asking again."""
         block = self.driver.last_sensors
         if block is None:
             block = self._driven("sensors")
@@ -121,7 +121,7 @@ class Senses(Base):
         return bool(self.getObstacle("center") > threshold)
 
     def get(self, sensor: str = "all", *position: Any) -> Any:
-        """A reading by its name: `get("light", "left")` is `getLight("left")`.
+        """Return a reading by its name: `get("light", "left")` is `getLight("left")`.
 
         Args:
             sensor: "light", "ir", "line", "stall", "obstacle", "bright", "blob", "battery", "distance", "all", "name",
@@ -144,7 +144,7 @@ class Senses(Base):
     def _picked(
         self, name: str, values: list[int], places: dict[Any, int], position: tuple[str | int, ...]
     ) -> Any:
-        """All values, the one at a position, or those at several."""
+        """Return all values, the one at a position, or those at several."""
         if not position or position in ((None,), ("all",)):
             return values
         picked = [values[choice(f"{name}: the position", where, places)] for where in position]
@@ -156,7 +156,7 @@ class Senses(Base):
         return values if place is None else values[place]
 
     def _said(self) -> dict[str, str]:
-        """The info line by its keys, and our version."""
+        """Return the info line by its keys, and our version."""
         info = self.driver.info
         said = {"fluke": info.fluke_version} if info.fluke != "none" else {}
         if info.model is not None:
@@ -168,7 +168,7 @@ class Senses(Base):
         return said | {"myro": __version__}
 
     def getVersion(self) -> str:
-        """The version of the robot's firmware."""
+        """Return the version of the robot's firmware."""
         return str(self.driver.info.robot_version)
 
     def getInfo(self, *item: str) -> Any:

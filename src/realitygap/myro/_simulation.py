@@ -28,7 +28,7 @@ def is_simulation(name: str) -> bool:
 
 
 def parse_simulation(name: str) -> dict[str, Any]:
-    """The options behind the question mark of "sim?seed=3&speed=off".
+    """Return the options behind the question mark of "sim?seed=3&speed=off".
 
     Raises:
         MyroError: One of them is not known.
@@ -104,11 +104,11 @@ class Simulation:
         return Pose(*self.witness.pose())
 
     def cells(self) -> tuple[int, ...]:
-        """The cells of the arena's grid that the pen went through, in order of first visits."""
+        """Return the cells of the arena's grid that the pen went through, in order of first visits."""
         return tuple(self.witness.cells())
 
     def coverage(self) -> float:
-        """Share of the arena's cells that the pen went through, 0 to 1."""
+        """Return the share of the arena's cells that the pen went through, 0 to 1."""
         return len(self.cells()) / self.arena.grid.n_cells
 
     def path(self) -> np.ndarray[Any, np.dtype[np.float64]]:
@@ -169,7 +169,7 @@ def _plain(value: Any) -> Any:
 
 
 def _random_pose(arena: Arena, seed: int) -> Pose:
-    """A pose by chance at which the robot touches neither wall nor obstacle."""
+    """Return a pose by chance at which the robot touches neither wall nor obstacle."""
     draw = np.random.default_rng(seed)
     walls = np.array(arena.walls)
     xs, ys = walls[:, [0, 2]], walls[:, [1, 3]]

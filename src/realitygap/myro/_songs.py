@@ -22,7 +22,7 @@ _OCTAVE = 5  # of a note without a number
 
 
 def frequency(name: str) -> float:
-    """The frequency of a note [Hz], from its name ("C", "C#5", "Bb3", "pause") or from a number as text.
+    """Return the frequency of a note [Hz], from its name ("C", "C#5", "Bb3", "pause") or from a number as text.
 
     Octaves run from 0 (low) to 9; a note without one is of octave 5, where C is 523.3 Hz. Equal temperament,
     A4 = 440 Hz, to four digits, as Myro's own table has them.
@@ -54,7 +54,7 @@ _LADDER = {frequency(f"{name}{octave}"): f"{name}{octave}" for octave in range(1
 
 
 def getNoteFromFrequency(hz: float) -> str:
-    """The name of the note nearest to a frequency [Hz], with its octave; sharps and no flats: "A#4".
+    """Return the name of the note nearest to a frequency [Hz], with its octave; sharps and no flats: "A#4".
 
     Raises:
         MyroError: It is not a number of at least 0.
@@ -84,7 +84,7 @@ text2song = makeSong
 
 
 def readSong(filename: str) -> list[Note]:
-    """A song from a file, written as for `makeSong`.
+    """Return a song from a file, written as for `makeSong`.
 
     Raises:
         MyroError: There is no such file, or a note cannot be read.
@@ -129,7 +129,7 @@ def _part(text: str) -> float:
 
 
 def song2text(song: Iterable[Note]) -> str:
-    """A song as text that `makeSong` reads again: "C5 0.25; E5 G5 0.25; "."""
+    """Return a song as text that `makeSong` reads again: "C5 0.25; E5 G5 0.25; "."""
     return "".join(f"{_line(note)}; " for note in song)
 
 

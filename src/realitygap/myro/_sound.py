@@ -104,5 +104,5 @@ class Sound(Plays, Base):
         self._start_song = songName
 
     def getStartSong(self) -> str:
-        """The name that `setStartSong` remembered; "tada" before."""
+        """Return the name that `setStartSong` remembered; "tada" before."""
         return self._start_song

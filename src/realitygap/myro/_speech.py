@@ -23,7 +23,7 @@ def stopSpeaking() -> None:
 
 
 def makeStory(story: str) -> str:
-    """A story whose words in double quotation marks were replaced by what the reader answered.
+    """Return a story whose words in double quotation marks were replaced by what the reader answered.
 
     Args:
         story: Text such as 'The "animal" went to the "place".'; each such word is asked for once.

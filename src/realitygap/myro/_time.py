@@ -23,7 +23,7 @@ def wait(seconds: float) -> None:
 
 
 def currentTime() -> float:
-    """The time [s]; only differences mean something."""
+    """Return the time [s]; only differences mean something."""
     return _robot.now()
 
 

@@ -80,7 +80,7 @@ def doTogether(*functions: Callable[[], Any]) -> list[Any] | None:
 
 
 def getFilenames(pattern: str) -> list[str]:
-    """The names of files that a pattern describes, in order: `getFilenames("picture*.jpg")`."""
+    """Return the names of files that a pattern describes, in order: `getFilenames("picture*.jpg")`."""
     return sorted(glob.glob(pattern))  # noqa: PTH207  # the pattern may name folders and begin anywhere
 
 

@@ -140,7 +140,7 @@ def _screen(svg: str) -> Any:
 
 
 def to_svg(simulation: Watched) -> str:
-    """The arena, the line that the pen drew, and the robot, as SVG."""
+    """Return the arena, the line that the pen drew, and the robot, as SVG."""
     from realitygap.emulator import SCRIBBLER_BODY
 
     arena, grid = simulation.arena, simulation.arena.grid
@@ -178,7 +178,7 @@ def to_svg(simulation: Watched) -> str:
 
 
 def thinned(points: list[tuple[float, float]]) -> list[tuple[float, float]]:
-    """A line with points that are not nearer than a centimeter to the one before; first and last stay."""
+    """Return a line with points that are not nearer than a centimeter to the one before; first and last stay."""
     kept: list[tuple[float, float]] = []
     for point in points:
         if not kept or math.dist(kept[-1], point) >= _APART:

@@ -91,7 +91,7 @@ class Fleet(Protocol):
         ...
 
     def facts(self) -> dict[str, Array]:
-        """`pose` (n, 3) and `readings` (n, s): distances without noise [m]."""
+        """Return `pose` (n, 3) and `readings` (n, s): distances without noise [m]."""
         ...
 
     def close(self) -> None:

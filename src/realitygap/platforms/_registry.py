@@ -101,7 +101,7 @@ def _checked(found: object, name: str, source: str) -> type[Platform]:
 
 
 def _plugins() -> Mapping[str, list[EntryPoint]]:
-    """The entry points of other packages by name, none of which is imported; names of ours are left out."""
+    """Return the entry points of other packages by name, none of which is imported; names of ours are left out."""
     return _plugins_on(tuple(sys.path))
 
 

@@ -151,13 +151,13 @@ class SimTarget(RepeatableTarget):
         return [trials[k] for k in range(len(plans))]
 
     def _command(self, plan: TrialPlan, observe: Observe) -> TrialRecord:
-        """Command after command."""
+        """Return the command after command."""
         self._robot.noise_key = NoiseKey(self.key, individual=plan.number)
         start = plan.start or self._drawn_start()
         return carry_out_on_robot(self._robot, plan, observe, RobotObserver(self._robot), start)
 
     def _drawn_start(self) -> Pose:
-        """The arena's start with what is drawn of it for the robot's trial."""
+        """Return the arena's start with what is drawn of it for the robot's trial."""
         if not self._is_start_set:
             return self.arena.start
         self._robot.reset()
@@ -172,7 +172,7 @@ class SimTarget(RepeatableTarget):
     def _try(
         self, plans: Sequence[TrialPlan], interface: ControllerInterface, observe: Observe
     ) -> list[TrialRecord]:
-        """Trials of controllers of one kind from one start."""
+        """Return trials of controllers of one kind from one start."""
         start, steps = plans[0].start, plans[0].steps
         platform, arena = self.platform.model_copy(update={"steps": steps}), self.arena
         if start is not None:

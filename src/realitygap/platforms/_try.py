@@ -40,7 +40,7 @@ def open_trials(
     noise: float,
     bias_value: float,
 ) -> PlatformTrials:
-    """A platform set up in an arena, ready to try networks of one kind.
+    """Return a platform set up in an arena, ready to try networks of one kind.
 
     Args:
         platform: The robot as simulated.
@@ -71,7 +71,7 @@ def try_all(
     noise: float,
     trace: bool = False,
 ) -> tuple[PlatformTrials, Tried]:
-    """Trial k is one of genome `which[k]` with the random numbers of `counters[k]`."""
+    """Return trial k is one of genome `which[k]` with the random numbers of `counters[k]`."""
     check_genomes(genomes, inputs)
     first = genomes[0]
     trials = open_trials(
@@ -148,7 +148,7 @@ def scores_of(
 
 
 def trajectories_of(trials: PlatformTrials, tried: Tried, network_inputs: tuple[str, ...]) -> Trajectories:
-    """Trials as a task sees them; of several robots in an arena, those of each trial one after the other.
+    """Return trials as a task sees them; of several robots in an arena, those of each trial one after the other.
 
     Coverage and stalls are then those of all robots of a trial.
     """

@@ -107,7 +107,7 @@ def _changed(before: NDArray[np.uint8] | None, now: NDArray[np.uint8]) -> tuple[
 
 
 def _comment(text: str) -> bytes:
-    """A comment in blocks of at most 255 bytes."""
+    """Return a comment in blocks of at most 255 bytes."""
     raw = text.encode("utf-8")
     blocks = [raw[k : k + 255] for k in range(0, len(raw), 255)]
     return b"\x21\xfe" + b"".join(bytes([len(block)]) + block for block in blocks) + b"\x00"

@@ -234,7 +234,7 @@ class WatchedRobot:
         return Pose(0.0, 0.0, 0.0) if self._where is None else Pose(*self._where())
 
     def _packed(self) -> list[dict[str, Any]]:
-        """A trial in which nothing has happened yet, so that the page knows the robot."""
+        """Return a trial in which nothing has happened yet, so that the page knows the robot."""
         (packed,) = pack_trials([self.trial], placed=self._where is not None)
         return [packed]
 

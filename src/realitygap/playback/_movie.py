@@ -139,14 +139,14 @@ def picture_period(step_s: float, duration_s: float) -> float:
 
 
 def gif_of(pictures: Sequence[Image], duration_s: float, comment: str) -> bytes:
-    """Pictures as a GIF that lasts so long, and then rests."""
+    """Return pictures as a GIF that lasts so long, and then rests."""
     ends = np.rint(np.linspace(0, 100 * duration_s, len(pictures))).astype(int)
     shown = [*np.diff(ends).tolist(), round(100 * HOLD_S)]
     return gif_bytes(pictures, shown, _COLORS, comment)
 
 
 def find_ffmpeg() -> str:
-    """The program that makes video: on the PATH, or the one that a package brings.
+    """Return the program that makes video: on the PATH, or the one that a package brings.
 
     Raises:
         RealityGapError: there is none.
@@ -163,7 +163,7 @@ def find_ffmpeg() -> str:
 
 
 def video_of(encoder: str, pictures: Sequence[Image]) -> bytes:
-    """Pictures as H.264 in an MP4 that every browser plays.
+    """Return pictures as H.264 in an MP4 that every browser plays.
 
     Raises:
         RealityGapError: ffmpeg does not make it.

@@ -78,7 +78,7 @@ class RobotShape:
 
     @classmethod
     def of(cls, robot: Ranging | RobotModel) -> RobotShape:
-        """The shape of a robot; of one that a file describes, with all its parts and what each sensor reaches."""
+        """Return the shape of a robot. With a robot file, it has all parts, and the reach of each sensor."""
         model: Any = getattr(robot, "model", None)
         if isinstance(robot, RobotModel) or isinstance(model, RobotModel):
             model = robot if isinstance(robot, RobotModel) else model
@@ -131,7 +131,7 @@ class MovingTrial(ShownAsCard):
         stalled: NDArray[np.bool_],
         parts: int = 1,
     ) -> MovingTrial:
-        """The trial with these rows, whose cells are found in its line; see the attributes."""
+        """Return the trial with these rows, whose cells are found in its line; see the attributes."""
         cells, rows, _ = first_visits(poses, arena.grid)
         visited = tuple(cells.tolist()), tuple(rows.tolist())
         return cls(title, label, arena, shape, step_s, poses, rays, stalled, *visited, parts)
@@ -206,7 +206,7 @@ def in_motion(
     title: str = "trial",
     label: str = "SIM",
 ) -> MovingTrial:
-    """A trial made ready to be shown.
+    """Return a trial made ready to be shown.
 
     Args:
         trajectory: Trial with every step.
@@ -238,7 +238,7 @@ def in_motion(
 
 
 def all_trials(trials: MovingTrial | Iterable[MovingTrial]) -> list[MovingTrial]:
-    """The trials that are shown together.
+    """Return the trials that are shown together.
 
     Raises:
         TypeError: one is something else.
@@ -305,7 +305,7 @@ def first_visits(
 
 
 def extent(arena: Arena) -> tuple[float, float, float, float]:
-    """Left, right, bottom and top of what is shown [m]."""
+    """Return left, right, bottom and top of what is shown [m]."""
     left, bottom, right, top = extent_of(arena)
     margin = 0.012 * (right - left)
     return left - margin, right + margin, bottom - margin, top + margin

@@ -23,7 +23,7 @@ _DIGITS = 4
 
 
 def play(trials: MovingTrial | Iterable[MovingTrial], *, title: str = "", speed: float = 1.0) -> Any:
-    """A widget that plays trials in a notebook: rays, trails, cells, a slider and the choice of a speed.
+    """Return a widget that plays trials in a notebook: rays, trails, cells, a slider and the choice of a speed.
 
     Args:
         trials: One trial, or up to eight in one arena.
@@ -49,7 +49,7 @@ def play(trials: MovingTrial | Iterable[MovingTrial], *, title: str = "", speed:
 
 
 def check_speed(speed: float) -> float:
-    """The speed, if a player offers it.
+    """Return the speed, if a player offers it.
 
     Raises:
         ValueError: it does not.
@@ -78,7 +78,7 @@ def widget_modules(missing: str) -> tuple[Any, Any]:
 
 @cache
 def player_class() -> type:
-    """The class of the widget; made when it is first needed, because anywidget is an extra.
+    """Return the class of the widget; made when it is first needed, because anywidget is an extra.
 
     Raises:
         RealityGapError: anywidget is not there.
@@ -168,5 +168,5 @@ def pack_trials(trials: Sequence[MovingTrial], *, placed: bool = True) -> list[d
 
 
 def pack_rays(lengths: Iterable[float]) -> list[float | None]:
-    """Lengths of rays ready for JSON, which has no NaN."""
+    """Return lengths of rays ready for JSON, which has no NaN."""
     return [None if math.isnan(length) else round(length, _DIGITS) for length in lengths]

@@ -51,18 +51,18 @@ _DOT = 1e-4
 
 
 def rgb(color: str) -> tuple[int, int, int]:
-    """Red, green and blue, 0 to 255, of #rrggbb."""
+    """Return red, green and blue, 0 to 255, of #rrggbb."""
     return int(color[1:3], 16), int(color[3:5], 16), int(color[5:7], 16)
 
 
 def paler(color: str, share: float) -> tuple[int, int, int]:
-    """A color, 0 to 255, of which only a share covers the ground."""
+    """Return a color, 0 to 255, of which only a share covers the ground."""
     red, green, blue = (round(255 * part) for part in _mixed(Ink.GROUND, color, share))
     return red, green, blue
 
 
 def _mixed(one: str, other: str, share: float) -> tuple[float, float, float]:
-    """A color between two, 0 to 1."""
+    """Return a color between two, 0 to 1."""
     red, green, blue = (
         (first + share * (second - first)) / 255 for first, second in zip(rgb(one), rgb(other), strict=True)
     )
@@ -70,7 +70,7 @@ def _mixed(one: str, other: str, share: float) -> tuple[float, float, float]:
 
 
 def ray_color(near: float) -> tuple[float, float, float]:
-    """The color of a ray that meets something as near as this, 0 (nothing) to 1 (touching)."""
+    """Return the color of a ray that meets something as near as this, 0 (nothing) to 1 (touching)."""
     if near <= 0:
         return _mixed(FAR, FAR, 0.0)
     return _mixed(FAR, MIDDLE, 2 * near) if near < 0.5 else _mixed(MIDDLE, NEAR, 2 * near - 1)
@@ -139,7 +139,7 @@ class Screen:
         self._visits: list[float] = []
 
     def picture(self, time: float) -> Image:
-        """The moment at a time since the start [s]."""
+        """Return the moment at a time since the start [s]."""
         from PIL import Image
 
         moments = [trial.at(time) for trial in self.trials]
@@ -234,7 +234,7 @@ class Screen:
             self._add(self._all, word)
 
     def _draw_foot(self, top: float) -> None:
-        """A line that fills as time goes by, and what the colors of rays mean."""
+        """Draw a line that fills as time goes by, and the meaning of the colors of rays."""
         from matplotlib.collections import LineCollection
 
         y = top + 0.1

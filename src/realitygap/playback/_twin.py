@@ -115,7 +115,7 @@ def _check_ending(path: Path, view: View, why: str = "") -> None:
 
 
 def _from_above(trial: TwinDrive) -> MovingTrial:
-    """The trial with what it saw, row by row."""
+    """Return the trial with what it saw, row by row."""
     robot = open_twin(trial.model, trial.arena, number=trial.number)
     seen, poses = [robot.observe()], [robot.pose]
     for step in range(trial.n_steps):

@@ -97,7 +97,7 @@ def read_checkpoint(path: Path, kind: str) -> tuple[dict[str, Any], dict[str, np
 
 
 def _arrays(data: bytes) -> dict[str, npt.NDArray[Any]]:
-    """The arrays in a file that `np.savez` wrote, none of which can be larger than the file.
+    """Return the arrays in a file that `np.savez` wrote, none of which can be larger than the file.
 
     Raises:
         ValueError: one is compressed, or says that it is of another size than it is.

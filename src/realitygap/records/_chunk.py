@@ -45,7 +45,7 @@ class ChunkName:
 
     @classmethod
     def parse(cls, name: str) -> ChunkName | None:
-        """The parts of a file name; None when it is not the name of a chunk."""
+        """Return the parts of a file name; None when it is not the name of a chunk."""
         match = _NAME.fullmatch(name)
         if match is None or int(match["last"]) < int(match["first"]):
             return None
@@ -101,7 +101,7 @@ def check_condition(name: str) -> None:
 def encode_chunk(
     folder: Path, condition: str, first: int, frame: pl.DataFrame, condition_hash: str
 ) -> tuple[Chunk, bytes]:
-    """A chunk and the bytes of its file.
+    """Return a chunk and the bytes of its file.
 
     Raises:
         TypeError: `frame` is not a polars frame, or the hash is not text.
@@ -124,7 +124,7 @@ def encode_chunk(
 
 
 def load_chunk(path: Path) -> Chunk:
-    """The chunk in a file, after a look at all of its bytes.
+    """Return the chunk in a file, after a look at all of its bytes.
 
     Raises:
         RecordError: the file is torn, foreign, or not what its name says.

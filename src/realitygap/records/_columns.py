@@ -114,18 +114,18 @@ KEYS: tuple[str, ...] = ("replicate", "generation", "individual")
 
 
 def columns_in(frame: pl.DataFrame) -> list[Column]:
-    """The columns of a frame in order: those that all have, and the extra ones that are there."""
+    """Return the columns of a frame in order: those that all have, and the extra ones that are there."""
     return [*COLUMNS, *(column for column in EXTRA if column.name in frame.columns)]
 
 
 def schema_with(names: Iterable[str]) -> pl.Schema:
-    """`SCHEMA`, and those extra columns that are among the names."""
+    """Return `SCHEMA`, and those extra columns that are among the names."""
     there = set(names)
     return pl.Schema({**SCHEMA, **{name: dtype for name, dtype in EXTRA_SCHEMA.items() if name in there}})
 
 
 def column_table() -> list[tuple[str, str, str]]:
-    """Name, type and description (with unit) of each column in order; a struct's fields as `column.field`."""
+    """Return the name, type and description (with unit) of each column; a struct's fields as `column.field`."""
     rows: list[tuple[str, str, str]] = []
     for column in (*COLUMNS, *EXTRA):
         if column.fields and isinstance(column.dtype, pl.List):
@@ -139,7 +139,7 @@ def column_table() -> list[tuple[str, str, str]]:
 
 
 def list_column(values: npt.NDArray[Any], lengths: npt.NDArray[np.integer[Any]]) -> pl.Series:
-    """A polars list column from padded rows: the first `lengths[i]` entries of row i.
+    """Return a polars list column from padded rows: the first `lengths[i]` entries of row i.
 
     Args:
         values: (n, k), any numeric or boolean type, which becomes the type of the entries.
@@ -166,7 +166,7 @@ def list_column(values: npt.NDArray[Any], lengths: npt.NDArray[np.integer[Any]])
 
 
 def check_rows(frame: pl.DataFrame, condition: str, first: int) -> int:
-    """The last replicate of a frame that is fit to be published.
+    """Return the last replicate of a frame that is fit to be published.
 
     Args:
         frame: Columns as in `SCHEMA`, and any of `EXTRA`, in any order.

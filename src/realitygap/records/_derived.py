@@ -40,7 +40,7 @@ class Derived:
         return pl.Schema({column.name: column.dtype for column in self.columns})
 
     def frame(self, rows: pl.DataFrame) -> pl.DataFrame:
-        """The frame, its columns in order and of their types."""
+        """Return the frame, its columns in order and of their types."""
         return self.of(rows).select(pl.col(name).cast(dtype) for name, dtype in self.schema.items())
 
 
@@ -129,7 +129,7 @@ def parent_rows(rows: pl.DataFrame) -> tuple[npt.NDArray[np.int64], npt.NDArray[
 
 
 def _taken(lists: pl.Series, at: npt.NDArray[np.int64]) -> pl.Series:
-    """The lists of the rows `at`; an empty one for -1."""
+    """Return the lists of the rows `at`; an empty one for -1."""
     taken = lists.gather(np.maximum(at, 0))
     return pl.select(
         pl.when(pl.Series(at >= 0)).then(taken).otherwise(pl.lit([], dtype=lists.dtype))
@@ -250,5 +250,5 @@ DERIVED: Mapping[str, Derived] = {
 
 
 def derived_table(what: DerivedFrame) -> list[tuple[str, str, str]]:
-    """Name, type and description of each column of a derived frame, in order."""
+    """Return the name, type and description of each column of a derived frame, in order."""
     return [(column.name, str(column.dtype), column.description) for column in DERIVED[what].columns]

@@ -27,7 +27,7 @@ class Description:
 
     @classmethod
     def of(cls, study: Mapping[str, Any], results_version: int) -> Description:
-        """A description, as it will be read back from a file.
+        """Return a description, as it will be read back from a file.
 
         Raises:
             TypeError: a value is not JSON's.
@@ -45,7 +45,7 @@ class Description:
 
     @classmethod
     def read(cls, path: Path) -> Description:
-        """The description in a file.
+        """Return the description in a file.
 
         Raises:
             RecordError: the file is torn, edited or foreign.

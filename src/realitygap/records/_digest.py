@@ -38,20 +38,20 @@ class RowsDigest:
             self._hashes[name].update(values.data)
 
     def hexdigest(self) -> str:
-        """Sha256 over the number of rows and the hash of each stream."""
+        """Return the sha256 over the number of rows and the hash of each stream."""
         streams = {name: stream.hexdigest() for name, stream in self._hashes.items()}
         return _hash_json({"n_rows": self._n_rows, "streams": streams})
 
 
 def rows_digest(frame: pl.DataFrame) -> str:
-    """Digest of all rows of a frame with the columns of `SCHEMA`, as hexadecimal sha256."""
+    """Return the digest of all rows of a frame with the columns of `SCHEMA`, as hexadecimal sha256."""
     digest = RowsDigest()
     digest.update(row_streams(frame), frame.height)
     return digest.hexdigest()
 
 
 def study_digest(results_version: int, conditions: dict[str, tuple[str, str]]) -> str:
-    """Digest of a study as hexadecimal sha256.
+    """Return the digest of a study as hexadecimal sha256.
 
     Args:
         results_version: Results version that computed the numbers.
@@ -61,7 +61,7 @@ def study_digest(results_version: int, conditions: dict[str, tuple[str, str]]) -
 
 
 def row_streams(frame: pl.DataFrame) -> Iterator[Stream]:
-    """The values of a frame as streams to hash; the condition's name is hashed once, by `study_digest`."""
+    """Yield the values of a frame as streams to hash; the condition's name is hashed once, by `study_digest`."""
     for column in columns_in(frame):
         if column.name != "condition":
             yield from _streams(column.name, column, frame[column.name])

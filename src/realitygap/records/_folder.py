@@ -131,7 +131,7 @@ class ResultsFolder(PublishedResults):
 
     @contextlib.contextmanager
     def inbox(self) -> Iterator[Path]:
-        """A folder into which processes without the lock, on any machine that sees it, `deliver` chunks.
+        """Yield a folder into which processes without the lock, on any machine that sees it, `deliver` chunks.
 
         It is removed on the way out, and with it what was not accepted; one that a killed process left, when
         the lock is next taken.

@@ -75,7 +75,7 @@ def deliver(inbox: Path, condition: str, first: int, frame: pl.DataFrame, condit
 
 
 def make_inbox(folder: Path) -> Path:
-    """A new inbox in a folder, with a name that never was and never will be.
+    """Return a new inbox in a folder, with a name that never was and never will be.
 
     Raises:
         RecordError: the folder cannot be written.

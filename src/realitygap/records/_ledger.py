@@ -243,7 +243,7 @@ class Ledger(LedgerReader):
             self._note_event(number, "undone", {})
 
     def void(self, number: int, reason: str) -> None:
-        """A trial that does not count; another attempt is planned in its place.
+        """Void a trial, and plan another attempt in its place.
 
         Raises:
             LedgerError: its generation is closed, it is void already, or no reason is given.
@@ -253,7 +253,7 @@ class Ledger(LedgerReader):
             self._void(number, reason)
 
     def note(self, text: str, who: str, number: int | None = None) -> None:
-        """A remark, of a trial or of the whole."""
+        """Add a remark on a trial or on the whole ledger."""
         if not text.strip():
             raise LedgerError("An empty note was not saved. Enter a text.")
         with self._writing():
@@ -368,7 +368,7 @@ class Ledger(LedgerReader):
         return {row["who"] for row in rows}
 
     def _checked(self, number: int, cells: Sequence[int]) -> list[int]:
-        """Cells of a trial, each at most once, all within its grid, and at least the one it starts in."""
+        """Return cells of a trial, each at most once, all within its grid, and at least the one it starts in."""
         row = self._one(
             "SELECT n_cells FROM conditions JOIN trials ON trials.condition = conditions.name WHERE trials.id = ?",
             number,

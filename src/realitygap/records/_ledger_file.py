@@ -201,7 +201,7 @@ def create_file(path: Path) -> None:
 
 
 def connect(path: Path, *, writable: bool) -> sqlite3.Connection:
-    """A connection to a ledger that is whole.
+    """Return a connection to a ledger that is whole.
 
     Raises:
         LedgerError: it is missing, torn, foreign or locked.
@@ -290,7 +290,7 @@ def _check_types(connection: sqlite3.Connection, path: Path) -> None:
 
 @functools.cache
 def _types() -> dict[str, dict[str, str]]:
-    """The type of each column of each table, as SQLite calls those of values."""
+    """Return the type of each column of each table, as SQLite calls those of values."""
     with contextlib.closing(sqlite3.connect(":memory:")) as connection:
         connection.executescript(TABLES)
         columns = {name: connection.execute(f"PRAGMA table_info({name})").fetchall() for name in _NAMES}

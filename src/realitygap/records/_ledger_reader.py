@@ -44,7 +44,7 @@ class LedgerReader(ClosedOnExit, ShownAsCard):
 
     @classmethod
     def open(cls, path: str | Path, *, writable: bool = True) -> Self:
-        """The ledger in a file."""
+        """Return the ledger in a file."""
         return cls(Path(path), connect(Path(path), writable=writable))
 
     def __repr__(self) -> str:
@@ -69,16 +69,16 @@ class LedgerReader(ClosedOnExit, ShownAsCard):
     # conditions and sittings
 
     def conditions(self) -> dict[str, dict[str, Any]]:
-        """Hash, label (None before the first trial) and sizes of each condition, by name."""
+        """Return the hash, label (None before the first trial) and sizes of each condition, by name."""
         return {row["name"]: dict(row) for row in self._all("SELECT * FROM conditions ORDER BY rowid")}
 
     def sittings(self) -> list[dict[str, Any]]:
-        """All sittings, oldest first; `robot` and `preflight` as they were given."""
+        """Return all sittings, oldest first; `robot` and `preflight` as they were given."""
         rows = self._all("SELECT * FROM sittings ORDER BY id")
         return [self._decoded(row, "robot", "preflight") for row in rows]
 
     def robots(self) -> list[dict[str, str]]:
-        """The identity of each robot that drove a trial, without repeats, oldest first."""
+        """Return the identity of each robot that drove a trial, without repeats, oldest first."""
         rows = self._all(
             "SELECT DISTINCT robot FROM sittings JOIN trials ON trials.sitting = sittings.id ORDER BY sittings.id"
         )
@@ -87,7 +87,7 @@ class LedgerReader(ClosedOnExit, ShownAsCard):
     # generations
 
     def generations(self, condition: str, replicate: int) -> list[tuple[int, bool]]:
-        """Number of each generation planned, and whether it is closed, in order."""
+        """Return the number of each generation planned, and whether it is closed, in order."""
         rows = self._all(
             "SELECT generation, closed FROM generations WHERE condition = ? AND replicate = ? ORDER BY generation",
             *(condition, replicate),
@@ -95,7 +95,7 @@ class LedgerReader(ClosedOnExit, ShownAsCard):
         return [(row["generation"], row["closed"] is not None) for row in rows]
 
     def individuals(self, condition: str, replicate: int, generation: int) -> list[dict[str, Any]]:
-        """The individuals of a generation in order; once it is closed with `fitness`, `novelty` and `cells`."""
+        """Return the individuals of a generation in order; once it is closed with `fitness`, `novelty` and `cells`."""
         rows = self._all(
             "SELECT individuals.*, scores.cells FROM individuals LEFT JOIN scores ON scores.id = individuals.score "
             "WHERE condition = ? AND replicate = ? AND generation = ? ORDER BY individual",
@@ -113,7 +113,7 @@ class LedgerReader(ClosedOnExit, ShownAsCard):
         *,
         states: Iterable[TrialState] | None = None,
     ) -> list[Trial]:
-        """Trials in the order of their turns; all of them, or those chosen."""
+        """Return trials in the order of their turns; all of them, or those chosen."""
         wanted = {"condition": condition, "replicate": replicate, "generation": generation}
         given = {name: value for name, value in wanted.items() if value is not None}
         clauses = [f"{name} = ?" for name in given]
@@ -126,7 +126,7 @@ class LedgerReader(ClosedOnExit, ShownAsCard):
         return [self._trial(row) for row in self._all(f"{_TRIALS}{where}ORDER BY place, attempt", *values)]
 
     def trial(self, number: int) -> Trial:
-        """A trial by its number.
+        """Return a trial by its number.
 
         Raises:
             LedgerError: there is none.
@@ -139,7 +139,7 @@ class LedgerReader(ClosedOnExit, ShownAsCard):
         return self._trial(row)
 
     def notes(self, number: int | None = None) -> list[dict[str, Any]]:
-        """Notes, oldest first; of one trial, or all."""
+        """Return notes, oldest first; of one trial, or all."""
         where, values = ("", ()) if number is None else ("WHERE trial = ? ", (number,))
         return [dict(row) for row in self._all(f"SELECT * FROM notes {where}ORDER BY id", *values)]
 
@@ -181,7 +181,7 @@ class LedgerReader(ClosedOnExit, ShownAsCard):
             ) from None
 
     def counted_score(self, number: int) -> Score | None:
-        """The score of a trial that counts for selection, with the driven path if it is known."""
+        """Return the score of a trial that counts for selection, with the driven path if it is known."""
         row = self._one(
             "SELECT * FROM scores WHERE trial = ? AND role = 'score' AND undone IS NULL ORDER BY id DESC LIMIT 1",
             number,
@@ -192,12 +192,12 @@ class LedgerReader(ClosedOnExit, ShownAsCard):
         return Score(tuple(values["cells"]), values["who"], n_ends=values["n_ends"], path=values["path"])
 
     def scores(self) -> list[dict[str, Any]]:
-        """All scores ever entered, oldest first, with their trial, role, who, and when they were undone."""
+        """Return all scores ever entered, oldest first, with their trial, role, who, and when they were undone."""
         rows = self._all("SELECT * FROM scores ORDER BY id")
         return [self._decoded(row, "cells", "path") for row in rows]
 
     def events(self) -> list[dict[str, Any]]:
-        """Everything that changed a trial, oldest first."""
+        """Return everything that changed a trial, oldest first."""
         return [self._decoded(row, "details") for row in self._all("SELECT * FROM events ORDER BY id")]
 
     def used_codes(self) -> set[str]:
@@ -205,7 +205,7 @@ class LedgerReader(ClosedOnExit, ShownAsCard):
         return {row["code"] for row in self._all("SELECT code FROM trials")}
 
     def last_sheet(self) -> int:
-        """The highest number of a sheet of paper; 0 before the first."""
+        """Return the highest number of a sheet of paper; 0 before the first."""
         row = self._one("SELECT coalesce(max(sheet), 0) AS sheet FROM trials")
         return 0 if row is None else int(row["sheet"])
 
@@ -244,7 +244,7 @@ class LedgerReader(ClosedOnExit, ShownAsCard):
         return Trial(trial=row["id"], cells=cells, is_closed=bool(row["is_closed"]), **given)
 
     def _decoded(self, row: sqlite3.Row, *names: str) -> dict[str, Any]:
-        """The values of a row, some of which are written as JSON."""
+        """Return the values of a row, some of which are written as JSON."""
         return dict(row) | {name: None if row[name] is None else self._value(row[name]) for name in names}
 
     def _value(self, text: str) -> Any:

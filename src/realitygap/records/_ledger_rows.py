@@ -31,7 +31,7 @@ WHERE condition = ? AND closed IS NOT NULL GROUP BY replicate HAVING count(*) = 
 
 
 def complete_runs(ledger: Ledger, condition: str) -> list[int]:
-    """Replicates all of whose generations are closed, in order."""
+    """Return replicates all of whose generations are closed, in order."""
     return [row["replicate"] for row in ledger._all(_COMPLETE, condition)]
 
 

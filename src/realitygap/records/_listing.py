@@ -24,7 +24,7 @@ _SYSTEM_PREFIXES = ("._", ".nfs")
 
 
 def list_chunks(trials: Path) -> list[ChunkName]:
-    """The chunks in a folder, by name; none while there is no folder.
+    """Return the chunks in a folder, by name; none while there is no folder.
 
     Raises:
         RecordError: there is a file that is not a chunk, or the folder cannot be read.
@@ -66,7 +66,7 @@ def is_trace(entry: Path) -> bool:
 
 
 def listed(names: Sequence[str], n_shown: int = 6) -> str:
-    """Names for a message, the first few of them."""
+    """Return names for a message, the first few of them."""
     if not names:
         return "nothing"
     shown = ", ".join(names[:n_shown])

@@ -53,7 +53,7 @@ def append_line(path: Path, event: Mapping[str, Any]) -> bool:
 
 
 def read_lines(path: Path) -> list[dict[str, Any]]:
-    """All events, oldest first; lines torn by a crash are left out, with a warning that counts them."""
+    """Return all events, oldest first; lines torn by a crash are left out, with a warning that counts them."""
     if not path.exists():
         return []
     with reading(path):

@@ -84,7 +84,7 @@ def not_compared(there: Mapping[str, Any], wanted: Mapping[str, Any]) -> str:
 
 
 def trial_to_dict(trial: TrialRecord) -> dict[str, Any]:
-    """A trial as plain values, without those that it lacks; an unknown voltage of the battery is null."""
+    """Return a trial as plain values, without those that it lacks; an unknown voltage of the battery is null."""
     values = {
         name: value.tolist() if isinstance(value, np.ndarray) else value
         for name, value in vars(trial).items()
@@ -98,7 +98,7 @@ def trial_to_dict(trial: TrialRecord) -> dict[str, Any]:
 
 
 def trial_from_dict(values: Mapping[str, Any]) -> TrialRecord:
-    """The trial that `trial_to_dict` described.
+    """Return the trial that `trial_to_dict` described.
 
     Raises:
         ValueError: Something is missing, or not of the shape that it has in a trial.

@@ -39,7 +39,7 @@ def check_size(parquet: bytes) -> None:
 
 
 def _sizes(parquet: bytes) -> tuple[int, int]:
-    """Decompressed bytes, and values, by the description and by the heads of the pages: the larger of both."""
+    """Return the decompressed bytes, and values, by the description and by the heads of pages: the larger of both."""
     length = int.from_bytes(parquet[-_WIDTH:-4], "little")
     if not 0 < length <= len(parquet) - _WIDTH:
         raise ValueError("its description is longer than the file")
@@ -58,7 +58,7 @@ def _sizes(parquet: bytes) -> tuple[int, int]:
 
 
 def _pages(parquet: bytes, begin: int, n_bytes: int) -> tuple[int, int]:
-    """Decompressed bytes and values of the pages of a column."""
+    """Return the decompressed bytes and values of the pages of a column."""
     large = values = 0
     at, end = begin, begin + n_bytes
     while at < end:
@@ -86,7 +86,7 @@ class _Thrift:
         self.at = at
 
     def struct(self, depth: int = 0) -> dict[int, Any]:
-        """The fields of a struct by their numbers."""
+        """Return the fields of a struct by their numbers."""
         if depth > _MOST_DEPTH:
             raise ValueError("its description is nested too deeply")
         fields: dict[int, Any] = {}

@@ -55,7 +55,7 @@ class PublishedResults(ShownAsCard):
 
     @classmethod
     def open(cls, path: str | Path) -> Self:
-        """The study in a folder.
+        """Return the study in a folder.
 
         Raises:
             RecordError: there is no such folder, it holds no results, or its `study.json` is torn or foreign.
@@ -175,7 +175,7 @@ class PublishedResults(ShownAsCard):
         return [(name, self._trials / str(name)) for name in self._names()]
 
     def chunks(self, condition: str | None = None) -> list[Chunk]:
-        """All published chunks, or those of one condition, in key order; every byte of them was checked.
+        """Return all published chunks, or those of one condition, in key order; every byte of them was checked.
 
         A file that was checked before and has not changed since is not read again.
 
@@ -189,7 +189,7 @@ class PublishedResults(ShownAsCard):
         return chunks
 
     def missing(self, condition: str, n_replicates: int) -> list[range]:
-        """The replicates of 0 to `n_replicates` - 1 that are not published, as ranges in order.
+        """Return the replicates of 0 to `n_replicates` - 1 that are not published, as ranges in order.
 
         Raises:
             RecordError: as `chunks`.
@@ -207,7 +207,7 @@ class PublishedResults(ShownAsCard):
     # rows
 
     def scan(self) -> pl.LazyFrame:
-        """All rows, lazily, in key order; warns when another version computed them.
+        """Return all rows, lazily, in key order; warns when another version computed them.
 
         Raises:
             RecordError: as `chunks`.
@@ -225,7 +225,7 @@ class PublishedResults(ShownAsCard):
     def frames(
         self, condition: str | None = None, columns: Sequence[str] | None = None
     ) -> Iterator[pl.DataFrame]:
-        """The rows chunk by chunk, in key order, so that memory holds one chunk at a time.
+        """Return the rows chunk by chunk, in key order, so that memory holds one chunk at a time.
 
         Args:
             condition: Condition. Default: all, in the description's order.
@@ -246,7 +246,7 @@ class PublishedResults(ShownAsCard):
         replicates: Iterable[int] | None = None,
         columns: Sequence[str] | None = None,
     ) -> pl.DataFrame:
-        """Rows in key order: conditions as in the description, then replicate, generation and individual.
+        """Return rows in key order: conditions as in the description, then replicate, generation and individual.
 
         Args:
             condition: Condition. Default: all.
@@ -273,7 +273,7 @@ class PublishedResults(ShownAsCard):
     def derive(
         self, what: DerivedFrame, condition: str | None = None, replicates: Iterable[int] | None = None
     ) -> pl.DataFrame:
-        """Species, innovations or lineage of the runs, derived from their rows.
+        """Return species, innovations or lineage of the runs, derived from their rows.
 
         Args:
             what: species (a row is one species in one generation), innovations (one innovation number in one run), or
@@ -325,7 +325,7 @@ class PublishedResults(ShownAsCard):
         return write_frames(path, self.derived_frames(what, condition, replicates), DERIVED[what].schema)
 
     def digest(self) -> str:
-        """Sha256 of all rows, as 64 hexadecimal digits.
+        """Return the sha256 of all rows, as 64 hexadecimal digits.
 
         It depends on the values, the conditions' names and hashes, and the results version: not on the order
         of the conditions, on how replicates were split into chunks, nor on when, where and with how many
@@ -363,7 +363,7 @@ class PublishedResults(ShownAsCard):
     # log
 
     def read_log(self) -> list[dict[str, Any]]:
-        """The events in the log, oldest first; warns of lines that a crash has torn."""
+        """Return the events in the log, oldest first; warns of lines that a crash has torn."""
         return read_lines(self._path / LOG_NAME)
 
     # inside
@@ -401,7 +401,7 @@ class PublishedResults(ShownAsCard):
     def _all_frames(
         self, condition: str | None, columns: Sequence[str] | None, replicates: pl.Series | None = None
     ) -> Iterator[pl.DataFrame]:
-        """Rows in key order, of chunks and of the ledger; of chunks only those with some of the replicates."""
+        """Yield rows in key order, of chunks and of the ledger; of chunks only those with some of the replicates."""
         names = self._names(condition)
         if replicates is not None:
             names = [name for name in names if replicates.is_between(name.first, name.last).any()]
@@ -511,6 +511,6 @@ class PublishedResults(ShownAsCard):
 
 
 def _wanted(replicates: Iterable[int]) -> pl.Series:
-    """The replicates that there may be, ascending; what is beyond any chunk may be beyond polars' numbers, too."""
+    """Return the possible replicates, ascending, because those beyond any chunk may be beyond polars' numbers, too."""
     numbers = {whole_number("replicate", number) for number in replicates}
     return pl.Series(sorted(number for number in numbers if 0 <= number <= MAX_REPLICATE), dtype=pl.Int64)

@@ -25,7 +25,7 @@ class BrokenSeal(Exception):  # noqa: N818 - says what happened; never leaves th
 
 
 def seal(parquet: bytes) -> bytes:
-    """The bytes of a Parquet file with a seal before its footer."""
+    """Return the bytes of a Parquet file with a seal before its footer."""
     footer = _footer_start(parquet)
     return b"".join((parquet[:footer], _MARK, hashlib.sha256(parquet).digest(), parquet[footer:]))
 

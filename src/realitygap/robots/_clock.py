@@ -15,7 +15,7 @@ class Clock(Protocol):
     """A clock that can be read and can wait. All code that times a robot uses the robot's own clock."""
 
     def now(self) -> float:
-        """Time [s] since any origin. It never decreases."""
+        """Return the time [s] since any origin. It never decreases."""
         ...
 
     def sleep(self, seconds: float) -> None:
@@ -27,7 +27,7 @@ class SystemClock:
     """Real time."""
 
     def now(self) -> float:
-        """The time since this machine started [s]."""
+        """Return the time since this machine started [s]."""
         return time.monotonic()
 
     def sleep(self, seconds: float) -> None:

@@ -172,7 +172,7 @@ class Recording:
     is_whole: bool
 
     def table(self) -> pl.DataFrame:
-        """One row for each line, with the columns of `COLUMNS`. Missing values are null."""
+        """Return one row for each line, with the columns of `COLUMNS`. Missing values are null."""
         import polars as pl
 
         rows = [

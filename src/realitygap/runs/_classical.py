@@ -43,7 +43,7 @@ class TaskRun:
 
 
 def run_task(task: ClassicalTask, settings: NeatSettings, seed: int, replicate: int) -> TaskRun:
-    """One run on a classical task, in one call of a kernel.
+    """Return one run on a classical task, in one call of a kernel.
 
     Args:
         task: Task to solve.

@@ -359,7 +359,7 @@ class Condition(Settings):
         return self.controller.outputs
 
     def settings(self) -> dict[str, Any]:
-        """All values that determine its results, as plain values. Its name counts only if seeds are not paired."""
+        """Return all values that determine its results, as plain values. Its name counts if seeds are not paired."""
         return self.model_dump(mode="json", exclude={"name"})
 
     @model_serializer(mode="wrap")
@@ -382,7 +382,7 @@ class Condition(Settings):
 
     @classmethod
     def from_settings(cls, name: str, settings: dict[str, Any]) -> Condition:
-        """The condition that `settings` described.
+        """Return the condition that `settings` described.
 
         Raises:
             RecordVersionError: They are not the settings of this version: one is missing, unknown or out of its
@@ -425,7 +425,7 @@ def _with_platform_of(values: dict[str, Any]) -> dict[str, Any]:
 
 
 def _lines(error: ValidationError, within: tuple[str, ...]) -> list[InitErrorDetails]:
-    """The mistakes of an error, with the name of their table in front of their places."""
+    """Return the mistakes of an error, with the name of their table in front of their places."""
     return [
         {
             "type": each["type"],
@@ -438,7 +438,7 @@ def _lines(error: ValidationError, within: tuple[str, ...]) -> list[InitErrorDet
 
 
 def _missing(given: Mapping[str, Any], full: Mapping[str, Any], place: str = "") -> Iterator[str]:
-    """The settings, and those within them, that are not given."""
+    """Yield the settings, and those within them, that are not given."""
     for key, value in full.items():
         if key not in given:
             yield place + key

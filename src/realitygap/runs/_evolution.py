@@ -82,7 +82,7 @@ class Evolution:
         )
 
     def ask(self) -> list[Asked]:
-        """This generation, in the order in which `tell` wants their scores."""
+        """Return this generation, in the order in which `tell` wants their scores."""
         condition = self._condition
         if condition.selection == "random":
             return [Asked(named(genome, condition), 0, ()) for genome in self._unrelated()]
@@ -122,7 +122,7 @@ class Evolution:
         return told
 
     def _unrelated(self) -> list[Genome]:
-        """Networks without parents, others in each generation."""
+        """Return networks without parents, others in each generation."""
         rules = self._condition.neat_rules
         genomes = make_genomes(
             self._condition.neat.population, N_OUTPUTS, rules.n_first_genes, rules.start_hidden + 1

@@ -137,7 +137,7 @@ class _EndsArchive:
         return self._n
 
     def update(self, ends: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Novelty (n,) of a generation, of which the novel ones then enter."""
+        """Return the novelty (n,) of a generation, of which the novel ones then enter."""
         points = np.ascontiguousarray(ends.T)
         n = points.shape[1]
         novelty, entered = np.empty(n), np.empty(n, np.bool_)
@@ -181,7 +181,7 @@ def run_maze(
     keep_ends: bool = False,
     go_on: Callable[[], bool] = lambda: True,
 ) -> MazeRun:
-    """One run in a maze, up to the first network that reaches the exit.
+    """Return one run in a maze, up to the first network that reaches the exit.
 
     Fitness is the novelty of where a trial ends, or how much less than the task's `far` its distance from the exit
     is.

@@ -21,12 +21,12 @@ _COLUMNS = (
 
 
 def genome_of(condition: Condition, row: Mapping[str, Any]) -> Genome:
-    """The genome of a row of results, whose inputs and outputs have the condition's names."""
+    """Return the genome of a row of results, whose inputs and outputs have the condition's names."""
     return _genome_from(condition, row["genome"])
 
 
 def partners_of(condition: Condition, row: Mapping[str, Any]) -> list[Genome]:
-    """The genomes of the other robots of a row's trial; none if all robots have the row's genome."""
+    """Return the genomes of the other robots of a row's trial; none if all robots have the row's genome."""
     return [_genome_from(condition, partner) for partner in row.get("partners") or ()]
 
 

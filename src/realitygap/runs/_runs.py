@@ -138,7 +138,7 @@ def _is_whole(condition: Condition) -> bool:
 def _run_whole(
     condition: Condition, rules: RunRules, first_replicate: int, rows: RunRows, room: int, hidden_room: int
 ) -> bool:
-    """All runs in one call of the platform; as `run_staged`."""
+    """Return all runs in one call of the platform; as `run_staged`."""
     return condition.on.run_whole(
         condition.arena.arena(),
         condition.neat_rules,
@@ -172,7 +172,7 @@ def prepare_kernels(conditions: Iterable[Condition] = ()) -> None:
 
 
 def _least(condition: Condition) -> Condition:
-    """The condition with a population of two that live for one step, and have children."""
+    """Return the condition with a population of two that live for one step, and have children."""
     short = condition.on.model_copy(update={"steps": 1})
     neat = condition.neat.model_copy(update={"population": 2, "generations": 2})
     return condition.model_copy(update={"on": short, "neat": neat})
@@ -197,7 +197,7 @@ def run_replicates(condition: Condition, first_replicate: int, n_runs: int) -> p
 
 
 def frame_of(condition: Condition, first_replicate: int, rows: RunRows) -> pl.DataFrame:
-    """The rows of runs as a frame with the columns of the records."""
+    """Return the rows of runs as a frame with the columns of the records."""
     n_runs, n_generations, n = rows.fitness.shape
     total = n_runs * n_generations * n
     n_cells = condition.arena.arena().grid.n_cells
@@ -261,7 +261,7 @@ def frame_of(condition: Condition, first_replicate: int, rows: RunRows) -> pl.Da
 
 
 def _partners(condition: Condition, genomes: pl.Series, first_replicate: int, n_runs: int) -> pl.Series:
-    """The genomes of the other robots of each trial, shape (n,) of lists."""
+    """Return the genomes of the other robots of each trial, shape (n,) of lists."""
     n, n_robots = condition.neat.population, condition.arena.robots
     which = np.concatenate(
         [

@@ -113,7 +113,7 @@ class _Staged:
         self.teams = np.empty((0, rules.population, self.arena.n_robots), np.int32)
 
     def carry_out(self, first_replicate: int, n_runs: int, rows: RunRows, first_row: int) -> bool:
-        """A block of runs from the first generation to the last; whether all genomes found room."""
+        """Return a block of runs from the first generation to the last; whether all genomes found room."""
         neat, rules, block = self.neat, self.rules, self.block
         key, first = np.uint64(self.condition.key), np.int64(first_replicate)
         runs, genomes, children = block.runs, block.genomes, block.children
@@ -166,7 +166,7 @@ class _Staged:
         return _Scored(*(np.concatenate(values) for values in zip(*parts, strict=True)))
 
     def _try_some(self, first: int, last: int) -> _Scored:
-        """Trials `first` up to `last` of a generation, scored by the task."""
+        """Return trials `first` up to `last` of a generation, scored by the task."""
         tried = self.trials.carry_out(
             self.block.networks,
             self.which[first:last],

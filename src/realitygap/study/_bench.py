@@ -35,7 +35,7 @@ MOST_SECONDS = 3600
 
 
 def measure_speed(seconds: float = 2.0) -> dict[str, Any]:
-    """Robot-steps and paper runs a second on this machine.
+    """Return robot-steps and paper runs a second on this machine.
 
     Args:
         seconds: Measuring time of each figure [s], after everything is compiled.
@@ -120,7 +120,7 @@ def _rate(work: Callable[[int], int], threads: int, seconds: float) -> float:
 
 
 def _fastest_rate(work: Callable[[int], int], seconds: float) -> float:
-    """Work a second of the fastest call, in time of the thread, which other programs hardly change."""
+    """Return the work a second of the fastest call, in time of the thread, which other programs hardly change."""
     work(0)
     until, fastest, call = time.perf_counter() + seconds, 0.0, 1
     while time.perf_counter() < until or not fastest:
@@ -132,7 +132,7 @@ def _fastest_rate(work: Callable[[int], int], seconds: float) -> float:
 
 
 def _trial_work(condition: Condition, n_hidden: int) -> Callable[[int], int]:
-    """Trials by the kernel alone, of networks that are decoded already."""
+    """Return trials by the kernel alone, of networks that are decoded already."""
     changes = {"population": TRIALS_PER_CALL, "start_hidden": n_hidden}
     settings = condition.neat.model_copy(update=changes)
     genomes = Population(3, 2, settings, seed=condition.seed, bias=False).ask()

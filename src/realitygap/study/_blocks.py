@@ -24,7 +24,7 @@ _LETTERS = "BCDFGHJKLMNPQRSTVWXZ"
 
 
 def blocks_of(conditions: Sequence[Condition], replicates: int, trials: TrialsSection) -> Iterator[Block]:
-    """All generations in the order in which they are driven.
+    """Yield all generations in the order in which they are driven.
 
     In order: a generation at a time, run by run, condition by condition. Shuffled: the same generation of the same
     replicate of all conditions together, so that what changes from day to day meets all conditions alike.
@@ -46,7 +46,7 @@ def blocks_of(conditions: Sequence[Condition], replicates: int, trials: TrialsSe
 def turns_of(
     generations: Block, trials: TrialsSection, *, first_sheet: int, used_codes: set[str]
 ) -> list[Turn]:
-    """The turns of all individuals of these generations."""
+    """Return the turns of all individuals of these generations."""
     places = [
         (condition, replicate, generation, individual)
         for condition, replicate, generation in generations
@@ -65,7 +65,7 @@ def turns_of(
 
 
 def _shuffled(n: int, generations: Block) -> list[int]:
-    """0 to n - 1 in an order that follows from the study's seed and the block."""
+    """Return 0 to n - 1 in an order that follows from the study's seed and the block."""
     condition, replicate, generation = generations[0]
     words = f"{condition.seed}:order:{replicate}:{generation}"
     seed = int.from_bytes(hashlib.blake2b(words.encode(), digest_size=16).digest(), "little")

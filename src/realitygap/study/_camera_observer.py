@@ -26,7 +26,7 @@ class Looking(Protocol):
     """Follows a robot, such as `LiveTrack`."""
 
     def now(self) -> float:
-        """The time of its pictures [s]."""
+        """Return the time of its pictures [s]."""
         ...
 
     def begin(self) -> None:
@@ -34,7 +34,7 @@ class Looking(Protocol):
         ...
 
     def tracked(self, until_s: float | None = None) -> Tracked:
-        """The track since then, up to a time [s] at least."""
+        """Return the track since then, up to a time [s] at least."""
         ...
 
 
@@ -87,7 +87,7 @@ class CameraObserver:
         self.beside.ready()
 
     def clock(self, robot: Robot) -> Clock:
-        """The clock by which its commands are timed."""
+        """Return the clock by which its commands are timed."""
         return self.beside.clock(robot)
 
     def place(self, plan: TrialPlan, arena: Arena, observe: Observe) -> None:
@@ -97,11 +97,11 @@ class CameraObserver:
         self._camera.begin()
 
     def battery_v(self) -> float:
-        """Voltage of the robot at the start of a trial [V]; nan if it is not known."""
+        """Return the voltage of the robot at the start of a trial [V]; nan if it is not known."""
         return self.beside.battery_v()
 
     def wheels(self) -> tuple[float, float] | None:
-        """Way of the wheels by its encoders [m]."""
+        """Return the way of the wheels by its encoders [m]."""
         return self.beside.wheels()
 
     def look(self) -> None:
@@ -128,7 +128,7 @@ class CameraObserver:
         return self._seen().between(self._times[0], self._times[-1]).cells(self._arena.grid)
 
     def score(self, arena: Arena) -> Score | None:
-        """The cells along the robot's line, and the path; None if the camera did not see it."""
+        """Return the cells along the robot's line, and the path; None if the camera did not see it."""
         if arena.grid != self._arena.grid:
             self._say(
                 f"The camera looks at the arena {self._arena.name!r}, and the trial was in {arena.name!r}."
@@ -143,7 +143,7 @@ class CameraObserver:
         return score
 
     def settle(self, plan: TrialPlan, arena: Arena, trial: TrialRecord) -> TrialRecord | None:
-        """None: the pictures are gone with the program. The person next to the robot reads so."""
+        """Return None: a person scores the trial, because its pictures are gone with the program."""
         self.beside.settle(plan, arena, replace(trial, end=str(EndReason.RUNNING)))
         return None
 
@@ -155,7 +155,7 @@ class CameraObserver:
 
 
 def seen_between(camera: Looking, first: float, last: float) -> Track:
-    """The track of a trial from one time to another [s].
+    """Return the track of a trial from one time to another [s].
 
     Raises:
         RobotError: The camera did not see all of it.

@@ -14,7 +14,7 @@ _KEYS = ("tag", "tag-size", "tag-height", "tag-at", "corner-size", "corner-inset
 
 
 def read_camera(spec: str, arena: Arena) -> tuple[str, Marks]:
-    """A camera's number or a video's file, and what to look for in its pictures.
+    """Return a camera's number or a video's file, and what to look for in its pictures.
 
     Args:
         spec: Camera, such as 0, or film.mp4?tag=10&tag-height=0.1. The options of `realitygap track` follow the
@@ -52,7 +52,7 @@ def read_camera(spec: str, arena: Arena) -> tuple[str, Marks]:
 
 
 def tag_of(text: str, size: float, height: float, at: str) -> RobotTag:
-    """The robot's tag by options: number or FAMILY:NUMBER, side [m], height [m], and AHEAD,LEFT,DEGREES.
+    """Return the robot's tag by options: number or FAMILY:NUMBER, side [m], height [m], and AHEAD,LEFT,DEGREES.
 
     Raises:
         StudyError: One of them cannot be.

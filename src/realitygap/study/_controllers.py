@@ -104,7 +104,7 @@ def _score_settings(task: Any) -> dict[str, Any]:
 
 
 def recorded_controllers(target: str) -> list[tuple[Controller, int]]:
-    """The controllers of a target of recorded trials, and of how many trials of each there are at least.
+    """Return the controllers of a target of recorded trials, and of how many trials of each there are at least.
 
     Args:
         target: Name of the target. Only recorded targets have controllers.
@@ -189,14 +189,14 @@ def _column_of(condition: Condition) -> str:
 
 
 def _best_of_runs(condition: Condition, rows: pl.DataFrame) -> Iterator[dict[str, Any]]:
-    """The first of the best in each run."""
+    """Return the first of the best in each run."""
     column = _column_of(condition)
     best = rows.filter(pl.col(column) == pl.col(column).max().over("replicate"))
     return best.unique("replicate", keep="first", maintain_order=True).iter_rows(named=True)
 
 
 def _with_fresh_scores(champions: list[_Champion]) -> list[Controller]:
-    """Champions tried again on fresh noise; those that a robot drove are as they are."""
+    """Return champions tried again on fresh noise; those that a robot drove are as they are."""
     found: list[Controller] = []
     for champion in champions:
         controller, condition, row = champion.controller, champion.condition, champion.row

@@ -39,7 +39,7 @@ class Executor(Protocol):
     """Computes chunks and publishes them in a folder whose lock the caller holds."""
 
     def facts(self) -> dict[str, Any]:
-        """Facts for the log: names and numbers, as JSON values."""
+        """Return facts for the log: names and numbers, as JSON values."""
 
     def prepare(self, conditions: Sequence[Condition]) -> None:
         """Do what is done once for these conditions and not counted as computing."""
@@ -59,7 +59,7 @@ class Threads:
         self._n = n
 
     def facts(self) -> dict[str, Any]:
-        """Their number."""
+        """Return the number of threads."""
         return {"threads": self._n}
 
     def prepare(self, conditions: Sequence[Condition]) -> None:

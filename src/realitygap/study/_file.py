@@ -171,7 +171,7 @@ def _refuse_other_files(data: dict[str, Any], origin: str) -> None:
 
 
 def _randomized(study: Study, randomize: str) -> Study:
-    """The study with robots of calibrations drawn, or not."""
+    """Return the study with robots of calibrations drawn, or not."""
     if randomize not in ("no", "posterior"):
         raise StudyError(f"randomize is {randomize!r}, expected no or posterior.")
 
@@ -301,7 +301,7 @@ def _check_section(section: str, values: dict[str, Any], place: str, problems: P
 
 
 def _laid_over(section: str, below: dict[str, Any], above: dict[str, Any]) -> dict[str, Any]:
-    """A section of a condition over that of the study: key by key, and numbers by name; another task has its own."""
+    """Return a section of a condition over that of the study: key by key, and numbers by name, but for another task."""
     if section == "task" and any(
         above.get(key, below.get(key)) != below.get(key) for key in ("kind", "source")
     ):

@@ -21,7 +21,7 @@ CLASSES = {
 
 
 def load_dask_jobqueue() -> Any:
-    """The module dask_jobqueue, whose import would have Ctrl-C end the process without a word."""
+    """Return the module dask_jobqueue, whose import would have Ctrl-C end the process without a word."""
     handler = signal.getsignal(signal.SIGINT)
     import dask_jobqueue
 
@@ -79,7 +79,7 @@ class JobQueue:
         return system, int(jobs) if colon else None
 
     def client(self) -> Any:
-        """A client of its scheduler."""
+        """Return a client of its scheduler."""
         from distributed import Client
 
         return Client(self._cluster, set_as_default=False)

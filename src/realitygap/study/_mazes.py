@@ -83,7 +83,7 @@ def measure_maze(
 
 
 def summarize_maze_runs(runs: Sequence[MazeRun], limit: int) -> dict[str, Any]:
-    """The figures of runs of one reward, an unsolved one counted as the limit."""
+    """Return the figures of runs of one reward, an unsolved one counted as the limit."""
     evaluations = [run.evaluations if run.solved else limit for run in runs]
     return {
         "solved": sum(run.solved for run in runs),
@@ -103,7 +103,7 @@ def _run_all(
     threads: int,
     tell: Callable[[Progress], None] | None,
 ) -> list[MazeRun]:
-    """All runs, those for novelty first, on threads."""
+    """Return all runs, those for novelty first, on threads."""
     trials, over = MazeTrials(load_arena(maze.name)), threading.Event()
 
     def compile_kernels() -> None:

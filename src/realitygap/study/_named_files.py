@@ -54,7 +54,7 @@ def _read_task(task: dict[str, Any], folder: Path, problems: Problems) -> None:
 
 
 def _tables(data: dict[str, Any]) -> Iterator[dict[str, Any]]:
-    """The study itself, and its conditions."""
+    """Yield the study itself, and its conditions."""
     yield data
     conditions = data.get("condition")
     for condition in conditions if isinstance(conditions, list) else []:
@@ -63,7 +63,7 @@ def _tables(data: dict[str, Any]) -> Iterator[dict[str, Any]]:
 
 
 def _platforms_in(data: dict[str, Any]) -> list[type[Platform]]:
-    """The platforms of realitygap, and those of other packages that the study names."""
+    """Return the platforms of realitygap, and those of other packages that the study names."""
     tables = data.get("platform")
     named = set(tables) if isinstance(tables, dict) else set()
     named |= {split_spec(str(table.get("platform")))[0] for table in _tables(data)}

@@ -42,7 +42,7 @@ CARRY_OUT = f"__import__({__name__!r}, fromlist=['carry_out_order']).carry_out_o
 
 
 def make_order(task: ChunkTask, inbox: Path) -> dict[str, Any]:
-    """The order for a chunk that is to be delivered to `inbox`."""
+    """Return the order for a chunk that is to be delivered to `inbox`."""
     condition = task.condition
     return {
         "software": software(),

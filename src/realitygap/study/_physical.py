@@ -160,7 +160,7 @@ class PhysicalStudy:
         self._ledger.plan(planned, turns)
 
     def _individuals(self, condition: Condition, replicate: int) -> list[Individual]:
-        """The generation that is due, bred from the scores so far."""
+        """Return the generation that is due, bred from the scores so far."""
         rules = condition.neat_rules
         return [
             Individual(
@@ -230,7 +230,7 @@ class PhysicalStudy:
     def _scores(
         self, condition: Condition, trials: Sequence[int], cells: Sequence[Sequence[int]]
     ) -> list[float]:
-        """The scores of trials by the condition's task; coverage is that of the counted cells."""
+        """Return the scores of trials by the condition's task; coverage is that of the counted cells."""
         arena = condition.arena.arena()
         if condition.coverage is not None:
             return [len(set(each)) / arena.grid.n_cells for each in cells]
@@ -243,7 +243,7 @@ class PhysicalStudy:
     # trials
 
     def _trials(self, generations: Sequence[tuple[Condition, int, int]]) -> list[Trial]:
-        """Trials of these generations that are not void, in the order of their turns."""
+        """Return trials of these generations that are not void, in the order of their turns."""
         found = [
             trial
             for condition, replicate, generation in generations

@@ -42,7 +42,7 @@ class Problems:
             self.lines.append(line)
 
     def table(self, place: str, value: Any) -> dict[str, Any]:
-        """The value as a table; a mistake and an empty table when it is none."""
+        """Return the value as a table; a mistake and an empty table when it is none."""
         if isinstance(value, Mapping):
             return dict(value)
         self.add(place, f"expected a table, got {shown(value)}.")
@@ -51,7 +51,7 @@ class Problems:
     def check(
         self, model: type[M], values: Mapping[str, Any], place: str, *, is_part: bool = False
     ) -> M | None:
-        """The values as a model; None after noting every mistake in them, of a part all but what is missing."""
+        """Return the values as a model; None after noting every mistake in them, of a part all but what is missing."""
         try:
             return model.model_validate(dict(values), strict=True)
         except ValidationError as error:

@@ -59,7 +59,7 @@ PRESSED = ((0.0, 0.0, 0.0, 2.5), (0.2, 0.0, -0.1, 0.03))
 
 
 def measure_realism(seconds: float = 2.0) -> dict[str, Any]:
-    """Robot-steps a second of one core, with everything that `sim` has for a Scribbler.
+    """Return robot-steps a second of one core, with everything that `sim` has for a Scribbler.
 
     Outline of ten corners and their radius, contact `slide`, three infrared sensors with their mixture of noise,
     a drive with lag, delay and noise; every number of robot and drive is different in each trial. Steps of
@@ -199,7 +199,7 @@ def _outline(numbers: dict[str, float]) -> list[tuple[float, float]]:
 
 
 def _spread(numbers: dict[str, float]) -> dict[str, NDArray[np.float64]]:
-    """Every number but those of walls, differently for each trial."""
+    """Return every number but those of walls, differently for each trial."""
     rng = np.random.default_rng(1)
     spread = {}
     for name, value in numbers.items():

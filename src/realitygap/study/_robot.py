@@ -30,7 +30,7 @@ def connect_robot(port: str, arena: Arena | None = None) -> OpenRobot:
 
 
 def default_operator(port: str) -> Operator:
-    """The witness of an emulator in this program.
+    """Return the witness of an emulator in this program.
 
     Raises:
         StudyError: Another port, whose robot needs a person who places it and scores its trials.

@@ -278,7 +278,7 @@ def machine_facts() -> dict[str, Any]:
 
 
 def processor_name() -> str:
-    """The processor's name, as far as the system tells."""
+    """Return the processor's name, as far as the system tells."""
     info = Path("/proc/cpuinfo")
     if info.exists():
         for line in info.read_text(errors="replace").splitlines():
@@ -411,7 +411,7 @@ class _Counter:
 
 
 def _chunks(study: Study, missing: dict[str, list[range]], chunk: int | None) -> Iterator[ChunkTask]:
-    """The chunks to compute."""
+    """Yield the chunks to compute."""
     for condition in study.conditions:
         if condition.is_physical:
             continue

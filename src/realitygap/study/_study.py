@@ -160,7 +160,7 @@ class Study(Settings, ShownAsCard):
         return sum(condition.is_physical for condition in self.conditions)
 
     def description(self) -> dict[str, Any]:
-        """The study as the folder of results keeps it (`study.json`)."""
+        """Return the study as the folder of results keeps it (`study.json`)."""
         return {
             "name": self.about.name,
             "title": self.about.title or self.about.name,

@@ -69,7 +69,7 @@ def measure_task(
 def task_settings(
     task: str, settings: str = "default", changes: Mapping[str, Any] | None = None
 ) -> NeatSettings:
-    """The settings that NEAT has in a classical task: of a named set, of the task, and changed.
+    """Return the settings that NEAT has in a classical task: of a named set, of the task, and changed.
 
     Raises:
         StudyError: No such task or set, or a setting that cannot be.
@@ -85,7 +85,7 @@ def task_settings(
 def checked_settings(
     settings: str, own: Mapping[str, Any], changes: Mapping[str, Any] | None
 ) -> NeatSettings:
-    """NEAT's settings of a named set, of a task, and changed.
+    """Return NEAT's settings of a named set, of a task, and changed.
 
     Raises:
         StudyError: No such set, or a setting that cannot be.
@@ -102,7 +102,7 @@ def checked_settings(
 
 
 def summarize_runs(task: ClassicalTask, settings: str, runs: Sequence[TaskRun]) -> dict[str, Any]:
-    """The figures of `measure_task` for these runs."""
+    """Return the figures of `measure_task` for these runs."""
     solvers = [run for run in runs if run.solved]
     evaluations = [run.evaluations for run in solvers]
     figures: dict[str, Any] = {
@@ -141,7 +141,7 @@ def _run_all(
     threads: int,
     tell: Callable[[Progress], None] | None,
 ) -> list[TaskRun]:
-    """All runs, on threads, in the order of their replicates."""
+    """Return all runs, on threads, in the order of their replicates."""
 
     def compile_kernels() -> None:
         run_task(task, settings.model_copy(update={"population": 2, "generations": 1}), seed, 0)

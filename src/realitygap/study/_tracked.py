@@ -64,7 +64,7 @@ class TrackedTrial:
 
 
 def trial_of_ledger(folder: str | Path, number: int) -> TrialToTrack:
-    """A driven trial of a study, with its commands step by step.
+    """Return a driven trial of a study, with its commands step by step.
 
     Raises:
         StudyError: It was not driven, or has no commands.
@@ -113,7 +113,7 @@ def _times(began: Floats) -> Floats:
 
 
 def trial_of_file(path: str | Path, number: int) -> TrialToTrack:
-    """A trial of a file of observed trials, the last one with its number.
+    """Return a trial of a file of observed trials, the last one with its number.
 
     Raises:
         StudyError: There is none with this number.
@@ -199,7 +199,7 @@ def score_tracked(
 
 
 def note_of_track(camera: str, found: Tracked, placed: TrackedTrial) -> str:
-    """The note that goes into a ledger with what a camera saw of a trial.
+    """Return the note that goes into a ledger with what a camera saw of a trial.
 
     Args:
         camera: Number of the camera, or file of the video.

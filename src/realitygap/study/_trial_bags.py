@@ -49,7 +49,7 @@ def export_trials(
 
 
 def _driven(source: Path) -> list[int]:
-    """The numbers of all trials that were driven."""
+    """Return the numbers of all trials that were driven."""
     if source.is_dir():
         if not (source / LEDGER_NAME).exists():
             raise StudyError(
@@ -67,7 +67,7 @@ def _driven(source: Path) -> list[int]:
 
 
 def _trial(source: Path, number: int) -> TrialToTrack:
-    """A trial with the times of a robot, and with the poses that the ledger has of it."""
+    """Return a trial with the times of a robot, and with the poses that the ledger has of it."""
     if source.is_dir():
         found = trial_of_ledger(source, number)
         with Ledger.open(source / LEDGER_NAME, writable=False) as ledger:

@@ -93,7 +93,7 @@ def _opened(folder: Path) -> Iterator[int | None]:
 
 
 def _path(digest: str) -> str | Path:
-    """The answer's name in the opened folder; its whole path on Windows."""
+    """Return the answer's name in the opened folder; its whole path on Windows."""
     return digest if _HAS_OWNERS else answers_folder() / digest
 
 

@@ -26,7 +26,7 @@ TASKS: dict[str, type[Settings]] = {
 
 
 def task_model(values: Mapping[str, Any]) -> type[Settings]:
-    """The settings that a table [task] has.
+    """Return the settings that a table [task] has.
 
     Raises:
         ValueError: There is no task of this kind.

@@ -116,5 +116,5 @@ def _last(arrays: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
 
 
 def _cells_at_ends(poses: NDArray[np.float64], arena: Arena) -> int:
-    """The number of cells in which the robot stood at its start and after each command."""
+    """Return the number of cells in which the robot stood at its start and after each command."""
     return len({arena.grid.cell_at(float(x), float(y)) for x, y, _ in poses} - {None})

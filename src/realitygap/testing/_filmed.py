@@ -66,7 +66,7 @@ class FilmedCamera:
     uneven: float = 0.35
 
     def camera(self, arena: Arena) -> Camera:
-        """The true one, which a tracker has to find."""
+        """Return the true one, which a tracker has to find."""
         walls = np.array(arena.walls).reshape(-1, 2)
         middle = (walls.min(axis=0) + walls.max(axis=0)) / 2
         place = np.array([*(middle + self.beside), self.above])
@@ -138,7 +138,7 @@ class Film:
         self._noise = rng.standard_normal((8, *self.size[::-1]), np.float32) * self.filmed.noise
 
     def _plane(self, z: float) -> NDArray[np.float32]:
-        """(FINE height, FINE width, 2) what point at height z each part of a pixel shows [m]."""
+        """Return (FINE height, FINE width, 2) what point at height z each part of a pixel shows [m]."""
         from scipy.interpolate import RectBivariateSpline
 
         x = np.arange(-COARSE, self.filmed.width + 2.0 * COARSE, COARSE)
@@ -151,7 +151,7 @@ class Film:
         return np.stack(fine, axis=-1).astype(np.float32)
 
     def _background(self) -> NDArray[np.float32]:
-        """(FINE height, FINE width, 3) the empty arena."""
+        """Return (FINE height, FINE width, 3) the empty arena."""
         x, y = self._floor[..., 0], self._floor[..., 1]
         walls = np.array(self.arena.walls).reshape(-1, 2)
         low, high = walls.min(axis=0), walls.max(axis=0)
@@ -180,7 +180,7 @@ class Film:
         return image
 
     def times(self) -> Floats:
-        """Times of the pictures that arrive, (t,) [s]."""
+        """Return times of the pictures that arrive, (t,) [s]."""
         all_of_them = np.arange(int(self.duration_s * self.rate)) / self.rate
         arrives = np.random.default_rng([self.seed, 1]).random(len(all_of_them)) >= self.lost
         arrives[:5] = True
@@ -191,7 +191,7 @@ class Film:
         return np.array([self.path(float(time)) for time in times], np.float64)
 
     def __iter__(self) -> Iterator[tuple[float, Image]]:
-        """Time [s] and picture."""
+        """Yield the time [s] and picture."""
         for k, time in enumerate(self.times()):
             yield float(time), self.picture(float(time), k)
 
@@ -222,7 +222,7 @@ class Film:
         return blurred
 
     def _with_robot(self, poses: Floats) -> tuple[NDArray[np.float32], slice, slice]:
-        """The part of the fine picture around the robot, as it looks on the mean of poses."""
+        """Return the part of the fine picture around the robot, as it looks on the mean of poses."""
         middle = poses[len(poses) // 2]
         reach = 0.16
         around = middle[:2] + reach * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
@@ -263,14 +263,14 @@ class Film:
 
 
 def _coarse(fine: NDArray[np.float32]) -> NDArray[np.float32]:
-    """The pixels of a fine picture."""
+    """Return the pixels of a fine picture."""
     h, w = fine.shape[0] // FINE, fine.shape[1] // FINE
     means: NDArray[np.float32] = fine.reshape(h, FINE, w, FINE, 3).mean(axis=(1, 3))
     return means
 
 
 def _texture(family: str, number: int) -> NDArray[np.float32]:
-    """A tag with its white border, finely, as seen upright."""
+    """Return a tag with its white border, finely, as seen upright."""
     bits = tag_bits(family, number).astype(np.float32)
     side = 24 * len(bits)
     big = np.kron(bits, np.ones((24, 24), np.float32))

@@ -72,7 +72,7 @@ class _Check:
         return found
 
     def settings(self) -> list[str]:
-        """Settings have a name and survive JSON."""
+        """Check that settings have a name and survive JSON."""
         values = self.platform.identified().model_dump_json()
         if type(self.platform).model_validate_json(values).model_dump_json() != values:
             return [
@@ -81,7 +81,7 @@ class _Check:
         return []
 
     def description(self) -> list[str]:
-        """Figures and messages have what they need."""
+        """Check that figures and messages have what they need."""
         platform, found = self.platform, []
         if not platform.name.isidentifier():
             found.append(f"Its name is {platform.name!r}, expected letters, digits and underscores.")
@@ -94,7 +94,7 @@ class _Check:
         return found
 
     def robot(self) -> list[str]:
-        """A robot that is driven step by step."""
+        """Return a robot that is driven step by step."""
         robot = self.platform.open_robot(self.arena)
         found = [] if hasattr(robot, "pose") else ["Its robot has no `pose`, or the platform is physical."]
         if robot.label != self.platform.label:
@@ -123,7 +123,7 @@ class _Check:
         return found
 
     def target(self) -> list[str]:
-        """Trials one by one."""
+        """Check trials one by one."""
         plans = [TrialPlan(genome=genome, steps=STEPS, number=k) for k, genome in enumerate(self.genomes)]
         how = Opening(self.platform.name)
         with self.platform.open(self.arena, how) as target:
@@ -144,7 +144,7 @@ class _Check:
         return found
 
     def batch(self) -> list[str]:
-        """Many trials in one call agree with trials one by one."""
+        """Check that many trials in one call agree with trials one by one."""
         rules, bias_value = self.genomes[0].rules, self.genomes[0].bias_value
         short = self.platform.model_copy(update={"steps": STEPS})
         trials = short.prepare(
@@ -164,7 +164,7 @@ class _Check:
         return []
 
     def fleet(self) -> list[str]:
-        """Several robots that are driven together."""
+        """Check several robots that are driven together."""
         fleet = self.platform.fleet(self.arena, ("obstacle", "stall", "time"), 0.0, 2)
         try:
             fleet.start(NoiseKey(1))

@@ -41,7 +41,7 @@ class Difficulty:
 
 
 def to_linear(color: ArrayLike) -> Floats:
-    """Reflectance of sRGB values 0..255."""
+    """Return the reflectance of sRGB values 0..255."""
     value = np.asarray(color, np.float32) / 255
     return np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4).astype(np.float32)
 
@@ -55,7 +55,7 @@ def ink_colors(names: Sequence[str], rng: np.random.Generator, spread: float) ->
 
 
 def resampled(path: NDArray[np.float64], spacing: float = 0.001) -> NDArray[np.float64]:
-    """Points on a path about this far from each other [m]."""
+    """Return points on a path about this far from each other [m]."""
     length = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
     at = np.linspace(0, length[-1], max(2, round(length[-1] / spacing) + 1))
     return np.column_stack([np.interp(at, length, path[:, k]) for k in range(2)])

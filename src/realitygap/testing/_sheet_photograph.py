@@ -41,7 +41,7 @@ def photograph_sheet(
     *,
     has_key: bool = True,
 ) -> SheetPhotograph:
-    """A photograph of a sheet on which pens drew these paths.
+    """Return a photograph of a sheet on which pens drew these paths.
 
     Args:
         layout: Layout of the sheet. Its pens draw the paths, in their order.
@@ -97,7 +97,7 @@ def draw_sheet(
 
 
 def take_photograph(paper: Floats, layout: SheetLayout, rng: np.random.Generator, hard: Difficulty) -> bytes:
-    """The JPEG file of a photograph of this sheet, as from a phone held over it."""
+    """Return the JPEG file of a photograph of this sheet, as from a phone held over it."""
     import cv2
 
     size = SIZES[int(rng.integers(len(SIZES)))]
@@ -114,7 +114,7 @@ def take_photograph(paper: Floats, layout: SheetLayout, rng: np.random.Generator
 
 
 def _table(rng: np.random.Generator) -> tuple[float, float, float]:
-    """Reflectance of the table or floor."""
+    """Return the reflectance of the table or floor."""
     dark = rng.uniform(0.05, 0.6)
     return dark, dark * rng.uniform(0.7, 1.0), dark * rng.uniform(0.45, 1.0)
 
@@ -122,7 +122,7 @@ def _table(rng: np.random.Generator) -> tuple[float, float, float]:
 def _seen_from(
     layout: SheetLayout, size: tuple[int, int], rng: np.random.Generator, hard: Difficulty
 ) -> tuple[Floats, Floats]:
-    """Column and row of the texture at each pixel of the photograph."""
+    """Return the column and row of the texture at each pixel of the photograph."""
     width, height = size
     left, lower, right, upper = layout.paper
     corners = np.array([(left, lower), (right, lower), (right, upper), (left, upper)])

@@ -24,7 +24,7 @@ BY_HAND = (
 def driven_paths(
     seed: int, arena: Arena, *, generations: int = 5, steps: int = 100
 ) -> list[list[NDArray[np.float64]]]:
-    """The paths of each generation of one evolution on `sim`, selected by coverage, from starts as hands put a robot.
+    """Return the paths of each generation of an evolution on `sim` for coverage, from starts as hands put a robot.
 
     Args:
         seed: Seed of the evolution and of the robot's noise.

@@ -78,7 +78,7 @@ class TrialBatch:
         )
 
     def behavior(self, k: int) -> NDArray[np.uint8]:
-        """The cells that trial k visited along its line, in order of first visit."""
+        """Return the cells that trial k visited along its line, in order of first visit."""
         return self.cells[k, : self.n_line[k]]
 
 
@@ -287,7 +287,7 @@ class PlatformTrials(Protocol):
         ends: bool = False,
         trace: bool = False,
     ) -> Tried:
-        """Trial k is one of network `which[k]` with the random numbers of `counters[k]`.
+        """Try networks: trial k is of network `which[k]`, with the random numbers of `counters[k]`.
 
         Args:
             networks: Networks, at least one.

@@ -128,7 +128,7 @@ def _kept(plan: TrialPlan, robot: Robot, driven: TrialRecord, looks: _Looks) -> 
 
 
 def _with_what_is_seen(trial: TrialRecord, observe: Observe, observer: Observer) -> TrialRecord:
-    """A trial with what the observer saw of it."""
+    """Return a trial with what the observer saw of it."""
     poses = observer.poses()[: len(trial.commands) + 1] if observe == "track" else np.empty((0, 3))
     cells = observer.cells() if sees(observe, "cells") else ()
     return replace(trial, cells=tuple(sorted(set(cells))), poses=poses)

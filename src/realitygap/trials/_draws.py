@@ -51,7 +51,7 @@ def _block_of(name: str) -> np.uint32:
 
 
 def _counters(counters: NDArray[np.uint32], per: str) -> NDArray[np.uint32]:
-    """The words of the counter for draws that hold for a trial, a run or the study."""
+    """Return the words of the counter for draws that hold for a trial, a run or the study."""
     words = np.zeros_like(counters)
     if per == "trial":
         words[:] = counters

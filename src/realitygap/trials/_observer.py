@@ -19,11 +19,11 @@ class Observer(Protocol):
     """Sees a trial from outside; asked only for what is to be observed."""
 
     def battery_v(self) -> float:
-        """Voltage of the robot at the start of a trial [V]; nan if it is not known."""
+        """Return the voltage of the robot at the start of a trial [V]; nan if it is not known."""
         ...
 
     def wheels(self) -> tuple[float, float] | None:
-        """Way of the left and the right wheel since the start of the trial, by encoders [m]; None: it has none."""
+        """Return the distance of both wheels since the start of the trial, by encoders [m]; None if it has none."""
         ...
 
     def look(self) -> None:
@@ -35,7 +35,7 @@ class Observer(Protocol):
         ...
 
     def cells(self) -> tuple[int, ...]:
-        """The cells that were crossed, in any order."""
+        """Return the cells that were crossed, in any order."""
         ...
 
 
@@ -75,7 +75,7 @@ class PortObserver(Observer, Protocol):
         ...
 
     def clock(self, robot: Robot) -> Clock:
-        """The clock by which commands of the robot that was met are timed."""
+        """Return the clock by which commands of the robot that was met are timed."""
         ...
 
     def place(self, plan: TrialPlan, arena: Arena, observe: Observe) -> None:
@@ -87,7 +87,7 @@ class PortObserver(Observer, Protocol):
         ...
 
     def score(self, arena: Arena) -> Score | None:
-        """The score of the trial that has just ended; None if a person has to count it."""
+        """Return the score of the trial that has just ended; None if a person has to count it."""
         ...
 
     def settle(self, plan: TrialPlan, arena: Arena, trial: TrialRecord) -> TrialRecord | None:
@@ -107,12 +107,12 @@ class RobotObserver:
         self._poses: list[tuple[float, float, float]] = []
 
     def battery_v(self) -> float:
-        """Battery voltage [V]; nan if the simulation has none."""
+        """Return the battery voltage [V]; nan if the simulation has none."""
         self._poses = []
         return float(getattr(self._robot, "battery_v", float("nan")))
 
     def wheels(self) -> tuple[float, float] | None:
-        """Way of the wheels by its encoders [m]."""
+        """Return the way of the wheels by its encoders [m]."""
         try:
             left, right = self._robot.encoders
         except (AttributeError, RobotError):

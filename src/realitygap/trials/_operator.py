@@ -125,7 +125,7 @@ class Operator:
         return ()
 
     def close(self, cards: Sequence[Card]) -> Sequence[int]:
-        """Numbers of trials whose scores are taken back before a generation is closed; none closes it."""
+        """Return numbers of trials whose scores are taken back before a generation is closed; none closes it."""
         return ()
 
     def lead(self, plan: TrialPlan, number: int, n: int) -> Led:
@@ -133,12 +133,12 @@ class Operator:
         return "go"
 
     def measure(self, plan: TrialPlan, trial: TrialRecord) -> TrialRecord | None:
-        """The trial with what a person measured of it; None has it driven again."""
+        """Return the trial with what a person measured of it; None has it driven again."""
         return trial
 
 
 def trial_seed(card: Card) -> int:
-    """The 32-bit seed of an emulated trial's sensor noise; another attempt has the same."""
+    """Return the 32-bit seed of an emulated trial's sensor noise; another attempt has the same."""
     trial = card.trial
     text = f"{card.key}:{trial.replicate}:{trial.generation}:{trial.individual}"
     return int.from_bytes(hashlib.blake2b(text.encode(), digest_size=4).digest(), "little")

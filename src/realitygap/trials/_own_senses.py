@@ -33,11 +33,11 @@ class OwnSenses:
         self._zero = None
 
     def battery_v(self) -> float:
-        """Voltage of its battery [V]; nan if it does not measure it."""
+        """Return the voltage of its battery [V]; nan if it does not measure it."""
         return float(self._robot.volts()) if hasattr(self._robot, "volts") else math.nan
 
     def wheels(self) -> tuple[float, float] | None:
-        """Distance of the left and right wheel since the start of the trial, for the end that is ahead [m]."""
+        """Return the distance of both wheels since the start of the trial, for the end that is ahead [m]."""
         if not self.has_encoders:
             return None
         left, right = self._robot.wheels()

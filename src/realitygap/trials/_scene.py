@@ -136,7 +136,7 @@ def _check_ending(out: Path) -> None:
 
 
 def _as_arrays(case: Case) -> kernel.Scene:
-    """The case as the kernel takes it."""
+    """Return the case as the kernel takes it."""
     robots = case.robots
     devices = [_all_sensors(robot.devices) for robot in robots]
     sensors = [sensor for robot in devices for sensor in robot]
@@ -185,7 +185,7 @@ def _edges(body: CaseBody) -> list[tuple[float, float, float, float]]:
 
 
 def _all_sensors(devices: list[CaseDevice]) -> list[tuple[list[float], int, float]]:
-    """Mount, kind for the kernel and maximum range [m] of each sensor of a robot, in order."""
+    """Return the mount, kind for the kernel and maximum range [m] of each sensor of a robot, in order."""
     return [
         (mount, _sensor_kind(device), device.max_range) for device in devices for mount in device.geometry
     ]

@@ -55,10 +55,10 @@ class SheetObserver(OwnSenses):
         self.observes = "encoders" if self.has_encoders else "cells"
 
     def ready(self) -> None:
-        """Nothing: a person has put it there."""
+        """Do nothing, because a person has put it there."""
 
     def clock(self, robot: Robot) -> Clock:
-        """The robot's own."""
+        """Return the robot's own clock."""
         clock: Clock = robot.clock  # type: ignore[attr-defined]  # of a robot on a port
         return clock
 
@@ -73,7 +73,7 @@ class SheetObserver(OwnSenses):
         """Do nothing, because the robot's pose is unknown."""
 
     def poses(self) -> NDArray[np.float64]:
-        """None."""
+        """Return no poses."""
         return np.empty((0, 3))
 
     def cells(self) -> tuple[int, ...]:
@@ -85,11 +85,11 @@ class SheetObserver(OwnSenses):
         return ()
 
     def score(self, arena: Arena) -> Score | None:
-        """None: a person looks at the sheet later."""
+        """Return None, because a person looks at the sheet later."""
         return None
 
     def settle(self, plan: TrialPlan, arena: Arena, trial: TrialRecord) -> TrialRecord | None:
-        """The trial with its cells, if its robot had driven and the person counts it; None: it is void."""
+        """Return the trial with its cells, if its robot had driven and the person counts it; None: it is void."""
         has_driven = trial.end == EndReason.DRIVEN
         what = f"The program ended in trial {trial.number} ({trial.purpose})"
         told = (

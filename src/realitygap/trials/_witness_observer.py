@@ -81,7 +81,7 @@ class WitnessObserver(OwnSenses):
         self.witness.place(PREFLIGHT_POSE if arena.grid == paper_arena().grid else arena.start, 0)
 
     def clock(self, robot: Robot) -> Clock:
-        """The robot's own; that of an emulator in another program is held from now on, if it can be."""
+        """Return the robot's own clock. That of an emulator in another program is held from now on, if possible."""
         clock: Clock = robot.clock  # type: ignore[attr-defined]  # of a robot on a port
         speed = None if self._is_own else self.witness.hold()  # type: ignore[attr-defined]  # those that are served can
         return clock if speed is None else WitnessClock(self.witness, clock, speed)
@@ -108,7 +108,7 @@ class WitnessObserver(OwnSenses):
         return poses
 
     def cells(self) -> tuple[int, ...]:
-        """Cells along the driven line."""
+        """Return cells along the driven line."""
         return self.witness.cells()
 
     def settle(self, plan: TrialPlan, arena: Arena, trial: TrialRecord) -> TrialRecord | None:
@@ -116,7 +116,7 @@ class WitnessObserver(OwnSenses):
         return None
 
     def score(self, arena: Arena) -> Score:
-        """The cells along the driven line, and the path."""
+        """Return the cells along the driven line, and the path."""
         rows = np.arange(len(self._times), dtype=np.float64)
         within = np.interp(np.arange((len(rows) - 1) * PATH_PARTS + 1) / PATH_PARTS, rows, self._times)
         cells = self.witness.cells()
@@ -143,7 +143,7 @@ class WitnessClock:
         self._witness, self._real, self._speed = witness, real, speed
 
     def now(self) -> float:
-        """The emulator's time [s]."""
+        """Return the emulator's time [s]."""
         return self._witness.now()
 
     def sleep(self, seconds: float) -> None:

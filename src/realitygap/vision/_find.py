@@ -123,7 +123,7 @@ def rectify(image: NDArray[np.uint8], sheet: Sheet, px_per_m: float) -> NDArray[
 
 
 def _shrunk(image: NDArray[np.uint8], sheet: Sheet, px_per_m: float) -> NDArray[np.uint8]:
-    """The photograph with about as many pixels as are asked for, so that none is skipped."""
+    """Return the photograph with about as many pixels as are asked for, so that none is skipped."""
     cv2 = from_extra("cv2", "vision")
     left, lower, right, upper = sheet.layout.walls
     corners = sheet.to_photograph(np.array([(left, lower), (right, lower), (right, upper), (left, upper)]))
@@ -196,7 +196,7 @@ def _fitted(view: View, here: Floats, there: Floats, lines: GridOffsets | None) 
 
 
 def _px_per_m(view: View, points: Floats) -> float:
-    """Pixels of the photograph a meter, over the sheet."""
+    """Return pixels of the photograph a meter, over the sheet."""
     low, high = points.min(axis=0), points.max(axis=0)
     return float(np.hypot(*(view(high) - view(low))) / np.hypot(*(high - low)))
 

@@ -165,7 +165,7 @@ def _is_outlier(offsets: Floats) -> NDArray[np.bool_]:
 
 
 def _smooth(offsets: Floats) -> Floats:
-    """The offsets without holes and with less noise: weighted means of those around."""
+    """Return the offsets without holes and with less noise: weighted means of those around."""
     from scipy.ndimage import gaussian_filter
 
     is_known = np.isfinite(offsets)
@@ -182,7 +182,7 @@ def _smooth(offsets: Floats) -> Floats:
 
 
 def _between(table: Floats, column: Floats, row: Floats) -> Floats:
-    """Values of a table between its entries, and those of its edge beyond."""
+    """Return values of a table between its entries, and those of its edge beyond."""
     from scipy.ndimage import map_coordinates
 
     places = np.stack([np.ravel(row), np.ravel(column)])

@@ -61,7 +61,7 @@ def _paper(light: Floats, px_per_m: float) -> Floats:
 
 
 def _closed(light: Floats, size: float) -> Floats:
-    """The light with everything dark and narrower than this many pixels filled."""
+    """Return the light with everything dark and narrower than this many pixels filled."""
     cv2 = from_extra("cv2", "vision")
     odd = 2 * round(size / 2) + 1
     kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (odd, odd))

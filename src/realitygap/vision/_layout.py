@@ -78,7 +78,7 @@ class SheetLayout:
 
     @classmethod
     def of(cls, arena: Arena, pens: Sequence[str] = PEN_NAMES) -> SheetLayout:
-        """The sheet of an arena.
+        """Return the sheet of an arena.
 
         Raises:
             ValueError: Its tags would not fit.
@@ -115,7 +115,7 @@ class SheetLayout:
         return np.array([square + lower_left for lower_left in lowers])
 
     def key_boxes(self) -> list[Box]:
-        """The box of each pen, in their order: eight below the cells, eight above; of further pens there is none."""
+        """Return the box of each pen in order: eight below the cells, eight above, and none for further pens."""
         tags = self.tag_corners()
         left, right = tags[0, 1, 0] + 2 * KEY_GAP, tags[1, 0, 0] - 2 * KEY_GAP
         n = min(len(self.pens), KEYS_A_STRIP)
@@ -130,7 +130,7 @@ class SheetLayout:
         return boxes
 
     def grid_lines(self) -> list[tuple[Literal["x", "y"], float, float, float]]:
-        """Lines of the grid: which coordinate stays, its value, and between which values the other goes [m]."""
+        """Return lines of the grid: which coordinate stays, its value, and between which values the other goes [m]."""
         grid = self.grid
         right, upper = grid.x + grid.columns * grid.cell, grid.y + grid.rows * grid.cell
         upright = [("x", grid.x + k * grid.cell, grid.y, upper) for k in range(grid.columns + 1)]
@@ -182,7 +182,7 @@ def _outline(box: Box, gray: float, width: float) -> list[Mark]:
 
 
 def _tag_marks(number: int, left: float, lower: float) -> list[Mark]:
-    """The black parts of a tag, row by row."""
+    """Return the black parts of a tag, row by row."""
     is_black = ~tag_bits(CORNER_FAMILY, number)
     size = CORNER_SIZE_M / len(is_black)
     marks = []

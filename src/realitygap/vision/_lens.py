@@ -53,7 +53,7 @@ class View:
         return cls(homography, float(numbers[8]), float(numbers[9]), width, height)
 
     def numbers(self) -> Floats:
-        """Numbers that a fit varies, each of a size about 1, (10,)."""
+        """Return numbers that a fit varies, each of a size about 1, (10,)."""
         scale = np.hypot(self.width, self.height)
         h = self.homography / self.homography[2, 2] / np.array([[scale], [scale], [1.0]])
         return np.append(h.ravel()[:8], [self.k1, self.k2])

@@ -48,7 +48,7 @@ class Search:
     total: NDArray[np.float64]
 
     def way(self, edge: int) -> NDArray[np.int64]:
-        """Places of the points of a link, from stretch to stretch."""
+        """Return places of the points of a link, from stretch to stretch."""
         ends = _back(self.before, int(self.rows[edge])), _back(self.before, int(self.columns[edge]))
         return np.asarray(self.nodes[ends[0][::-1] + ends[1]])
 
@@ -98,7 +98,7 @@ Edge = tuple[int, int, float, int]
 def _pruned(
     edges: list[Edge], lengths: NDArray[np.float64], root: int
 ) -> tuple[NDArray[np.bool_], list[Edge]]:
-    """The stretches that are worth the links to the rest, and the links between these.
+    """Return the stretches that are worth the links to the rest, and the links between these.
 
     A link is worth it where all that lies beyond it, less what the links there cost, is worth more.
 
@@ -132,7 +132,7 @@ def _pruned(
 
 
 def _outwards(first: int, neighbors: dict[int, list[tuple[int, Edge]]]) -> list[tuple[int, int, Edge]]:
-    """The stretches of a tree from one of them on: each with that before it, and the link between the two."""
+    """Return the stretches of a tree from one of them on: each with that before it, and the link between the two."""
     order = [(first, 0, (0, 0, 0.0, 0))]
     seen = {first}
     for stretch, _, _ in order:
@@ -160,7 +160,7 @@ def _search(stretches: NDArray[np.int32], costs: Floats) -> Search:
 
 
 def _tree(search: Search, n: int) -> list[Edge]:
-    """The shortest tree over n stretches."""
+    """Return the shortest tree over n stretches."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import minimum_spanning_tree
 
@@ -187,7 +187,7 @@ def _closing(
     *,
     is_bare: bool,
 ) -> tuple[list[NDArray[np.int64]], NDArray[np.int64]]:
-    """Links between ends of a trace that lead to each other under other ink, and the ends left; each has one at most.
+    """Return links between ends of a trace that meet under other ink, and the ends left; each has one at most.
 
     The trace's own points cost at least as much as a crossing; otherwise, each link would go back along the trace. If
     no visible line of the trace begins at the start, a hidden one may. Then the start is an end like others, from which
@@ -268,7 +268,7 @@ def _times_met(trace: NDArray[np.bool_], middle: tuple[int, int]) -> int:
 
 
 def _graph(costs: Floats) -> tuple[Any, NDArray[np.int64]]:
-    """Points through which a trace can go, joined to their eight neighbors, and their places."""
+    """Return points through which a trace can go, joined to their eight neighbors, and their places."""
     from scipy.sparse import coo_matrix
 
     is_open = np.isfinite(costs)

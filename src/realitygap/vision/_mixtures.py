@@ -34,7 +34,7 @@ TOGETHER = 20_000  # places that are weighed at a time
 
 @cache
 def ink_sets(n_pens: int) -> tuple[tuple[int, ...], ...]:
-    """All sets of one, two and three pens."""
+    """Return all sets of one, two and three pens."""
     return tuple(pens for count in (1, 2, 3) for pens in itertools.combinations(range(n_pens), count))
 
 

@@ -18,7 +18,7 @@ WIDTH_IN = 7.0  # of a panel
 
 
 def overlay_png(score: SheetScore, titles: dict[int, str] | None = None) -> bytes:
-    """A PNG picture: the sheet from straight above, and a panel for each pen with its trace and cells.
+    """Return a PNG picture: the sheet from straight above, and a panel for each pen with its trace and cells.
 
     Cells that a trace crosses are shaded; those less than 90 % sure, crossed or not, have a thick border and their
     probability.

@@ -184,7 +184,7 @@ LEAST_TRIED = 8e-6
 
 
 def _named(pen: str) -> Floats:
-    """The density of a full stroke of a pen by its name.
+    """Return the density of a full stroke of a pen by its name.
 
     Raises:
         SheetError: It is no color.

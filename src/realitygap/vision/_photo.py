@@ -108,7 +108,7 @@ def _hint(data: bytes) -> str:
 
 
 def is_gray(image: NDArray[np.uint8]) -> bool:
-    """Whether a picture (h, w, 3) has no colors."""
+    """Return whether a picture (h, w, 3) has no colors."""
     some = image[::7, ::7].astype(np.int16)
     return bool((some.max(axis=2) - some.min(axis=2)).max() <= GRAY_SPREAD)
 
@@ -143,5 +143,5 @@ def photo_bytes(photo: str | Path | bytes) -> bytes:
 
 
 def photo_hash(data: bytes) -> str:
-    """The SHA-256 of a photograph's file, by which a ledger knows it."""
+    """Return the SHA-256 of a photograph's file, by which a ledger knows it."""
     return hashlib.sha256(data).hexdigest()

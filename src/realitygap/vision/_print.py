@@ -41,7 +41,7 @@ class Tile:
 
 
 def sheet_tiles(layout: SheetLayout, paper: str) -> list[Tile]:
-    """The pages that make up a sheet, the upper left one first.
+    """Return the pages that make up a sheet, the upper left one first.
 
     Raises:
         SheetError: There is no such paper.
@@ -73,7 +73,7 @@ def _usable(side: float) -> float:
 
 
 def sheet_pdf(layout: SheetLayout, paper: str = "a4") -> bytes:
-    """The PDF of a sheet, to be printed at 100 %.
+    """Return the PDF of a sheet, to be printed at 100 %.
 
     Args:
         layout: Layout to print.
@@ -126,7 +126,7 @@ def _page(layout: SheetLayout, marks: list[Mark], tile: Tile, paper: str, tiles:
 
 
 def _draw(axes: Axes, marks: list[Mark], labels: list[Label], box: Box | None) -> None:
-    """Marks and labels, as far as they lie in a box."""
+    """Draw marks and labels, as far as they lie in a box."""
     from matplotlib.collections import LineCollection, PatchCollection
     from matplotlib.patches import Rectangle
 

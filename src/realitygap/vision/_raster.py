@@ -16,7 +16,7 @@ SUB = 4  # fractional bits of OpenCV's drawing coordinates
 
 
 def shape_of(box: Box, px_per_m: float) -> tuple[int, int]:
-    """Rows and columns of a picture of this box."""
+    """Return rows and columns of a picture of this box."""
     return round((box[3] - box[1]) * px_per_m), round((box[2] - box[0]) * px_per_m)
 
 

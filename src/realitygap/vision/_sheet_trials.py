@@ -35,7 +35,7 @@ def trials_on_sheet(
     sheet: int | None = None,
     role: ScoreRole = "score",
 ) -> SheetTrials:
-    """The trials on a sheet that wait for their cells.
+    """Return the trials on a sheet that wait for their cells.
 
     Args:
         ledger: Ledger of the study.

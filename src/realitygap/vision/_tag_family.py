@@ -28,7 +28,7 @@ FAMILIES = {
 
 @cache
 def dictionary(family: str) -> Any:
-    """OpenCV's dictionary of a family.
+    """Return OpenCV's dictionary of a family.
 
     Raises:
         MissingExtraError: OpenCV is not installed.

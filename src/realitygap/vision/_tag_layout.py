@@ -60,7 +60,7 @@ class RobotTag:
             raise ValueError(f"family is {self.family!r}, expected one of {', '.join(FAMILIES)}.")
 
     def corners(self) -> Floats:
-        """Upper left, upper right, lower right and lower left corner of its square, about its middle, (4, 2) [m].
+        """Return the upper left, upper right, lower right and lower left corner, about its middle, (4, 2) [m].
 
         Its upper edge is towards +x.
         """
@@ -69,7 +69,7 @@ class RobotTag:
 
 
 def bounds(arena: Arena) -> Box:
-    """Left, lower, right and upper end of an arena's walls [m]."""
+    """Return left, lower, right and upper end of an arena's walls [m]."""
     walls = np.array(arena.walls, np.float64).reshape(-1, 2, 2)
     (left, lower), (right, upper) = walls.min(axis=(0, 1)), walls.max(axis=(0, 1))
     return float(left), float(lower), float(right), float(upper)
@@ -78,7 +78,7 @@ def bounds(arena: Arena) -> Box:
 def corner_tags(
     arena: Arena, size: float = CORNER_SIZE_M, inset: float | None = None
 ) -> Mapping[int, Floats]:
-    """The corners of the four tags at an arena's corners, upright for who looks with +y up.
+    """Return the corners of the four tags at an arena's corners, upright for who looks with +y up.
 
     By default, they are as on the sheet of `realitygap print-sheet`: in the ring around the reachable cells if that is
     wide enough, otherwise just outside the walls.

@@ -61,7 +61,7 @@ def _with_border(size: float) -> float:
 
 
 def _page(width: float, height: float) -> tuple[Figure, Any]:
-    """A sheet whose units are meters, from its lower left."""
+    """Return a sheet whose units are meters, from its lower left."""
     page, axes = blank_page(width, height)
     _ruler(axes, width)
     return page, axes
@@ -78,7 +78,7 @@ def _ruler(axes: Any, width: float) -> None:
 
 
 def _tag(axes: Any, family: str, number: int, x: float, y: float, size: float) -> None:
-    """A tag about x, y [m], upright, with a line to cut along."""
+    """Draw a tag about x, y [m], upright, with a line to cut along."""
     from matplotlib.patches import Rectangle
 
     bits = tag_bits(family, number)

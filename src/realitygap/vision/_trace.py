@@ -160,7 +160,7 @@ def _pooled(maps: PenMaps, pen: int) -> tuple[Floats, Floats, Floats, Floats]:
 
 
 def _highest(part: Floats, pool: int) -> Floats:
-    """The highest of each pool x pool values."""
+    """Return the highest of each pool x pool values."""
     rows, columns = part.shape[0] // pool, part.shape[1] // pool
     corners = [
         part[i : i + rows * pool : pool, k : k + columns * pool : pool]
@@ -173,7 +173,7 @@ def _highest(part: Floats, pool: int) -> Floats:
 def _stretches(
     is_own: NDArray[np.bool_], presence: Floats
 ) -> tuple[NDArray[np.int32], int, NDArray[np.float64]]:
-    """Connected stretches of a color, numbered from 1, and the length of each [m]; entry 0 is what is none."""
+    """Return connected stretches of a color, numbered from 1, and the length of each [m]; entry 0 is what is none."""
     from scipy import ndimage
 
     near = ndimage.binary_dilation(is_own, np.ones((3, 3), np.bool_))
@@ -206,7 +206,7 @@ def _costs(presence: Floats, hidden: Floats, strength: Floats) -> Floats:
 
 
 def _nearest_ink(costs: Floats, row: int, column: int) -> tuple[int, int]:
-    """The point nearest to the start through which a trace can go."""
+    """Return the point nearest to the start through which a trace can go."""
     rows, columns = np.nonzero(np.isfinite(costs))
     nearest = int(np.argmin((rows - row) ** 2 + (columns - column) ** 2))
     return int(rows[nearest]), int(columns[nearest])

@@ -29,7 +29,7 @@ class Pose(NamedTuple):
     heading: float
 
     def point(self, ahead: float, left: float) -> tuple[float, float]:
-        """The place in the arena of a point of the robot [m]."""
+        """Return the place in the arena of a point of the robot [m]."""
         sine, cosine = math.sin(self.heading), math.cos(self.heading)
         return self.x + ahead * cosine - left * sine, self.y + ahead * sine + left * cosine
 
@@ -59,7 +59,7 @@ class Grid:
         return self.columns * self.rows
 
     def cell_at(self, x: float, y: float) -> int | None:
-        """The number of the cell that a point [m] lies in, columns * row + column; None outside of the grid."""
+        """Return the number of the cell that a point [m] lies in, columns * row + column; None outside of the grid."""
         column, row = int((x - self.x) // self.cell), int((y - self.y) // self.cell)
         if 0 <= column < self.columns and 0 <= row < self.rows:
             return self.columns * row + column
@@ -133,7 +133,7 @@ class Arena:
         return self.segments
 
     def to_dict(self) -> dict[str, Any]:
-        """The arena as plain values; of what may be there, only what is."""
+        """Return the arena as plain values; of what may be there, only what is."""
         values: dict[str, Any] = {
             "name": self.name, "walls": self.walls, "grid": asdict(self.grid), "start": tuple(self.start)
         }  # fmt: skip
@@ -152,7 +152,7 @@ class Arena:
         return values
 
     def numbers(self) -> dict[str, float | Distribution]:
-        """Every number that may be drawn, by its dotted name: "arena.start.x" and so on."""
+        """Return every number that may be drawn, by its dotted name: "arena.start.x" and so on."""
         return {PREFIX + name: value for name, value in self._file().numbers().items()}
 
     def with_numbers(self, values: Mapping[str, float | Distribution | Mapping[str, Any]]) -> Arena:
@@ -183,7 +183,7 @@ class Arena:
         return self._file().to_toml()
 
     def _file(self) -> ArenaFile:
-        """The arena in the form of a file."""
+        """Return the arena in the form of a file."""
         return ArenaFile(
             name=self.name,
             wall=[list(wall) for wall in self.walls],
@@ -219,7 +219,7 @@ class Arena:
 
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> Arena:
-        """The arena that `to_dict` described."""
+        """Return the arena that `to_dict` described."""
         obstacles = (
             Obstacle(**{**each, "corners": tuple((x, y) for x, y in each["corners"])})
             for each in values.get("obstacles", ())
@@ -239,7 +239,7 @@ class Arena:
 
 
 def paper_arena(start: Pose | None = None) -> Arena:
-    """The paper's arena: 42 x 24 in inside wooden blocks, cells of 3 in, the inner 12 x 6 reachable.
+    """Return the paper's arena: 42 x 24 in inside wooden blocks, cells of 3 in, the inner 12 x 6 reachable.
 
     Args:
         start: Start of trials, which the paper does not give. Default: (0.1905, 0.1905) m, the center of cell (1, 1),

@@ -29,7 +29,7 @@ NO_LENGTHS = ("heading", "strength", "columns", "rows", "per")
 
 
 def in_meters(values: Mapping[str, Any]) -> dict[str, Any]:
-    """The values of a file in meters and radians: what `unit` says of all lengths, and what keys end in.
+    """Return the values of a file in meters and radians: what `unit` says of all lengths, and what keys end in.
 
     Raises:
         ValueError: There is no such unit, or a number has another one.
@@ -61,7 +61,7 @@ def _refuse_other_units(value: Any, unit: object) -> None:
 
 
 def _scaled(value: Any, scale: float, key: str) -> Any:
-    """A value with all lengths in it times `scale`; the third number of a start is a heading."""
+    """Return a value with all lengths in it times `scale`; the third number of a start is a heading."""
     if key in NO_LENGTHS or isinstance(value, bool):
         return value
     if isinstance(value, int | float):

@@ -187,7 +187,7 @@ class Calibration(Settings, ShownAsCard):
         return max((len(values) for values in self.draws.values()), default=0)
 
     def to_toml(self) -> str:
-        """The file that keeps it; `load_calibration` reads it."""
+        """Return the file that keeps it; `load_calibration` reads it."""
         values = self.model_dump()
         tables = [(name, values.pop(name)) for name in ("numbers", "draws", "evidence")]
         parts = [_HEAD + toml_table(values)]

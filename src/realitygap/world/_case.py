@@ -74,7 +74,7 @@ Positive = Annotated[float, Field(gt=0.0)]
 
 
 def _one_of(what: str, names: Collection[str]) -> AfterValidator:
-    """A check that a text is one of the known names."""
+    """Return a check that a text is one of the known names."""
 
     def check(name: str) -> str:
         if name not in names:
@@ -111,7 +111,7 @@ class CaseWorld(_Part):
     segments: list[Row4] = []
 
     def lines(self) -> list[list[float]]:
-        """All walls, x1, y1, x2, y2 [m]: four of each box, and the single ones."""
+        """Return all walls, x1, y1, x2, y2 [m]: four of each box, and the single ones."""
         if not self.boxes and not self.walls:
             return self.segments
         lines = []
@@ -242,7 +242,7 @@ class Case(_Part):
 
     @classmethod
     def from_dict(cls, data: object, *, source: str = "the case") -> Case:
-        """The case that `data`, a parsed JSON object, describes.
+        """Return the case that `data`, a parsed JSON object, describes.
 
         Args:
             data: The object; keys as in the introduction of this module.
@@ -275,7 +275,7 @@ class Case(_Part):
 
     @classmethod
     def read(cls, path: Path) -> Case:
-        """The case in a JSON file.
+        """Return the case in a JSON file.
 
         Raises:
             CaseError: The file cannot be read, is not JSON, or is no case.
@@ -283,12 +283,12 @@ class Case(_Part):
         return cls.from_dict(_read_json(path), source=str(path))
 
     def to_dict(self) -> dict[str, Any]:
-        """The whole case, defaults included, in a form that `from_dict` and JSON take."""
+        """Return the whole case, defaults included, in a form that `from_dict` and JSON take."""
         return self.model_dump(by_alias=True, exclude_none=True)
 
 
 def _read_json(path: Path) -> object:
-    """The value in a JSON file; a key given twice is a mistake, like everything that is not JSON."""
+    """Return the value in a JSON file; a key given twice is a mistake, like everything that is not JSON."""
     try:
         text = read_file(path, MOST_JSON_BYTES).decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -324,7 +324,7 @@ def _without_doubles(pairs: list[tuple[str, object]]) -> dict[str, object]:
 
 
 def _misspelt(data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    """Unknown keys that look like one that is not given, by the place of the key that was meant."""
+    """Yield unknown keys that look like one that is not given, by the place of the key that was meant."""
     for path, part, model in _parts(data):
         known = {field.alias or name for name, field in model.model_fields.items()}
         open_keys = known - set(part)
@@ -340,7 +340,7 @@ def _misspelt(data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
 
 
 def _parts(data: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any], type[_Part]]]:
-    """All objects of a case that are objects, with their place and what they should be."""
+    """Yield all objects of a case that are objects, with their place and what they should be."""
     yield "", data, Case
     if isinstance(data.get("world"), Mapping):
         yield "world", data["world"], CaseWorld

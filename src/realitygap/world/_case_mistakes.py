@@ -59,7 +59,7 @@ def shown(value: object) -> str:
 
 
 def place_of(loc: tuple[int | str, ...]) -> str:
-    """A place in the file: robots[0].start.heading."""
+    """Return a place in the file, such as robots[0].start.heading."""
     path = ""
     for part in loc:
         path += f"[{part}]" if isinstance(part, int) else f".{part}" if path else part
@@ -94,7 +94,7 @@ def listed(source: str, mistakes: Mapping[str, str]) -> str:
 
 
 def objects(value: object) -> list[tuple[int, Mapping[str, Any]]]:
-    """The entries of a list that are objects, with their index; nothing when it is no list."""
+    """Return the entries of a list that are objects, with their index; nothing when it is no list."""
     if not isinstance(value, list):
         return []
     return [(i, entry) for i, entry in enumerate(value) if isinstance(entry, Mapping)]

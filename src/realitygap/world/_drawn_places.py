@@ -47,7 +47,7 @@ def check_drawn_starts(arena: Arena, robot: Body | RobotModel) -> None:
 
 
 def _rows(words: dict[str, str]) -> Iterator[dict[str, float]]:
-    """Uniform random numbers by the word that numbers are drawn by: the ends of the start, then draws of all."""
+    """Yield uniform random numbers by the word that numbers are drawn by: the ends of the start, then draws of all."""
     every = list(dict.fromkeys(words.values()))
     ends = list(dict.fromkeys(word for name, word in words.items() if name.startswith(START)))
     for corner in itertools.product((0.0, TOP), repeat=len(ends)):

@@ -36,7 +36,7 @@ class FloorImage:
 
     @classmethod
     def of(cls, x: float, y: float, width: float, gray: NDArray[np.uint8]) -> FloorImage:
-        """The image of (rows, columns) bytes, 0 black to 255 white, the top row first."""
+        """Return the image of (rows, columns) bytes, 0 black to 255 white, the top row first."""
         rows, columns = gray.shape
         packed = base64.b85encode(zlib.compress(np.ascontiguousarray(gray, np.uint8).tobytes(), 9))
         return cls(x, y, width, columns, rows, packed.decode())
@@ -98,7 +98,7 @@ class Floor:
 
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> Floor:
-        """The floor that `to_dict` described."""
+        """Return the floor that `to_dict` described."""
         tape = tuple((x1, y1, x2, y2) for x1, y1, x2, y2 in values.get("tape", ()))
         image = FloorImage(**values["image"]) if "image" in values else None
         return cls(tape, values.get("tape_width", TAPE_WIDTH), image)

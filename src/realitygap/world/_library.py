@@ -41,7 +41,7 @@ def robot_names() -> list[str]:
 
 
 def load_robot(robot: str | Path) -> RobotModel:
-    """A robot by name, or from a TOML file.
+    """Return a robot by name, or from a TOML file.
 
     Args:
         robot: One of `robot_names`, or the path of a file.
@@ -54,7 +54,7 @@ def load_robot(robot: str | Path) -> RobotModel:
 
 
 def _robot_values(robot: str | Path, chain: list[str]) -> tuple[dict[str, Any], str]:
-    """The values of a robot's file laid over those of the robot it builds on, and what to call it."""
+    """Return the values of a robot's file laid over those of the robot it builds on, and what to call it."""
     below, addition = _taken_apart(str(robot))
     if addition:
         file = resources.files(__package__) / "robots" / "additions" / f"{addition}.toml"
@@ -115,7 +115,7 @@ def _as_calibration(values: Mapping[str, Any], origin: str) -> Calibration:
 
 
 def _calibrated(calibration: Calibration, origin: str, chain: list[str]) -> dict[str, Any]:
-    """The values of the robot that a calibration builds on, with its numbers."""
+    """Return the values of the robot that a calibration builds on, with its numbers."""
     below, _ = _robot_values(calibration.robot, chain)
     model = _checked(origin, lambda: RobotModel(**below).with_numbers(calibration.numbers))
     said = f"{Path(origin).name}: {calibration.kind} of {calibration.target}, {calibration.date}"
@@ -125,7 +125,7 @@ def _calibrated(calibration: Calibration, origin: str, chain: list[str]) -> dict
 
 
 def _with_base(values: dict[str, Any], origin: str, chain: list[str]) -> dict[str, Any]:
-    """The values of a robot laid over those of its base."""
+    """Return the values of a robot laid over those of its base."""
     base, turned = values.pop("base", None), values.pop("turned", False)
     if base is None and not turned:
         return values
@@ -149,7 +149,7 @@ def _beside(robot: str, origin: str) -> str | Path:
 
 
 def _taken_apart(name: str) -> tuple[str, str]:
-    """The robot and the addition that a name is made of, such as scribbler-s2 and fluke2; no addition otherwise."""
+    """Return the robot and the addition in a name, such as scribbler-s2 and fluke2; no addition otherwise."""
     rest, _, last = name.rpartition("-")
     is_made = last in (*BOARDS, CARDBOARD) and name in robot_names()
     return (rest, last) if is_made else (name, "")
@@ -160,7 +160,7 @@ def _texts(value: Any) -> list[Any]:
 
 
 def _values_of(file: Traversable, origin: str) -> dict[str, Any]:
-    """The values of a robot's file in SI units, what [each.KIND] says put into every entry of that kind.
+    """Return the values of a robot's file in SI units, what [each.KIND] says put into every entry of that kind.
 
     `each` stays for those kinds of which only the robot's base has entries.
     """
@@ -198,7 +198,7 @@ def _laid_over(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, 
 
 
 def _turned(values: Mapping[str, Any], origin: str) -> dict[str, Any]:
-    """The values of a robot turned half round: its back is ahead, and its left wheel the right one."""
+    """Return the values of a robot turned half round: its back is ahead, and its left wheel the right one."""
     model = _checked(origin, lambda: RobotModel(**values))
     if model.vary:
         raise DescriptionError(
@@ -230,7 +230,7 @@ def arena_names() -> list[str]:
 
 
 def load_arena(arena: str | Path) -> Arena:
-    """An arena by name, or from a TOML or SVG file.
+    """Return an arena by name, or from a TOML or SVG file.
 
     Args:
         arena: One of `arena_names`, or the path of a file.
@@ -257,7 +257,7 @@ def load_arena(arena: str | Path) -> Arena:
 
 
 def _in_present_words(values: dict[str, Any]) -> dict[str, Any]:
-    """The values of an emulator's scene file of 0.1 in the words of arena files: its walls, lamps, tape and start."""
+    """Return an emulator's scene file of 0.1 as the values of an arena file: its walls, lamps, tape and start."""
     values = dict(values)
     if "walls" in values and "wall" not in values:
         values["wall"] = values.pop("walls")
@@ -292,7 +292,7 @@ def _read_image(values: dict[str, Any], origin: str) -> None:
 
 
 def _gray(path: Path, origin: str) -> NDArray[np.uint8]:
-    """The brightness of an image file."""
+    """Return the brightness of an image file."""
     try:
         with open_image(path, MOST_PIXELS) as picture:
             return np.asarray(picture.convert("L"), dtype=np.uint8)
@@ -303,7 +303,7 @@ def _gray(path: Path, origin: str) -> NDArray[np.uint8]:
 
 
 def read_toml(file: Traversable, origin: str) -> dict[str, Any]:
-    """The values of a TOML file.
+    """Return the values of a TOML file.
 
     Raises:
         DescriptionError: It cannot be read, is too large, or is no TOML.
@@ -316,7 +316,7 @@ def read_toml(file: Traversable, origin: str) -> dict[str, Any]:
 
 
 def read_text(file: Traversable, origin: str) -> str:
-    """The text of a file of sensible size."""
+    """Return the text of a file of sensible size."""
     try:
         with file.open("rb") as stream:
             data = stream.read(MOST_TOML_BYTES + 1)
@@ -340,7 +340,7 @@ def _names(folder: str) -> list[str]:
 
 
 def _find(what: str, known: list[str], name: str | Path) -> tuple[Traversable, str]:
-    """The file of that name or path, and what to call it in messages."""
+    """Return the file of that name or path, and what to call it in messages."""
     if not isinstance(name, str | Path):
         raise TypeError(f"{what} is {name!r}, expected the name of one, or the path of its file.")
     if str(name) in known:

@@ -113,7 +113,7 @@ class Described(Settings):
         return f"{name}: no number of this name. {did_you_mean(name, known)}"
 
     def numbers(self) -> dict[str, float | Distribution]:
-        """Every number by its dotted name, in the order of the description."""
+        """Return every number by its dotted name, in the order of the description."""
         return {name: self.vary.get(name, value) for name, (value, _) in _walk(self)}
 
     def limits(self) -> dict[str, Limits]:
@@ -157,7 +157,7 @@ class Described(Settings):
         return made
 
     def to_dict(self) -> dict[str, Any]:
-        """The description as plain values; `from_dict` makes it again."""
+        """Return the description as plain values; `from_dict` makes it again."""
         values = self.model_dump(mode="json", exclude={"vary"})
         return values | (
             {"vary": {name: drawn.to_dict() for name, drawn in self.vary.items()}} if self.vary else {}
@@ -165,7 +165,7 @@ class Described(Settings):
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Self:
-        """The description that `to_dict` made plain.
+        """Return the description that `to_dict` made plain.
 
         Raises:
             ValueError: It is none; every mistake with its place.
@@ -185,7 +185,7 @@ def _distribution(place: str, values: Mapping[str, Any]) -> Distribution:
 
 
 def _walk(model: Settings, place: str = "") -> Iterator[tuple[str, tuple[float, Limits]]]:
-    """Every number with its dotted name and limits."""
+    """Yield every number with its dotted name and limits."""
     for key, field in type(model).model_fields.items():
         value = getattr(model, key)
         if NUMBER in field.metadata:
@@ -221,7 +221,7 @@ def _limits(metadata: list[Any]) -> Limits:
 
 
 def _limited(name: str, drawn: Distribution, limits: Limits) -> Distribution:
-    """A distribution that keeps a number's limits; a normal one is cut there.
+    """Return a distribution that keeps a number's limits; a normal one is cut there.
 
     Raises:
         ValueError: It does not.
@@ -260,7 +260,7 @@ def _set(tree: Any, path: list[str], value: Any) -> None:
 
 
 def in_si(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Values of a file with the units that keys end in taken away: track_mm = 153 becomes track = 0.153.
+    """Return values of a file with the units that keys end in taken away: track_mm = 153 becomes track = 0.153.
 
     Raises:
         ValueError: A number is given twice, in two units, or an angle in a unit of lengths, or the other way round.
@@ -308,7 +308,7 @@ def _converted(value: Any, unit: str) -> Any:
 def _split(
     values: Mapping[str, Any], model: type[BaseModel]
 ) -> tuple[dict[str, Any], dict[str, Distribution]]:
-    """Values with every distribution replaced by its center, and the distributions by dotted name.
+    """Return values with every distribution replaced by its center, and the distributions by dotted name.
 
     One in the place of what is the same in all trials stays, and its field says what it expects.
 

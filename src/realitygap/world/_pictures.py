@@ -80,7 +80,7 @@ def arena_picture(
 
 
 def _model_shapes(model: RobotModel, pose: Pose) -> list[Shape]:
-    """A robot of a file at a pose: its rays, cut off at the size of its body, and its outline."""
+    """Return a robot of a file at a pose: its rays, cut off at the size of its body, and its outline."""
     shapes: list[Shape] = []
     for sensor in model.range:
         x, y = pose.point(sensor.x, sensor.y)
@@ -106,7 +106,7 @@ def extent_of(arena: Arena) -> tuple[float, float, float, float]:
 
 
 def _cells(arena: Arena) -> list[Shape]:
-    """The reachable cells, lightly filled unless there is something on the floor."""
+    """Return the reachable cells, lightly filled unless there is something on the floor."""
     grid = arena.grid
     right, top = grid.x + grid.columns * grid.cell, grid.y + grid.rows * grid.cell
     corners = ((grid.x, grid.y), (right, grid.y), (right, top), (grid.x, top))
@@ -145,19 +145,19 @@ def _arena_in_words(arena: Arena, width: float, height: float) -> str:
 
 
 def things_in(arena: Arena) -> list[Shape]:
-    """Obstacles, lights and the goal."""
+    """Return obstacles, lights and the goal."""
     shapes = [shape for obstacle in arena.obstacles for shape in obstacle_shapes(obstacle)]
     shapes += [shape for light in arena.lights for shape in light_shapes(light)]
     return shapes + (goal_shapes(arena.goal) if arena.goal is not None else [])
 
 
 def obstacle_shapes(obstacle: Obstacle) -> list[Shape]:
-    """An obstacle from above."""
+    """Return an obstacle from above."""
     return [Line(obstacle.outline(), Ink.TEXT, 1.6, closed=True, fill=Ink.RULE)]
 
 
 def light_shapes(light: Light) -> list[Shape]:
-    """A light from above, and how strong it is."""
+    """Return a light from above, and how strong it is."""
     shapes: list[Shape] = [
         Disc(light.x, light.y, radius, color=None, fill=fill)
         for radius, fill in ((9.0, LIGHT_GLOW), (5.5, LIGHT_GLOW), (4.0, LIGHT))
@@ -166,7 +166,7 @@ def light_shapes(light: Light) -> list[Shape]:
 
 
 def goal_shapes(goal: Goal) -> list[Shape]:
-    """The goal from above."""
+    """Return the goal from above."""
     rim = tuple(
         (goal.x + goal.radius * math.cos(k * math.pi / 24), goal.y + goal.radius * math.sin(k * math.pi / 24))
         for k in range(48)
@@ -198,7 +198,7 @@ def floor_shapes(floor: Floor) -> list[Shape]:
 
 
 def _image_shapes(image: FloorImage) -> list[Shape]:
-    """Runs of like brightness, row by row."""
+    """Return runs of like brightness, row by row."""
     step = max(1, math.ceil(max(image.columns, image.rows) / MOST_DRAWN))
     gray = image.gray[::step, ::step] // GRAYS * GRAYS
     pixel = image.width / image.columns * step
@@ -220,7 +220,7 @@ def _image_shapes(image: FloorImage) -> list[Shape]:
 
 
 def robot_picture(name: str, body: Body, sensors: RangeSensors) -> Picture:
-    """A robot from above, facing right: outline, center, rays as far as they see, and its dimensions."""
+    """Return a robot from above, facing right: outline, center, rays as far as they see, and its dimensions."""
     forwards, lefts = zip(*body.corners, strict=True)
     back, front, low, high = min(forwards), max(forwards), min(lefts), max(lefts)
     here = Pose(0.0, 0.0, 0.0)

@@ -82,7 +82,7 @@ def is_inside(arena: Arena, x: float, y: float) -> bool:
 
 
 def enclosing_walls(walls: Sequence[Segment]) -> list[Segment]:
-    """The walls that make closed rounds: what is left after taking away those with a loose end, again and again."""
+    """Return the walls that make closed rounds: those with a loose end are taken away, again and again."""
     left = list(walls)
     while True:
         counts = Counter(end for wall in left for end in _ends(wall))
@@ -107,7 +107,7 @@ def _is_within(walls: Sequence[Segment], x: float, y: float) -> bool:
 
 
 def _outlines(robot: Body | RobotModel, pose: Pose) -> Iterator[tuple[Point, ...]]:
-    """The outlines of a robot at a pose, each convex [m]."""
+    """Yield the outlines of a robot at a pose, each convex [m]."""
     parts = [robot.corners] if isinstance(robot, Body) else [part.outline() for part in robot.body]
     for part in parts:
         yield tuple(pose.point(*corner) for corner in part)

@@ -97,7 +97,7 @@ def _ratio(functions: tuple[tuple[float, ...], tuple[float, ...]], r: Floats) ->
 
 
 def logarithm(x: NDArray[np.float64] | np.float64) -> Floats:
-    """Natural logarithm of positive numbers, within 4e-16 relative to the larger of it and 1."""
+    """Return the natural logarithm of positive numbers, within 4e-16 relative to the larger of it and 1."""
     mantissa, power = np.frexp(np.asarray(x, dtype=np.float64))
     small = mantissa < np.sqrt(0.5)
     mantissa, power = np.where(small, 2 * mantissa, mantissa), power - small
@@ -110,7 +110,7 @@ def logarithm(x: NDArray[np.float64] | np.float64) -> Floats:
 
 
 def exponential(x: NDArray[np.float64] | np.float64) -> Floats:
-    """Euler's number to the power of numbers of moderate size (|x| < 700), within 1e-15 relative."""
+    """Return Euler's number to the power of numbers of moderate size (|x| < 700), within 1e-15 relative."""
     x = np.asarray(x, dtype=np.float64)
     power = np.floor(x / (LN2_HIGH + LN2_LOW) + 0.5)
     r = (x - power * LN2_HIGH) - power * LN2_LOW
@@ -121,7 +121,7 @@ def exponential(x: NDArray[np.float64] | np.float64) -> Floats:
 
 
 def normal_quantile(u: Floats) -> Floats:
-    """Standard normal numbers whose cumulated probability is u, within 1e-14 relative.
+    """Return the standard normal numbers whose cumulated probability is u, within 1e-14 relative.
 
     Args:
         u: Any shape, 0 <= u < 1.

@@ -360,7 +360,7 @@ class RobotModel(Described):
     looks: Looks = Looks()
 
     def to_dict(self) -> dict[str, Any]:
-        """The robot as plain values without its prose, which decides nothing; `from_dict` makes it again."""
+        """Return the robot as plain values without its prose, which decides nothing; `from_dict` makes it again."""
         return {
             key: value for key, value in super().to_dict().items() if key not in ("description", "sources")
         }

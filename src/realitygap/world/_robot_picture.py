@@ -24,7 +24,7 @@ SHELL = "#eef0f3"
 
 @picture_of.register(RobotModel)
 def model_picture(model: RobotModel) -> Picture:
-    """A robot from above, facing right: outline, wheels, sensors and their reach, dimensions, sources.
+    """Return a robot from above, facing right: outline, wheels, sensors and their reach, dimensions, sources.
 
     Args:
         model: The robot; of numbers that are drawn, the centers.
@@ -57,7 +57,7 @@ def model_picture(model: RobotModel) -> Picture:
 
 
 def _size(model: RobotModel) -> float:
-    """Length or width of the body, whichever is more [m]."""
+    """Return the length or width of the body, whichever is more [m]."""
     xs, ys = zip(*(point for part in model.body for point in part.outline()), strict=True)
     return float(max(max(xs) - min(xs), max(ys) - min(ys)))
 
@@ -204,12 +204,12 @@ def _marks(model: RobotModel) -> list[Shape]:
 
 
 def _point_sensors(model: RobotModel) -> list[tuple[str, Sequence[Any]]]:
-    """Sensors other than range sensors, by kind."""
+    """Return sensors other than range sensors, by kind."""
     return [(kind, getattr(model, kind)) for kind in SENSORS if kind != "range"]
 
 
 def _around(shapes: list[Shape]) -> tuple[float, float, float, float]:
-    """Left, right, bottom and top of shapes that are as large as they are drawn."""
+    """Return left, right, bottom and top of shapes that are as large as they are drawn."""
     points = [point for shape in shapes if isinstance(shape, Line) for point in shape.points]
     xs, ys = zip(*points, strict=True)
     return min(xs), max(xs), min(ys), max(ys)

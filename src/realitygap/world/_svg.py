@@ -107,7 +107,7 @@ class Shape:
 
 
 def svg_values(text: str) -> dict[str, Any]:
-    """The values of an arena file from a drawing, in meters, y upwards.
+    """Return the values of an arena file from a drawing, in meters, y upwards.
 
     Raises:
         ValueError: It is no drawing of a known size, or something in it cannot be used: everything, by name.
@@ -140,7 +140,7 @@ def svg_values(text: str) -> dict[str, Any]:
 
 
 def _root(text: str) -> ElementTree.Element:
-    """The drawing; entities, which can make a small file huge, are refused."""
+    """Return the drawing; entities, which can make a small file huge, are refused."""
     declared = text.partition("<!DOCTYPE")[2].partition(">")[0]
     if "<!ENTITY" in text or "[" in declared:
         raise ValueError("it declares entities which are not read. Save it as plain SVG")
@@ -189,7 +189,7 @@ def _to_meters(root: ElementTree.Element) -> Affine:
 
 
 def _length(text: str) -> float | None:
-    """A length with a unit [m]."""
+    """Return a length with a unit [m]."""
     found = re.fullmatch(r"\s*([-+.\deE]+?)\s*(mm|cm|in|pt|pc)\s*", text)
     numbers = _numbers(found[1]) if found else []
     return numbers[0] * UNITS[found[2]] if found and len(numbers) == 1 and numbers[0] > 0 else None
@@ -272,7 +272,7 @@ def _transform(element: ElementTree.Element) -> Affine:
 
 
 def _shape(element: ElementTree.Element, ink: Ink) -> Shape:
-    """A shape in the arena.
+    """Return a shape in the arena.
 
     Raises:
         ValueError: It cannot be used.
@@ -337,7 +337,7 @@ def _poly(element: ElementTree.Element) -> tuple[list[Point], bool, float]:
 
 
 def _path(element: ElementTree.Element) -> tuple[list[Point], bool, float]:
-    """A path of straight pieces: M, L, H, V and Z, absolute or relative."""
+    """Return a path of straight pieces: M, L, H, V and Z, absolute or relative."""
     parts = re.findall(rf"[A-Za-z]|{_NUMBER.pattern}", element.get("d", ""))
     points: list[Point] = []
     x = y = 0.0
@@ -383,7 +383,7 @@ OUTLINES: dict[str, Callable[[ElementTree.Element], tuple[list[Point], bool, flo
 
 
 def _corners(shape: Shape) -> list[Point]:
-    """The corners of a shape, each once and counter-clockwise if it is closed."""
+    """Return the corners of a shape, each once and counter-clockwise if it is closed."""
     points = [point for k, point in enumerate(shape.points) if k == 0 or point != shape.points[k - 1]]
     if not shape.closed:
         return points

@@ -13,7 +13,7 @@ DIGITS = 9
 
 
 def toml_value(value: Any) -> str:
-    """A value on one line.
+    """Return a value on one line.
 
     Args:
         value: Texts, numbers, truth values, and lists, arrays and tables of such.
@@ -46,7 +46,7 @@ def toml_key(key: str) -> str:
 
 
 def toml_table(values: Mapping[str, Any]) -> str:
-    """A table, a line for each key; a list of tables or texts has a line for each of them."""
+    """Return a table, a line for each key; a list of tables or texts has a line for each of them."""
     return "\n".join(f"{toml_key(key)} = {_spread(value)}" for key, value in values.items())
 
 

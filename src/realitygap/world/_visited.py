@@ -51,7 +51,7 @@ class VisitedCells:
 
 
 def cells_along(path: NDArray[np.float64], grid: Grid) -> tuple[int, ...]:
-    """Cells along a line, columns * row + column, in the order of first visits.
+    """Return cells along a line, columns * row + column, in the order of first visits.
 
     Args:
         path: (n, >= 2) x and y of its points [m].

@@ -15,7 +15,7 @@ SONAR_RANGE = 8.0
 
 
 def _mounts(*mounts: tuple[float, float, float]) -> Mounts:
-    """Mounts from forward [m], left [m] and angle [degrees]."""
+    """Return mounts from forward [m], left [m] and angle [degrees]."""
     return [[forward, left, degrees * (math.pi / 180.0)] for forward, left, degrees in mounts]
 
 
@@ -104,7 +104,7 @@ def complete_device(data: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def device_ranges(robot: Mapping[str, Any]) -> list[float]:
-    """The different maximum ranges of the devices of a robot in a case [m], as far as they can be read."""
+    """Return the different maximum ranges of the devices of a robot in a case [m], as far as they can be read."""
     devices = robot.get("devices")
     if not isinstance(devices, list):
         return []

@@ -65,7 +65,7 @@ def independence(placements: list[Placement], rng: np.random.Generator) -> Indep
 
 
 def _consecutive(rows: list[Array], rng: np.random.Generator) -> tuple[float, float]:
-    """Correlation of consecutive readings within placements, each less its placement's mean, and its p value."""
+    """Return the correlation of consecutive readings, each less the mean of its placement, and its p value."""
     centered = [row - row.mean() for row in rows if len(row) > 2 and np.ptp(row) > 0]
     power = sum(float(row @ row) for row in centered)
     if not centered or power == 0:
@@ -82,7 +82,7 @@ def _consecutive(rows: list[Array], rng: np.random.Generator) -> tuple[float, fl
 
 
 def _between(placements: list[Placement], rng: np.random.Generator) -> tuple[float, float]:
-    """Share of the variance at one distance that lies between placements, and its p value."""
+    """Return the share of the variance at one distance that lies between placements, and its p value."""
     groups: dict[tuple[float, ...], list[Array]] = defaultdict(list)
     for placement in placements:
         groups[placement.group].append(np.asarray(placement.readings, np.float64))
@@ -104,7 +104,7 @@ def _between(placements: list[Placement], rng: np.random.Generator) -> tuple[flo
 
 
 def _intraclass(rows: list[Array]) -> float:
-    """Intraclass correlation of readings in placements at one distance, by the analysis of variance."""
+    """Return the intraclass correlation of readings in placements at one distance, by the analysis of variance."""
     sizes = np.array([len(row) for row in rows])
     means = np.array([row.mean() for row in rows])
     within = sum(float(((row - row.mean()) ** 2).sum()) for row in rows) / max(sizes.sum() - len(rows), 1)

@@ -34,7 +34,7 @@ BINS = 20
 
 
 def step_of(readings: Array) -> float:
-    """The step in which a sensor answers: what all readings are multiples of, at least `FINEST`."""
+    """Return the step in which a sensor answers: what all readings are multiples of, at least `FINEST`."""
     values = np.unique(np.asarray(readings, np.float64))
     apart = np.diff(values)
     step = float(apart[apart > FINEST].min(initial=1.0))
@@ -136,7 +136,7 @@ class MixtureReadings(Readings):
 
 
 def _inner_edges(step: float) -> Array:
-    """Edges of the bins between 0 and 1: what rounds to 0 is 0, and what rounds to 1 is 1."""
+    """Return edges of the bins between 0 and 1: what rounds to 0 is 0, and what rounds to 1 is 1."""
     if step > 0.5 / BINS:
         return np.arange(step / 2, 1.0, step)
     edges = np.arange(BINS + 1) / BINS

@@ -72,7 +72,7 @@ class PulseReadings(Readings):
         burst: Array,
         stray: float,
     ) -> Array:
-        """Probability of each count; the arrays are broadcast against each other."""
+        """Return the probability of each count; the arrays are broadcast against each other."""
         left = sent_back - counts
         logs = np.log(missed) * np.maximum(left, 0) + np.log1p(-missed) * counts
         apart = np.where(left >= 0, _ways(self.pulses)[sent_back, counts] * np.exp(logs), 0.0)

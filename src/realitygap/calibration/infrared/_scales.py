@@ -33,13 +33,13 @@ class Scale:
     advice: str
 
     def of(self, unit: Array) -> Array:
-        """Values for places in 0..1."""
+        """Return values for places in 0..1."""
         if self.kind == "ratio":
             return np.asarray(self.low * (self.high / self.low) ** unit)
         return np.asarray(self.low + (self.high - self.low) * unit)
 
     def place(self, value: Array | float) -> Array:
-        """Places in 0..1 of values."""
+        """Return places in 0..1 of values."""
         if self.kind == "ratio":
             return np.asarray(np.log(np.asarray(value) / self.low) / np.log(self.high / self.low))
         return np.asarray((np.asarray(value) - self.low) / (self.high - self.low))

@@ -104,7 +104,7 @@ class Bus:
         return body
 
     def _next(self) -> tuple[int, dict[int, Any], list[Any]]:
-        """The next message: its kind, the fields of its header, and its values."""
+        """Return the next message: its kind, the fields of its header, and its values."""
         head = self._exactly(16)
         order, kind, _, _, body_size, _ = _HEADER.unpack_from(head)
         if order != b"l":
@@ -137,7 +137,7 @@ def _message(serial: int, fields: dict[int, tuple[str, str]], body: bytes) -> by
 
 
 def _encoded(signature: str, values: tuple[Any, ...]) -> bytes:
-    """Bytes of numbers, texts and, for `v`, numbers of type `d`."""
+    """Return bytes of numbers, texts and, for `v`, numbers of type `d`."""
     data = bytearray()
     for kind, value in zip(signature, values, strict=True):
         if kind == "v":
@@ -154,7 +154,7 @@ def _encoded(signature: str, values: tuple[Any, ...]) -> bytes:
 
 
 def _split(signature: str) -> list[str]:
-    """The complete types of a signature."""
+    """Return the complete types of a signature."""
     found: list[str] = []
     start = depth = 0
     for k, letter in enumerate(signature):

@@ -81,7 +81,7 @@ def why_not(speed: float = 1.0) -> str:
 
 
 def _path() -> str:
-    """The path for programs, with the folder of `ip`, which other users than root often lack."""
+    """Return the path for programs, with the folder of `ip`, which other users than root often lack."""
     return f"{os.environ.get('PATH', os.defpath)}:/usr/sbin:/sbin"
 
 
@@ -90,7 +90,7 @@ def _unshare() -> list[str]:
 
 
 def _faketime() -> Path | None:
-    """The library that lets time pass faster."""
+    """Return the library that lets time pass faster."""
     found = sorted(Path("/usr/lib").glob("*/faketime/libfaketimeMT.so.1"))
     return found[0] if found else None
 
@@ -208,7 +208,7 @@ class Playground(ClosedOnExit):
         """Do nothing: its time was not held."""
 
     def now(self) -> float:
-        """The robot's time [s]; the path gets a point at it."""
+        """Return the robot's time [s]; the path gets a point at it."""
         return self._note()
 
     def _note(self) -> float:
@@ -227,7 +227,7 @@ class Playground(ClosedOnExit):
                         self._note()
 
     def pose(self) -> Pose:
-        """The true pose of the robot."""
+        """Return the true pose of the robot."""
         found = dict(self._call(self._path, _PROPERTIES, "GetAll", "s", _BODY)[0])  # type: ignore[call-overload]
         return Pose(found["x"] / CM + self._left, found["y"] / CM + self._low, found["angle"])
 
@@ -264,15 +264,15 @@ class Playground(ClosedOnExit):
         )
 
     def arena(self) -> Arena:
-        """The arena in which it drives."""
+        """Return the arena in which it drives."""
         return self._arena
 
     def identity(self) -> str:
-        """A text that is equal for playgrounds of equal scenes."""
+        """Return a text that is equal for playgrounds of equal scenes."""
         return f"playground {self._arena.name} {hashlib.sha256(self._scene.encode()).hexdigest()[:12]}"
 
     def motors(self) -> tuple[float, float]:
-        """The speeds of the wheels between the last two points of the path, left and right [m/s]."""
+        """Return the speeds of the wheels between the last two points of the path, left and right [m/s]."""
         (before, x1, y1, heading), (after, x2, y2, turned) = [*self._points, *self._points][-2:]
         seconds = max(after - before, SAMPLE_S)
         ahead = ((x2 - x1) * np.cos(heading) + (y2 - y1) * np.sin(heading)) / seconds
@@ -285,11 +285,11 @@ class Playground(ClosedOnExit):
             return np.array(self._points, np.float64).reshape(-1, 4)
 
     def cells(self) -> tuple[int, ...]:
-        """Cells of the arena's grid along the driven line, in order of first visits."""
+        """Return cells of the arena's grid along the driven line, in order of first visits."""
         return cells_along(self.path()[:, 1:3], self._arena.grid)
 
     def cells_at(self, times: Sequence[float]) -> tuple[int, ...]:
-        """Cells of the grid in which the robot was at given times [s], in order of first visits."""
+        """Return cells of the grid in which the robot was at given times [s], in order of first visits."""
         return cells_at_times(self.path(), self._arena.grid, times)
 
     # the robot's parts

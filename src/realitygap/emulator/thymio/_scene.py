@@ -68,7 +68,7 @@ def scene_of(arena: Arena, port: int) -> str:
 
 
 def _obstacle(obstacle: Obstacle, left: float, low: float) -> Iterator[str]:
-    """A disc, or the sides of an outline: the playground has no other shapes."""
+    """Yield a disc, or the sides of an outline: the playground has no other shapes."""
     if len(obstacle.corners) == 1:
         ((x, y),) = obstacle.placed
         size = {"r": obstacle.radius * CM, "h": HEIGHT_CM}

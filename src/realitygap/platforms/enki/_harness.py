@@ -193,6 +193,6 @@ def _has_floor(arena: Arena) -> bool:
 
 
 def _corner(arena: Arena) -> tuple[float, float]:
-    """The point of the arena that is Enki's origin [m]."""
+    """Return the point of the arena that is Enki's origin [m]."""
     room = room_of(arena)
     return (0.0, 0.0) if room is None else room[:2]

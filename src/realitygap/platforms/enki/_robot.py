@@ -23,7 +23,7 @@ CHANNELS = ("line.0", "line.1", "encoder.0", "encoder.1")
 
 
 def _seed_of(number: int) -> int:
-    """A seed of 31 bits: those of successive numbers would begin with related random numbers in Enki."""
+    """Return a seed of 31 bits: those of successive numbers would begin with related random numbers in Enki."""
     return int.from_bytes(hashlib.blake2b(str(number).encode(), digest_size=4).digest(), "little") >> 1
 
 
@@ -106,6 +106,6 @@ class EnkiRobot(ProgramRobot):
         return tuple(min(1.0, max(0.0, value)) for value in dark)
 
     def _speeds(self) -> tuple[float, ...]:
-        """Speed of each wheel in the last command, as a part of full speed."""
+        """Return the speed of each wheel in the last command, as a part of full speed."""
         full = self._speed * self.step_s
         return tuple(min(1.0, max(-1.0, distance / full)) for distance in self._driven)

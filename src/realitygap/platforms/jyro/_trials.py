@@ -83,7 +83,7 @@ def is_enclosed(platform: JyroSettings, walls: NDArray[np.float64], heading: flo
 
 
 def jyro_scene(platform: JyroSettings, arena: Arena) -> TrialScene:
-    """Arena, body and sensors in the form that kernels read.
+    """Return arena, body and sensors in the form that kernels read.
 
     Raises:
         ValueError: More than 256 cells: a cell is kept as one byte; or the arena is not of straight walls.
@@ -229,7 +229,7 @@ class JyroTrials:
 
 
 def _as_arrays(trace: Trace) -> TraceArrays:
-    """Readings turned so that 1 is near; there are no wheels."""
+    """Return readings turned so that 1 is near; there are no wheels."""
     nothing = np.zeros((0, 2, trace.stalled.shape[1]), trace.poses.dtype)
     near = 1 - trace.readings
     return TraceArrays(trace.poses, near, trace.inputs, trace.commands, trace.stalled, nothing)

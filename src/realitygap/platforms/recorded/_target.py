@@ -112,7 +112,7 @@ class RecordedTarget(RepeatableTarget):
 
 
 def _imported(path: str | Path) -> Observations:
-    """The trials of a log, with the mapping next to it."""
+    """Return the trials of a log, with the mapping next to it."""
     log_map, _ = mapping_of(path)
     name, robot = robot_of(log_map)
     logs = list(read_logs(path, log_map, robot))

@@ -277,7 +277,7 @@ class SimEnsemble:
     def _cut_alike(
         self, given: Mapping[str, NDArray[np.float64]], m: int
     ) -> list[tuple[Finely, NDArray[np.int64]]]:
-        """The m robots by the parts of their steps: robots that differ in them have different scenes."""
+        """Return the m robots by the parts of their steps: robots that differ in them have different scenes."""
         most = {name: np.full(m, value) for name, value in self._most.items()}
         most |= {name: np.abs(given[name]).max(axis=1) for name in most if name in given}
         halves = [self._half(given, number) for number in range(len(self._own.robot.body))]
@@ -304,7 +304,7 @@ class SimEnsemble:
     def _scene(
         self, inputs: tuple[str, ...], given: Mapping[str, NDArray[np.float64]] | None = None
     ) -> SimScene:
-        """Robot and arena whose structure serves all these numbers."""
+        """Return robot and arena whose structure serves all these numbers."""
         ranges = dict(self._ranges)
         for name, value in (given or {}).items():
             if not np.isfinite(value).all():
@@ -479,7 +479,7 @@ def _as_it_is(rehearsal: Rehearsal) -> Rehearsal:
 
 
 def _n_robots(values: Values) -> int:
-    """Number of sets of numbers; one robot as it is if there are none."""
+    """Return the number of sets of numbers; one robot as it is if there are none."""
     return len(next(iter(values.values()), np.empty(1)))  # type: ignore[arg-type]
 
 
@@ -496,7 +496,7 @@ def _in_order(parts: Iterable[tuple[NDArray[np.int64], NDArray[F]]], m: int) -> 
 
 
 def _gathered(parts: Sequence[tuple[NDArray[np.int64], Rehearsal]]) -> Rehearsal:
-    """All robots in order."""
+    """Return all robots in order."""
     if len(parts) == 1:
         return parts[0][1]
     m = sum(len(robots) for robots, _ in parts)

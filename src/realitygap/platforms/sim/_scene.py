@@ -77,7 +77,7 @@ class SimScene:
 
 
 def sim_scene(platform: SimSettings, arena: Arena, inputs: Sequence[str], noise: float) -> SimScene:
-    """Robot and arena with all settings, and what networks see of them.
+    """Return robot and arena with all settings, and what networks see of them.
 
     Args:
         platform: The robot as simulated.
@@ -133,7 +133,7 @@ def sim_scene(platform: SimSettings, arena: Arena, inputs: Sequence[str], noise:
 
 
 def highest(value: float | Distribution) -> float:
-    """The most that a number can be."""
+    """Return the most that a number can be."""
     return value.highest if isinstance(value, Distribution) else value
 
 
@@ -232,7 +232,7 @@ def parts_of_step(
 
 
 def own_half(robot: RobotModel, number: int) -> NDArray[np.float64]:
-    """The half width of a part of its body as the robot's file has it [m]."""
+    """Return the half width of a part of its body as the robot's file has it [m]."""
     body = robot.body[number]
     return half_width([(corner.x, corner.y) for corner in body.corner], body.radius)
 
@@ -254,7 +254,7 @@ def _farthest(most: Mapping[str, ArrayLike], step_s: float) -> NDArray[np.float6
 
 
 def largest(value: float | Distribution) -> float:
-    """The largest magnitude that a number can have."""
+    """Return the largest magnitude that a number can have."""
     return max(abs(value.lowest), abs(value.highest)) if isinstance(value, Distribution) else abs(value)
 
 
@@ -299,7 +299,7 @@ def _surroundings(arena: Arena, numbers: Numbers) -> dict[str, Any]:
 
 
 def _n_corners(obstacle: Obstacle, k: int, numbers: Numbers) -> int:
-    """0 for a disc around its own origin, whose corner needs no numbers."""
+    """Return 0 for a disc around its own origin, whose corner needs no numbers."""
     middle = all(numbers[f"arena.obstacle.{k}.corner.0.{axis}"] == 0.0 for axis in "xy")
     return 0 if len(obstacle.corners) == 1 and middle else len(obstacle.corners)
 
@@ -322,7 +322,7 @@ def _floor_image(image: FloorImage | None) -> tuple[NDArray[np.float32] | None, 
 
 
 def sim_inputs(robot: RobotModel, arena: Arena) -> tuple[str, ...]:
-    """Names of all that networks can see of a robot in an arena, the constant input included."""
+    """Return names of all that networks can see of a robot in an arena, the constant input included."""
     counts = {kind: len(getattr(robot, kind)) for kind in SENSORS}
     counts["encoder"] = 0 if robot.encoder is None else 2
     counts["goal_sector"] = 0 if arena.goal is None else N_SECTORS
@@ -333,7 +333,7 @@ def sim_inputs(robot: RobotModel, arena: Arena) -> tuple[str, ...]:
 
 
 def _inputs(names: Sequence[str], robot: RobotModel, arena: Arena) -> list[tuple[str, int]]:
-    """Kind and index of each input.
+    """Return the kind and index of each input.
 
     Raises:
         ControllerError: This robot in this arena does not have one of them.

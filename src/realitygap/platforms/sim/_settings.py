@@ -57,7 +57,7 @@ def _named_robot(name: str) -> RobotModel:
 
 
 def _read_draws(robot: Any) -> Calibration | None:
-    """The calibration in a file; None if it has none, or one with mistakes, which its robot reports."""
+    """Return the calibration in a file; None if it has none, or one with mistakes, which its robot reports."""
     try:
         return read_calibration(robot) if isinstance(robot, str | Path) else None
     except ValueError:
@@ -65,7 +65,7 @@ def _read_draws(robot: Any) -> Calibration | None:
 
 
 def _as_robot(value: Any) -> Any:
-    """A robot by name or from a file, of a calibration, or as results describe it."""
+    """Return a robot by name or from a file, of a calibration, or as results describe it."""
     if isinstance(value, Calibration):
         return load_robot(value.robot).with_numbers(value.numbers).model_copy(update=value.step)
     if isinstance(value, str | Path):
@@ -78,7 +78,7 @@ def _as_robot(value: Any) -> Any:
 
 
 def as_numbers(values: Mapping[Any, Any]) -> tuple[dict[str, float | Distribution], list[str]]:
-    """Numbers by name, and distributions made of tables; and what is wrong with the others."""
+    """Return numbers by name, and distributions made of tables; and what is wrong with the others."""
     found: dict[str, float | Distribution] = {}
     problems: list[str] = []
     for name, value in values.items():
@@ -103,7 +103,7 @@ def as_numbers(values: Mapping[Any, Any]) -> tuple[dict[str, float | Distributio
 
 
 def _why_not(robot: RobotModel, numbers: Mapping[str, float | Distribution]) -> list[str]:
-    """Mistakes in numbers of a robot."""
+    """Return mistakes in numbers of a robot."""
     own = {name: value for name, value in numbers.items() if not name.startswith(ARENA)}
     settings = [name for name in own if name in SimSettings.model_fields]
     problems = [f"{name}: a setting of [platform.sim] itself, write it there" for name in settings]
@@ -330,7 +330,7 @@ def _without_start(numbers: Mapping[str, T]) -> dict[str, T]:
 
 
 def hull(points: list[tuple[float, float]]) -> tuple[tuple[float, float], ...]:
-    """The corners of the convex outline around points, counter-clockwise."""
+    """Return the corners of the convex outline around points, counter-clockwise."""
 
     def half(ordered: list[tuple[float, float]]) -> list[tuple[float, float]]:
         kept: list[tuple[float, float]] = []

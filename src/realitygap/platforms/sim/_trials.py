@@ -133,7 +133,7 @@ def sim_rules(scene: SimScene, bias_value: float) -> SimRules:
 
 
 def sensor_names(shape: SimShape) -> tuple[str, ...]:
-    """Names of the readings in a trace, in order."""
+    """Return names of the readings in a trace, in order."""
     return tuple(f"{kind}.{k}" for kind in SENSORS for k in range(getattr(shape, f"row_{kind}").size))
 
 

@@ -134,7 +134,7 @@ class SimWorld:
         return next(name for k in range(1, len(taken) + 2) if (name := f"{kind}-{k}") not in taken)
 
     def __getitem__(self, name: str) -> SimWorldRobot:
-        """The robot of a name.
+        """Return the robot of a name.
 
         Raises:
             KeyError: There is none.
@@ -168,7 +168,7 @@ class SimWorld:
         self.step(round(seconds / self.step_s), brains=brains)
 
     def reset(self) -> None:
-        """All robots at their starts, standing, with the same random numbers as before."""
+        """Put all robots at their starts, standing, with the same random numbers as before."""
         self.n_steps = 0
         self._is_ready = False
         self._prepare()
@@ -193,7 +193,7 @@ class SimWorld:
         self._is_ready = True
 
     def picture(self) -> Picture:
-        """The arena from above with all robots, their trails and what their range sensors see."""
+        """Return the arena from above with all robots, their trails and what their range sensors see."""
         self._prepare()
         ground = arena_picture(self.arena)
         layers = (_trail, _rays, _body)
@@ -257,7 +257,7 @@ class SimWorldRobot(ProgramRobot):
     # what it is told
 
     def move(self, move: float, turn: float) -> None:
-        """The command of this and all further steps, each part -1..1.
+        """Set the command of this and all further steps, each part -1..1.
 
         Raises:
             ValueError: A part is not within -1..1. The robot keeps its last command.
@@ -273,7 +273,7 @@ class SimWorldRobot(ProgramRobot):
         return self._pose
 
     def point(self, ahead: float, left: float) -> Point:
-        """Position in the arena of a point of the robot [m]."""
+        """Return the position in the arena of a point of the robot [m]."""
         return self.pose.point(ahead, left)
 
     @property
@@ -317,7 +317,7 @@ class SimWorldRobot(ProgramRobot):
         self.world.reset()
 
     def observe(self) -> Observation:
-        """The range readings after the last step; raw is the same, as they have no other unit."""
+        """Return the range readings after the last step; raw is the same, as they have no other unit."""
         self._check_open()
         readings = tuple(value for name, value in self.readings.items() if name.startswith("range."))
         return Observation(readings, self.stalled, readings)
@@ -335,7 +335,7 @@ class SimWorldRobot(ProgramRobot):
     # what the world asks
 
     def _parts(self) -> list[Obstacle]:
-        """The parts of its body at its start, which the others meet."""
+        """Return the parts of its body at its start, which the others meet."""
         return [Obstacle(*self.start, part.corners, part.radius) for part in self.model.body]
 
     def _begin(self, arena: Arena, others: list[SimWorldRobot]) -> None:
@@ -433,7 +433,7 @@ def _trail(robot: SimWorldRobot) -> list[Shape]:
 
 
 def _rays(robot: SimWorldRobot) -> list[Shape]:
-    """The rays of the range sensors, as far as they see."""
+    """Return the rays of the range sensors, as far as they see."""
     shapes: list[Shape] = []
     lengths = iter(robot.distances.tolist())
     for sensor in robot.model.range:
@@ -447,7 +447,7 @@ def _rays(robot: SimWorldRobot) -> list[Shape]:
 
 
 def _body(robot: SimWorldRobot) -> list[Shape]:
-    """The outline, and an arrow ahead."""
+    """Return the outline, and an arrow ahead."""
     color, size = hex_of(robot.color), robot.model.radius
     shapes: list[Shape] = [
         Line(tuple(robot.point(*point) for point in part.outline()), color, 1.4, closed=True, fill="#ffffff")

@@ -63,7 +63,7 @@ class SimTwin(SimRobot):
         self._points.append(self.pose)
 
     def path(self) -> NDArray[np.float64]:
-        """Poses x [m], y [m] and heading [rad] at the start and after each command, (n, 3)."""
+        """Return poses x [m], y [m] and heading [rad] at the start and after each command, (n, 3)."""
         return np.array(self._points)
 
     @property
@@ -78,7 +78,7 @@ class SimTwin(SimRobot):
 
 
 def open_twin(model: TwinModel, arena: Arena, *, number: int = 0) -> TwinRobot | SimTwin:
-    """A twin in an arena, as a robot.
+    """Return a twin in an arena, as a robot.
 
     Args:
         model: The twin.

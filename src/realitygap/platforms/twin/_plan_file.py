@@ -13,7 +13,7 @@ from realitygap.world import Pose
 
 
 def plan_to_dict(plan: TrialPlan) -> dict[str, Any]:
-    """A plan as JSON knows it."""
+    """Return a plan as JSON knows it."""
     return {
         **vars(plan),
         "start": None if plan.start is None else list(plan.start),
@@ -23,7 +23,7 @@ def plan_to_dict(plan: TrialPlan) -> dict[str, Any]:
 
 
 def plan_from_dict(values: Mapping[str, Any]) -> TrialPlan:
-    """The plan that `plan_to_dict` described."""
+    """Return the plan that `plan_to_dict` described."""
     return TrialPlan(
         **{
             **values,

@@ -116,7 +116,7 @@ class TwinPlatform(Platform):
 
 
 def hash_elsewhere(file: str) -> str:
-    """The SHA-256 of a file, which another process reads.
+    """Return the SHA-256 of a file, which another process reads.
 
     Raises:
         ValueError: There is no such file, or it cannot be read.

@@ -65,7 +65,7 @@ class TwinProcess:
         return self._ask(self._setup)
 
     def ask(self, request: Mapping[str, Any]) -> Any:
-        """The answer to a request; a process that was not there is started first."""
+        """Return the answer to a request; a process that was not there is started first."""
         self.start()
         return self._ask(request)
 

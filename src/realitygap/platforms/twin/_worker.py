@@ -52,7 +52,7 @@ class _Twin:
         }
 
     def carry_out(self, plan: dict[str, Any], observe: str) -> dict[str, Any]:
-        """A trial, as far as it is to be observed."""
+        """Return a trial, as far as it is to be observed."""
         from realitygap.records import trial_to_dict
         from realitygap.trials import RobotObserver, carry_out_on_robot
 
@@ -79,7 +79,7 @@ class _Twin:
         number: int,
         trace: bool,
     ) -> dict[str, Any]:
-        """A trial of a network as an evolution scores it."""
+        """Return a trial of a network as an evolution scores it."""
         from realitygap.evolution import ControllerInterface, Network
 
         from .._stepwise import trial_of

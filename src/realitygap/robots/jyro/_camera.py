@@ -111,7 +111,7 @@ class Camera(Device):
         return Column(color, int(min(max(closeness**2 * full, 1), full)), distance, closeness)
 
     def _direction(self, x: float, y: float) -> tuple[float, float]:
-        """Angle to the left of the heading, -pi/2 to 3 pi/2 [rad], and distance [m]."""
+        """Return the angle to the left of the heading, -pi/2 to 3 pi/2 [rad], and distance [m]."""
         here = self.robot.pose
         toward = math.atan2(y - here.y, x - here.x) - here.heading
         return (toward + math.pi / 2) % (2 * math.pi) - math.pi / 2, math.hypot(x - here.x, y - here.y)
@@ -169,7 +169,7 @@ class Camera(Device):
         return file.getvalue()
 
     def rays(self) -> list[Shape]:
-        """The edges of the field of view."""
+        """Return the edges of the field of view."""
         shapes: list[Shape] = []
         for angle, column in ((self.field / 2, self.columns[0]), (-self.field / 2, self.columns[-1])):
             if column:
@@ -179,11 +179,11 @@ class Camera(Device):
         return shapes
 
     def shapes(self) -> list[Shape]:
-        """The camera on the robot."""
+        """Return the camera on the robot."""
         return [self.robot.polygon(((0.14, -0.06), (0.06, -0.06), (0.06, 0.06), (0.14, 0.06)), "black", None)]
 
     def to_dict(self) -> dict[str, Any]:
-        """Size, field, and columns, as plain values."""
+        """Return the size, field, and columns, as plain values."""
         return super().to_dict() | {
             "width": self.width,
             "height": self.height,

@@ -66,7 +66,7 @@ class DrivenRobot(ProgramRobot):
             self.robot.place(pose)
 
     def observe(self) -> Observation:
-        """The readings after the last step."""
+        """Return the readings after the last step."""
         self._check_open()
         raw = np.concatenate([sensor.readings for sensor in self.sensors])
         near = np.concatenate([sensor.nearness for sensor in self.sensors])

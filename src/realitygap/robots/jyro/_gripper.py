@@ -125,12 +125,12 @@ class Gripper(Device):
         return opening, self._speed
 
     def edges(self, *, ahead: bool) -> Sequence[Edge]:
-        """The two paddles."""
+        """Return the two paddles."""
         half = self._next()[0] if ahead else self.opening
         return (MOUNT, half, MOUNT + LENGTH, half), (MOUNT, -half, MOUNT + LENGTH, -half)
 
     def shapes(self) -> list[Shape]:
-        """The paddles, and the beams: solid where broken."""
+        """Return the paddles, and the beams: solid where broken."""
         at, robot = self.opening, self.robot
         base = Line((robot.point(MOUNT, OPEN), robot.point(MOUNT, -OPEN)), Ink.TEXT, 1.0)
         shapes: list[Shape] = [base]
@@ -146,7 +146,7 @@ class Gripper(Device):
         return shapes
 
     def to_dict(self) -> dict[str, Any]:
-        """State, opening, beams and names of the stored robots, as plain values."""
+        """Return the state, opening, beams and names of the stored robots, as plain values."""
         return super().to_dict() | {
             "state": self.state,
             "opening": self.opening,

@@ -74,12 +74,12 @@ class LightSensor(MountedSensors):
         )
 
     def shapes(self) -> list[Shape]:
-        """The positions of the sensors."""
+        """Return the positions of the sensors."""
         return [
             Disc(*self.robot.point(forward, left), 2.0, "#ffa500", "#ffff00", 0.6)
             for forward, left, _ in self.mounts.tolist()
         ]
 
     def to_dict(self) -> dict[str, Any]:
-        """Mounts, range, mode, groups and readings, as plain values."""
+        """Return mounts, range, mode, groups and readings, as plain values."""
         return super().to_dict() | {"mode": self.mode}

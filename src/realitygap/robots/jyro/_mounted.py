@@ -59,7 +59,7 @@ class MountedSensors(Device):
         return self._readings[list(self.groups[name])]
 
     def to_dict(self) -> dict[str, Any]:
-        """Mounts, range, groups and readings, as plain values."""
+        """Return mounts, range, groups and readings, as plain values."""
         return super().to_dict() | {
             "mounts": self.mounts.tolist(),
             "max_range": self.max_range,

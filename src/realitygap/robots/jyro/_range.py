@@ -67,7 +67,7 @@ class RangeSensor(MountedSensors):
         return nearest
 
     def rays(self) -> list[Shape]:
-        """The rays, up to the measured distance."""
+        """Return the rays, up to the measured distance."""
         shapes: list[Shape] = []
         for (forward, left, direction), far in zip(self.mounts.tolist(), self._lengths(), strict=True):
             end = (forward + far * math.cos(direction), left + far * math.sin(direction))

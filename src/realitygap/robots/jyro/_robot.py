@@ -102,15 +102,15 @@ class Device:
         return ()
 
     def rays(self) -> list[Shape]:
-        """Shapes of the sensor's rays, drawn below the robot, in world coordinates [m]."""
+        """Return shapes of the sensor's rays, drawn below the robot, in world coordinates [m]."""
         return []
 
     def shapes(self) -> list[Shape]:
-        """Shapes of the device, drawn above the robot, in world coordinates [m]."""
+        """Return shapes of the device, drawn above the robot, in world coordinates [m]."""
         return []
 
     def to_dict(self) -> dict[str, Any]:
-        """Kind, `active`, and readings, as plain values."""
+        """Return the kind, `active`, and readings, as plain values."""
         return {"kind": self.kind, "active": self.active}
 
 
@@ -197,7 +197,7 @@ class SceneRobot:
         self._leave_trail()
 
     def point(self, forward: float, left: float) -> Point:
-        """Position in the world of a point of the robot [m]."""
+        """Return the position in the world of a point of the robot [m]."""
         return self.pose.point(forward, left)
 
     @property
@@ -304,7 +304,7 @@ class SceneRobot:
     # showing
 
     def outlines(self) -> list[Shape]:
-        """The outline of the body as drawn."""
+        """Return the outline of the body as drawn."""
         return [self.polygon(self.body, self.color)] if self.body else []
 
     def polygon(self, corners: Sequence[Sequence[float]], fill: str, line: str | None = Ink.TEXT) -> Line:
@@ -342,7 +342,7 @@ class SceneRobot:
         return [Text(x, y, self.speech, 8.0, "start", (8.0, 10.0), halo=True)]
 
     def _repr_svg_(self) -> str:
-        """The robot alone, with its devices and without its rays, in a square of 1 m."""
+        """Return the robot alone, with its devices and without its rays, in a square of 1 m."""
         x, y = self.point(0.0, 0.0)
         parts = self.parts()
         shapes = (*parts["bodies"], *parts["devices"], *parts["speech"])

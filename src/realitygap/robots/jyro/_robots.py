@@ -42,7 +42,7 @@ class Scribbler(_StockRobot):
     body_name = "Scribbler"
 
     def outlines(self) -> list[Shape]:
-        """The rounded outline, and two wheels."""
+        """Return the rounded outline, and two wheels."""
         shapes: list[Shape] = [self.polygon(_SCRIBBLER, self.color)]
         for left in (0.075, -0.075):
             wheel = [(0.04, left + 0.005), (0.04, left - 0.005), (-0.04, left - 0.005), (-0.04, left + 0.005)]
@@ -57,7 +57,7 @@ class Pioneer(_StockRobot):
     body_name = "Pioneer"
 
     def outlines(self) -> list[Shape]:
-        """An octagon."""
+        """Return an octagon."""
         return [self.polygon(_PIONEER, "white" if self.stalled else self.color)]
 
 
@@ -69,7 +69,7 @@ class Blimp(_StockRobot):
     radius = 0.44
 
     def outlines(self) -> list[Shape]:
-        """The disc."""
+        """Return the disc."""
         return [self.polygon(_circle(self.radius), self.color, "#0000ff")]
 
 
@@ -83,7 +83,7 @@ class Puck(SceneRobot):
     radius = 0.05
 
     def outlines(self) -> list[Shape]:
-        """The disc, and the body if it has one."""
+        """Return the disc, and the body if it has one."""
         shapes: list[Shape] = [self.polygon(_circle(self.radius), self.color)]
         if self.body:
             shapes.append(_without_fill(self))

@@ -349,7 +349,7 @@ class JyroWorld:
     # showing
 
     def picture(self, hide: Collection[str] = ()) -> Picture:
-        """The world from above, without the parts to hide: "rays", "trails", "devices" and so on."""
+        """Return the world from above, without the parts to hide: "rays", "trails", "devices" and so on."""
         return picture_of(self, hide=hide)
 
     def _repr_svg_(self) -> str:
@@ -393,7 +393,7 @@ class JyroWorld:
                 yield self.picture()
 
     def to_dict(self) -> dict[str, Any]:
-        """Time, walls, lamps, and the state of all robots, as plain values."""
+        """Return time, walls, lamps, and the state of all robots, as plain values."""
         return {
             "time": self.time,
             "n_steps": self.n_steps,

@@ -117,7 +117,7 @@ class Scribbler(Driving, Channels, SoundAndLight, Camera, Board, PortDriver):
         return self.info.fluke != "none" and self.forwardness == "fluke"
 
     def wheels(self) -> tuple[float, float]:
-        """Distance of the left and right wheel since power-on, as seen from the end without the Fluke [m]."""
+        """Return the distance of both wheels since power-on, as seen from the end without the Fluke [m]."""
         left, right = self.encoders()
         return left * COUNT_M, right * COUNT_M
 

@@ -76,7 +76,7 @@ class BoardClock:
         return (time.monotonic() - self._at) * self.rate
 
     def now(self) -> float:
-        """The time since the robot was opened [s]."""
+        """Return the time since the robot was opened [s]."""
         if self._ticks is not None:
             self._shown = max(self._shown, self._board + self.unread_s)
         return self._shown

@@ -125,22 +125,22 @@ def _copy(source: int, target: int) -> list[int]:
 
 
 def _change(offset: int, operation: int) -> list[int]:
-    """The words that add 1 to a variable, or subtract 1 from it."""
+    """Return the words that add 1 to a variable, or subtract 1 from it."""
     return [_load(offset), _push(1), 0x8000 | operation, _store(offset)]
 
 
 def _increase(offset: int, by: int) -> list[int]:
-    """The words that add a variable to another."""
+    """Return the words that add a variable to another."""
     return [_load(offset), _load(by), 0x8000 | _ADD, _store(offset)]
 
 
 def _only_if(offset: int, comparison: int, body: Sequence[int]) -> list[int]:
-    """The words that run a body if a variable compares with 0; the distance counts from the branch."""
+    """Return the words that run a body if a variable compares with 0; the distance counts from the branch."""
     return [_load(offset), _push(0), 0xA000 | comparison, len(body) + 2, *body]
 
 
 def _only_if_sum(args: int, body: Sequence[int]) -> list[int]:
-    """The words that run a body if three variables and the constant add up to the fourth."""
+    """Return the words that run a body if three variables and the constant add up to the fourth."""
     total = [_push(CHECK)]
     for k in range(3):
         total += [_load(args + k), 0x8000 | _ADD]

@@ -305,7 +305,7 @@ class Thymio(PortDriver):
         return Observation(readings, stalled, raw, chosen)
 
     def _encoders(self) -> tuple[float, ...]:
-        """Mean speed of each wheel since the last observation, as a part of `full_speed`."""
+        """Return the mean speed of each wheel since the last observation, as a part of `full_speed`."""
         if not self.has_encoders:
             return ()
         (before_s, *before), now_s = self._observed, self.clock.now()
@@ -401,7 +401,7 @@ class Thymio(PortDriver):
 
 
 def _stop_messages(robot: Description) -> bytes:
-    """The messages that end the life of the last command and set both targets to 0."""
+    """Return the messages that end the life of the last command and set both targets to 0."""
     off = [set_variables(robot.node, robot.variables[name][0], (0,)) for name in _TARGETS]
     return user_event(DRIVE, with_sum((0, 0, 1))) + b"".join(off)
 

@@ -147,7 +147,7 @@ class TwinBody:
         return self._servo.volts_at(load)
 
     def ranges(self, mounts: Floats, reach: float) -> Floats:
-        """Distances to walls and obstacles [m], from mounts in the Scribbler's frame."""
+        """Return distances to walls and obstacles [m], from mounts in the Scribbler's frame."""
         return np.array(
             [
                 self._physics.look(-x, -y, np.array([direction + math.pi]), reach)[0][0]

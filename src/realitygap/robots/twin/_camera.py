@@ -93,7 +93,7 @@ class TwinCamera(ClosedOnExit):
 
 
 def _off_screen(width: int, height: int) -> Any:
-    """Something to draw on that is no screen."""
+    """Return something to draw on that is no screen."""
     from importlib import import_module
 
     for driver in DRIVERS:

@@ -188,7 +188,7 @@ class FamilyRow(NamedTuple):
 
 
 def family_rows(name: str) -> list[FamilyRow]:
-    """All numbers that a family draws.
+    """Return all numbers that a family draws.
 
     Args:
         name: One of `FAMILIES`, or `every` for the numbers of all families.
@@ -217,7 +217,7 @@ def _family(name: str) -> Family:
 
 
 def sample_twin(family: str, seed: int) -> TwinModel:
-    """A twin drawn from a family: the same for the same seed, everywhere.
+    """Return a twin drawn from a family: the same for the same seed, everywhere.
 
     Args:
         family: One of `FAMILIES`.

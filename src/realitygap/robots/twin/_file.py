@@ -12,7 +12,7 @@ from ._model import TwinModel
 
 
 def load_twin(path: str | Path) -> TwinModel:
-    """A twin from its file.
+    """Return a twin from its file.
 
     Args:
         path: Path of a TOML file, as written by `TwinModel.to_toml`. Keys may end in _mm, _cm or _in, angles in _deg.

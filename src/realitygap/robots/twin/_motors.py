@@ -47,7 +47,7 @@ class SpeedSteps:
         return self._step == self._target
 
     def tick(self) -> tuple[float, float]:
-        """Speeds for the next 20 ms, left and right, as shares of full speed."""
+        """Return speeds for the next 20 ms, left and right, as shares of full speed."""
         step = self._step / STEPS
         self._step = min(self._step + 1, self._target)
         return self._shares[0] * step, self._shares[1] * step
@@ -101,7 +101,7 @@ class Servo:
         self.volts = self._battery.volts
 
     def follow(self, left: float, right: float, pose: Pose, seconds: float) -> tuple[float, float]:
-        """Speeds for the motors in a short time, left and right [m/s].
+        """Return speeds for the motors in a short time, left and right [m/s].
 
         Args:
             left, right: Target speeds of the regulator, in shares of full speed.
@@ -144,7 +144,7 @@ class Servo:
         return self._left, self._right
 
     def _supply(self, work: float, seconds: float) -> float:
-        """Share of the speed that the battery leaves."""
+        """Return the share of the speed that the battery leaves."""
         battery = self._battery
         self._used += battery.fall_per_s * work * seconds
         self.volts = self.volts_at(work)

@@ -25,7 +25,7 @@ EYE_ABOVE = 0.05  # of the floor, where sensors look [m]
 
 @functools.lru_cache(maxsize=16)
 def _compiled(text: str) -> Any:
-    """The model of a text in MuJoCo's XML; it is only read."""
+    """Return the model of a text in MuJoCo's XML; it is only read."""
     mujoco = from_extra("mujoco", "twin")
     if mujoco.get_mju_user_warning() is None:
         mujoco.set_mju_user_warning(

@@ -21,7 +21,7 @@ def outline_of(model: TwinModel) -> tuple[Point, ...]:
 
 
 def twin_picture(model: TwinModel) -> Picture:
-    """A twin from above, facing right: shell, wheels, caster, pen, and the cones of its infrared."""
+    """Return a twin from above, facing right: shell, wheels, caster, pen, and the cones of its infrared."""
     outline = outline_of(model)
     xs, ys = zip(*outline, strict=True)
     back, front, low, high = min(xs), max(xs), min(ys), max(ys)

@@ -9,6 +9,6 @@ DELAYS, WHEELS, LIGHT, ENCODERS, FAMILY, AMBIENT = range(6)
 
 
 def numbers_for(seed: int, number: int, purpose: int, step: int = 0) -> np.random.Generator:
-    """A generator that draws the same on every machine."""
+    """Return a generator that draws the same on every machine."""
     words = np.array([seed, number], np.uint64)
     return np.random.Generator(np.random.Philox(key=words, counter=[0, 0, step, purpose]))

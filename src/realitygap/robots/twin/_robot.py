@@ -219,11 +219,11 @@ class TwinRobot(ProgramRobot):
         return self._servo.volts
 
     def path(self) -> NDArray[np.float64]:
-        """Line of the pen since the start, at least every 40 ms: x [m], y [m] and heading [rad], (n, 3)."""
+        """Return the line of the pen since the start, at least every 40 ms: x [m], y [m] and heading [rad], (n, 3)."""
         return np.array(self._points)
 
     def times(self) -> NDArray[np.float64]:
-        """Time of each point of `path` since the start, (n,) [s]."""
+        """Return the time of each point of `path` since the start, (n,) [s]."""
         return np.array(self._times)
 
     @property

@@ -30,7 +30,7 @@ LEAST_INERTIA = 2e-4  # of a motor behind its gears, about the wheel; chosen [kg
 
 
 def mjcf_of(model: TwinModel, arena: Arena) -> str:
-    """The twin in its arena in MuJoCo's XML."""
+    """Return the twin in its arena in MuJoCo's XML."""
     slope, uphill = model.oddities.slope, model.oddities.uphill
     along = -GRAVITY * math.sin(slope)
     gravity = along * math.cos(uphill), along * math.sin(uphill), -GRAVITY * math.cos(slope)
@@ -55,7 +55,7 @@ def mjcf_of(model: TwinModel, arena: Arena) -> str:
 
 
 def shell_of(model: TwinModel) -> tuple[tuple[tuple[float, float], ...], float]:
-    """The corners of the outline that meets walls, x and y [m], and the radius they are grown by."""
+    """Return the corners of the outline that meets walls, x and y [m], and the radius they are grown by."""
     body = model.body
     if body.cardboard is None:
         scale_x, scale_y = body.length_scale, body.width_scale
@@ -91,7 +91,7 @@ def _chassis(model: TwinModel) -> Iterator[str]:
 
 
 def _shell_points(model: TwinModel) -> str:
-    """The shell that is drawn: its outline below and, drawn in a little, above."""
+    """Return the shell that is drawn: its outline below and, drawn in a little, above."""
     corners, radius = shell_of(model)
     low, high = -model.wheels.diameter / 2 + SHELL_BOTTOM, -model.wheels.diameter / 2 + SHELL_TOP
     return " ".join(
@@ -142,7 +142,7 @@ def _walls(arena: Arena, friction: float) -> Iterator[str]:
 
 
 def _thickness(arena: Arena, wall: Segment) -> tuple[float, float]:
-    """Half the thickness of an enclosing wall, and how far to the left of it its middle lies [m]."""
+    """Return half the thickness of an enclosing wall, and how far to the left of it its middle lies [m]."""
     for side in (1.0, -1.0):
         if not any(_is_inside_beside(arena, wall, -side * far) for far in (THIN_HALF, 2 * THIN_HALF)):
             continue

@@ -18,7 +18,7 @@ def toml_of(model: Settings) -> str:
 
 
 def _lines(model: Settings, place: str) -> Iterator[str]:
-    """A table's own values, then the tables in it."""
+    """Yield a table's own values, then the tables in it."""
     tables: list[tuple[str, Any]] = []
     for key, field in type(model).model_fields.items():
         value = getattr(model, key)

@@ -193,7 +193,7 @@ def _part(log: Log, first: int, end: int) -> Log:
 
 
 def _arrays(log: Log) -> tuple[Floats, Floats, Floats | None]:
-    """Times, commands with the last one once more, and poses, without headings if the log has none."""
+    """Return times, commands with the last one once more, and poses, without headings if the log has none."""
     commands = np.concatenate([log.commands, log.commands[-1:]])
     if not len(log.poses):
         return log.time_s, commands, None
@@ -210,12 +210,12 @@ def _fit_to(logs: Sequence[Log], robot: RobotModel, hold_out: float, seed: int) 
 
 
 def _split(time_s: Floats, hold_out: float) -> int:
-    """First row that a fit does not see."""
+    """Return the first row that a fit does not see."""
     return int(np.searchsorted(time_s, time_s[0] + (1 - hold_out) * (time_s[-1] - time_s[0])))
 
 
 def _compare(log: Log, robot: RobotModel, held_out: HeldOut, hold_out: float, seed: int) -> Compared:
-    """The errors of the fit next to those of simpler predictions."""
+    """Return the errors of the fit next to those of simpler predictions."""
     time_s, commands, poses = _arrays(log)
     split = _split(time_s, hold_out)
     errors = {FITTED: held_out.fitted, NOMINAL: held_out.nominal}
@@ -242,12 +242,12 @@ def _compare(log: Log, robot: RobotModel, held_out: HeldOut, hold_out: float, se
 
 
 def _noise(rng: np.random.Generator, shape: tuple[int, ...]) -> Floats:
-    """The paper's uniform noise, here on wheels: the paper has it on sensors only."""
+    """Return the paper's uniform noise on the wheels. The paper itself has it on sensors only."""
     return np.asarray(JyroPlatform.default_noise * rng.uniform(-1, 1, shape))
 
 
 def _steps(time_s: Floats, commands: Floats, robot: RobotModel) -> Floats:
-    """Way ahead [m] and turn [rad] of each step by the robot's nominal gains and track, without lag."""
+    """Return the way ahead [m] and turn [rad] of each step by the robot's nominal gains and track, without lag."""
     gains = np.array([robot.drive.gain_left, robot.drive.gain_right]) * robot.drive.speed
     ways = commands[:-1] * gains * np.diff(time_s)[:, None]
     return np.stack([ways.mean(1), (ways[:, 1] - ways[:, 0]) / robot.drive.track], 1)
@@ -256,7 +256,7 @@ def _steps(time_s: Floats, commands: Floats, robot: RobotModel) -> Floats:
 def _wheel_baselines(
     log: Log, robot: RobotModel, commands: Floats, split: int, seed: int
 ) -> dict[str, float]:
-    """Errors of wheel speeds by uniform noise and by seen speeds at similar commands [m/s]."""
+    """Return errors of wheel speeds by uniform noise and by seen speeds at similar commands [m/s]."""
     speeds = np.diff(log.wheels, axis=0) / log.step_s
     nominal = commands[:-1] * robot.drive.speed
     noise = _noise(np.random.default_rng(seed), nominal.shape) * robot.drive.speed

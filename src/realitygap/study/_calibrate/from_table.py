@@ -107,7 +107,7 @@ def _write_robot(table: RangeTable, radius: float, file: Path) -> Path:
 
 
 def _turned(table: RangeTable, robot: RobotModel) -> tuple[NDArray[np.float64], list[str]]:
-    """Bearings, positive to the left: by the mapping, or by the robot file, whose readings have to be more alike."""
+    """Return bearings, positive to the left: by the mapping, or in the direction that suits the robot file better."""
     if table.clockwise is not None or not np.ptp(table.bearing):
         return table.bearing_left(clockwise=bool(table.clockwise)), []
     errors = {}
@@ -127,7 +127,7 @@ def _turned(table: RangeTable, robot: RobotModel) -> tuple[NDArray[np.float64], 
 
 
 def _seen(table: RangeTable, hold_out: HoldOut, seed: int) -> NDArray[np.bool_]:
-    """Whether the fit sees each reading."""
+    """Return whether the fit sees each reading."""
     row, column = place_ranks(table.distance, table.bearing)
     if hold_out == "blocks":
         return np.asarray((row + column) % 2 == 0)
@@ -144,7 +144,7 @@ def _compare(
     fitted: RobotModel,
     hold_out: HoldOut,
 ) -> Compared:
-    """Errors at the places that the fit did not see."""
+    """Return errors at the places that the fit did not see."""
     at = table.sensor, table.distance, bearing
     off = {
         FITTED: predict_range_table(*at, fitted, measured_from=table.measured_from) - table.readings,
@@ -177,7 +177,7 @@ def _by_condition(
     errors: Callable[[NDArray[np.bool_]], dict[str, float]],
     unseen: NDArray[np.bool_],
 ) -> dict[str, dict[str, dict[str, float]]]:
-    """Errors by sensor, distance and bearing."""
+    """Return errors by sensor, distance and bearing."""
     conditions: dict[str, dict[str, NDArray[np.bool_]]] = {
         "sensor": {str(k): table.sensor == k for k in np.unique(table.sensor)}
     }

@@ -42,7 +42,7 @@ class Compared:
     by: Mapping[str, Mapping[str, Mapping[str, float]]] = field(default_factory=dict)
 
     def to_dict(self) -> dict[str, Any]:
-        """As plain values, for the evidence of a calibration."""
+        """Return plain values, for the evidence of a calibration."""
         digits = 5
         plain = {name: round(value, digits) for name, value in self.errors.items()}
         more = {key: {name: round(v, digits) for name, v in rows.items()} for key, rows in self.more.items()}

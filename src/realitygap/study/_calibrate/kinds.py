@@ -60,7 +60,7 @@ class Kind:
 
 
 def _told_of_ends(parts: Parts, *, is_cut: bool) -> Parts:
-    """Says of what decides how the robot moves where it wants to be more than was thought possible.
+    """Add a note on the numbers of the motion that are at an end of what was thought possible.
 
     Noise is left out: a robot without any lies at the lower end, and what `sim` cannot make looks like more of it.
 
@@ -131,12 +131,12 @@ def _fit_path(
 
 
 def _is_straight(trial: TrialRecord) -> bool:
-    """Whether it was to go straight ahead."""
+    """Return whether it was to go straight ahead."""
     return bool(np.any(trial.commands[:, 0] > 0)) and not np.any(trial.commands[:, 1])
 
 
 def _ends_at_a_wall(trial: TrialRecord, robot: RobotModel, arena: Arena) -> bool:
-    """Whether something ahead stopped the robot; where nobody saw its end, by what it said itself.
+    """Return whether something ahead stopped the robot; where nobody saw its end, by what it said itself.
 
     One that went back has been told wrongly which of its ends is ahead: that is said elsewhere.
     """

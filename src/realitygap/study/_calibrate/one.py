@@ -120,7 +120,7 @@ def _calibrated(
 def _chosen(
     target: Target, robot: str | Path, observe: Observe, n: int, seed: int, tell: Tell | None
 ) -> Calibration:
-    """A calibration of everything whose last trials are chosen after a first fit."""
+    """Return a calibration of everything whose last trials are chosen after a first fit."""
     counting = CountingTarget(target, n, tell)
     try:
         made = calibrate_all(
@@ -294,7 +294,7 @@ def _fit(
 
 
 def _seen_as(trial: TrialRecord, observe: Observe) -> TrialRecord:
-    """A trial with no more than was to be observed."""
+    """Return a trial with no more than was to be observed."""
     if observe != "track" and len(trial.poses):
         trial = ruled(trial) if trial.purpose == PATH else replace(trial, poses=np.empty((0, 3)))
     return replace(trial, wheels=np.empty((0, 2))) if observe == "cells" else trial
@@ -311,7 +311,7 @@ def calibration_of(
     arena: str,
     seed: int,
 ) -> Calibration:
-    """The parts of a fit laid over an earlier calibration, where it builds on one."""
+    """Return the parts of a fit laid over an earlier calibration, where it builds on one."""
     below = read_calibration(robot)
     numbers, draws = dict(parts.numbers), {name: list(map(float, parts.draws[name])) for name in parts.draws}
     fitted, notes = parts.fitted, parts.notes
@@ -391,7 +391,7 @@ def _refuse_no_robot(parts: Parts, robot: str | Path, target: str) -> None:
 def _paired(
     below: Mapping[str, Sequence[float]], above: Mapping[str, Sequence[float]]
 ) -> dict[str, list[float]]:
-    """Draws of two calibrations as draws of both, row by row at random: they were fitted apart."""
+    """Return draws of two calibrations as draws of both, row by row at random: they were fitted apart."""
     n = max((len(values) for values in (*below.values(), *above.values())), default=0)
     rng = np.random.default_rng(0)
 

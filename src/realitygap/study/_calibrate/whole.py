@@ -141,7 +141,7 @@ def calibrate_all(
 
 
 def all_plans(arena: Arena, robot: RobotModel, budget: int, seed: int = 0) -> list[TrialPlan]:
-    """The trials of a calibration of everything: excitation and random controllers in turn."""
+    """Return the trials of a calibration of everything: excitation and random controllers in turn."""
     rng = np.random.default_rng([seed, 1])
     given = excitation(arena, robot.radius, (budget + 1) // 2, STEPS, rng)
     driven = [
@@ -162,7 +162,7 @@ def fit_everything(
     tell: Callable[[str], None] | None = None,
     threads: int | None = None,
 ) -> Parts:
-    """The fit of all parameters to trials that were recorded; arguments as in `calibrate_all`.
+    """Return the fit of all parameters to trials that were recorded; arguments as in `calibrate_all`.
 
     Raises:
         ValueError: Trials with commands of several lengths of time.
@@ -187,7 +187,7 @@ class _Fit:
         )
 
     def simulate(self, one: Evidence, numbers: Mapping[str, Floats], key: int) -> Vectors:
-        """(m, d) what is seen of m robots."""
+        """Return (m, d) what is seen of m robots."""
         return self.ensemble.summarize(one.play, numbers, key, one.of, keep=one.keep)
 
     def evidence(self, trials: Sequence[TrialRecord]) -> list[Evidence]:
@@ -235,7 +235,7 @@ class _Fit:
         return numbers_of(self.prior, values, self.robot)
 
     def parts(self, trials: Sequence[TrialRecord], effort: Effort) -> Parts:
-        """All that the trials tell."""
+        """Return all that the trials tell."""
         if not self.evidence(trials):
             return self._as_it_is()
         posterior = self.posterior(trials, effort)
@@ -267,7 +267,7 @@ class _Fit:
         return estimate, self.numbers(posterior.values)
 
     def chosen(self, posterior: Posterior, n: int, number: int) -> list[TrialPlan]:
-        """The n trials that tell most of how controllers do that were not tried."""
+        """Return the n trials that tell most of how controllers do that were not tried."""
         rng = np.random.default_rng([self.seed, 2])
         given = excitation(self.arena, self.robot.radius, N_CANDIDATES // 2, STEPS, rng)
         controllers = random_controllers(N_CANDIDATES, int(rng.integers(2**31)))

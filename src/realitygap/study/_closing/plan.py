@@ -122,7 +122,7 @@ class ClosingPlan:
         return self.controllers_seed + (name.seed if self.has_own_controllers else 0)
 
     def to_dict(self) -> dict[str, Any]:
-        """As plain values."""
+        """Return plain values."""
         found: dict[str, Any] = json.loads(json.dumps(asdict(self)))
         return found
 
@@ -240,7 +240,7 @@ def adopt_plan(folder: Path, plan: ClosingPlan) -> None:
 
 
 def read_plan(folder: Path) -> ClosingPlan:
-    """The plan of a folder.
+    """Return the plan of a folder.
 
     Raises:
         RecordError: There is none.

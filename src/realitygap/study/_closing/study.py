@@ -95,7 +95,7 @@ def closing_the_gap(
 
 
 def n_done(folder: Path, plan: ClosingPlan) -> int:
-    """Units that are there."""
+    """Return units that are there."""
     return sum(path.exists() for name in plan.names for path in _paths(folder, plan, name))
 
 

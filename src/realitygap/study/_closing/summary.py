@@ -81,7 +81,7 @@ def _read_units(folder: Path, plan: ClosingPlan) -> dict[str, dict[str, Row]]:
 
 
 def _goal_budget(plan: ClosingPlan) -> int:
-    """The budget by which goals are judged."""
+    """Return the budget by which goals are judged."""
     return plan.transfer_budget if plan.transfer_budget in plan.budgets else max(plan.budgets)
 
 
@@ -119,7 +119,7 @@ def _is_after(unit: str) -> bool:
 
 
 def standard_error(estimate: Row) -> float | None:
-    """That of a figure with a 95 % interval, as wide as a normal one; None where there is no interval."""
+    """Return the standard error of a figure by its 95 % interval, as of a normal one; None without an interval."""
     if estimate["low"] is None or estimate["high"] is None:
         return None
     return float(estimate["high"] - estimate["low"]) / (2 * NORMAL_95)
@@ -160,7 +160,7 @@ def _measures(unit: Row) -> Row:
 
 
 def _families(plan: ClosingPlan, twins: Sequence[Row]) -> list[Row]:
-    """RMS gap by family, observation and budget: medians over all twins, and over those that count."""
+    """Return the RMS gap by family, observation and budget: medians over all twins, and over those that count."""
     rows: list[Row] = []
     for family in plan.families:
         of_family = [twin for twin in twins if twin["family"] == family]
@@ -206,7 +206,7 @@ def _after(twin: Row, observe: str, budget: int) -> Row | None:
 
 
 def _strategies(twins: Sequence[Row]) -> list[Row]:
-    """Quality on the twins by strategy: mean over twins, with an interval over twins."""
+    """Return the quality on the twins by strategy: mean over twins, with an interval over twins."""
     found: dict[str, list[float]] = {}
     for twin in twins:
         for row in twin.get("transfer", []):
@@ -242,7 +242,7 @@ def _goals(plan: ClosingPlan, twins: Sequence[Row], budget: int) -> Iterable[Row
 
 
 def _goals_of_platform(plan: ClosingPlan, family: str, twins: Sequence[Row], budget: int) -> Iterable[Row]:
-    """Goals of one robot over its sittings, none of which is left out; of all controllers, and of each kind."""
+    """Return goals of one robot over its sittings, none of which is left out; of all controllers, and of each kind."""
     pairs = [(twin, after) for twin in twins if twin["family"] == family for after in twin["calibrated"]]
     for observe in plan.observations:
         if (family, observe) in plan.unseen:
@@ -323,7 +323,7 @@ def _goal(
 
 
 def _no_family_worse(plan: ClosingPlan, observe: str, falls: Sequence[tuple[Row, Row, float]]) -> Row:
-    """The smallest median fall of a family."""
+    """Return the smallest median fall of a family."""
     by_family = {
         family: [value for twin, _, value in falls if twin["family"] == family] for family in plan.families
     }
@@ -342,7 +342,7 @@ def _no_family_worse(plan: ClosingPlan, observe: str, falls: Sequence[tuple[Row,
 
 
 def _wins(counted: Sequence[Row], observe: str, other: str, least: float) -> Row:
-    """On which share of twins `posterior` does better than another strategy; a draw is half a win."""
+    """Return the share of twins on which `posterior` does better than another strategy; a draw is half a win."""
     pairs = []
     for twin in counted:
         quality = {row["strategy"]: row["quality"]["estimate"] for row in twin.get("transfer", [])}
@@ -372,7 +372,7 @@ def _wins(counted: Sequence[Row], observe: str, other: str, least: float) -> Row
 
 
 def _why_unknown(name: str, after: Row) -> str:
-    """Why a twin has no such figure."""
+    """Return the reason why a twin has no such figure."""
     gap = after["gap"]
     if name.startswith("MMRV") and gap["mmrv_floor"] == 0 and gap["mmrv"] is not None:
         return f"its floor is 0, the same order in both halves of its trials; MMRV is {gap['mmrv']:.3f}"
@@ -396,7 +396,7 @@ def _why(row: Row, after: Row, value: float) -> Row:
 
 
 def median_interval(values: Sequence[float]) -> Row:
-    """The median, with the 95 % interval between two of the values in order; without one below six of them.
+    """Return the median, with the 95 % interval between two of the values in order; without one below six of them.
 
     Source: Conover (1999), Practical Nonparametric Statistics, section 3.2.
     """
@@ -443,7 +443,7 @@ def pooled_fall(before: Sequence[float], after: Sequence[float]) -> Row:
 
 
 def _mean_interval(values: Sequence[float]) -> Row:
-    """The mean, with Student's 95 % interval."""
+    """Return the mean, with Student's 95 % interval."""
     n = len(values)
     if not n:
         return {"estimate": None, "low": None, "high": None}
@@ -455,7 +455,7 @@ def _mean_interval(values: Sequence[float]) -> Row:
 
 
 def share_interval(successes: float, n: int) -> tuple[float | None, float | None]:
-    """Wilson's 95 % interval of a share."""
+    """Return Wilson's 95 % interval of a share."""
     if not n:
         return None, None
     p, z2 = successes / n, NORMAL_95**2

@@ -58,7 +58,7 @@ class ClosingTwin:
     tell: Callable[[str], None]
 
     def carry_out(self) -> None:
-        """All units that are missing."""
+        """Compute all units that are missing."""
         missing = [unit for unit in self.plan.units(self.name) if not self._path(unit).exists()]
         if not missing:
             return
@@ -97,7 +97,7 @@ class ClosingTwin:
     # the same controllers on both sides
 
     def _judge(self, target: Target) -> dict[str, Any]:
-        """The held-out controllers on the twin: crossed cells of each trial, and the share of stalled steps."""
+        """Return the held-out controllers on the twin: crossed cells of each trial, and the share of stalled steps."""
         n = self.plan.trials
         repeated = [genome for genome in self.genomes for _ in range(n)]
         trials = target.carry_out(plans_of(self.condition, repeated, JUDGING, "held out"), "cells")
@@ -185,7 +185,7 @@ class ClosingTwin:
     # transfer
 
     def _transfer(self, target: Target) -> dict[str, Any]:
-        """Each strategy at equal budget; `posterior` for each way to observe, calibrated by its share of the budget."""
+        """Judge each strategy at equal budget. For `posterior`, calibration has its share of the budget."""
         budget = self.plan.transfer_budget
         rows = self._strategies(target, "any", STRATEGIES, None)
         for observe in self.plan.observations:

@@ -72,7 +72,7 @@ class GapPlan:
 
 
 def pilot_spreads(seed: int = 1, arena: str | Arena = "paper", task: Task | None = None) -> Spreads:
-    """Spreads of random controllers on `sim`: 30 of them, tried 20 times each, and scored by a task or by coverage.
+    """Return spreads of 30 random controllers on `sim`, tried 20 times each, and scored by a task or by coverage.
 
     Raises:
         TaskError: The task cannot be scored in the arena.
@@ -89,7 +89,7 @@ def pilot_spreads(seed: int = 1, arena: str | Arena = "paper", task: Task | None
 
 
 def recorded_spreads(path: str, task: Task | None = None) -> Spreads:
-    """Spreads of the controllers in a file of observed trials, scored by a task; by coverage if none is given.
+    """Return spreads of the controllers in a file of observed trials, scored by a task; by coverage if none is given.
 
     Raises:
         RecordError: The file cannot be read.

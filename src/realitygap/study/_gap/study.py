@@ -189,7 +189,7 @@ def study_gap(
 def _paced(
     source: Target, target: Target, on_target: Sequence[TrialRecord]
 ) -> tuple[Target, tuple[str, ...]]:
-    """The simulator with commands as long as most of a robot's trials had, and what there is to say of it."""
+    """Return the simulator with commands as long as most of a robot's trials had, and what there is to say of it."""
     step_s = float(np.median([trial.step_s for trial in on_target]))
     if not (isinstance(source, SimTarget) and source.is_paced and target.is_paced):
         return source, ()
@@ -250,12 +250,12 @@ def _carry_out(
 
 
 def _by_controller(trials: Sequence[TrialRecord], n: int) -> list[TrialRecord]:
-    """Trials that went round n controllers, those of a controller together."""
+    """Return trials that went round n controllers, those of a controller together."""
     return [trials[k] for i in range(n) for k in range(i, len(trials), n)]
 
 
 def side_of(platform: Target, trials: Sequence[TrialRecord], n: int, task: Task) -> GapSide:
-    """Trials that went round n controllers, as a side of a gap.
+    """Return trials that went round n controllers, as a side of a gap.
 
     Raises:
         TaskError: A trial has less than the task needs.
@@ -325,7 +325,7 @@ def _reevolved(
     target: Target,
     task: Task,
 ) -> Estimate:
-    """Quality of what was evolved on the target, there, less that of what was evolved in simulation, in simulation."""
+    """Return the quality on the target of what was evolved there, less that in simulation of what was evolved in it."""
     if not reevolved:
         return Estimate.refusal(0, "Nothing was evolved on the target (--reevolved).")
     champions = [(k, each) for k, each in enumerate(controllers) if each.kind == "champion"]

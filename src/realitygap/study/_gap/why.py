@@ -34,7 +34,7 @@ TRIALS = 8
 
 
 def part_of(number: str) -> str:
-    """The part of the model that a number of a robot belongs to: motor for `drive.lag`."""
+    """Return the part of the model that a number of a robot belongs to: motor for `drive.lag`."""
     return _OWN.get(number) or _BY_FIRST.get(number.partition(".")[0], "sensor noise")
 
 

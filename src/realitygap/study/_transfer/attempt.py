@@ -35,7 +35,7 @@ class Simulation:
         *,
         runs: int | None = None,
     ) -> list[Champion]:
-        """The champions of a replicate's runs under a condition, the best in simulation first.
+        """Return the champions of a replicate's runs under a condition, the best in simulation first.
 
         Args:
             condition: As `evolve_champions` wants it.
@@ -87,7 +87,7 @@ class Attempt:
         return self.budget - self.target.spent
 
     def champions(self, condition: Condition | None = None) -> list[Champion]:
-        """Champions evolved under a condition, the attempt's own when not given; the best in simulation first."""
+        """Return champions evolved under a condition, the attempt's own by default; the best in simulation first."""
         return self.simulation.champions(condition or self.condition, self.replicate)
 
     def try_on_target(self, genomes: Sequence[Genome]) -> tuple[list[float], list[tuple[int, ...]]]:
@@ -105,7 +105,7 @@ class Attempt:
 def plans_of(
     condition: Condition, genomes: Sequence[Genome], first: int, purpose: str = "controller"
 ) -> list[TrialPlan]:
-    """A trial for each genome, as long as those of the condition, numbered from `first` on."""
+    """Return a trial for each genome, as long as those of the condition, numbered from `first` on."""
     steps, sees_end = condition.on.steps, condition.task_of_trials.needs_trace
     return [
         TrialPlan(genome=genome, steps=steps, number=first + k, purpose=purpose, sees_end=sees_end)

@@ -35,17 +35,17 @@ _RECOMMENDED = {FITTED: "calibrated", POSTERIOR: "posterior", NOMINAL: "nominal"
 
 
 def calibrated(attempt: Attempt) -> Champion:
-    """Evolved in the simulator with the numbers that were fitted; trials that are left choose as in select."""
+    """Evolve in the simulator with the fitted numbers, and choose by the trials that are left, as `select` does."""
     return best_on_target(attempt, attempt.champions(_fitted(attempt, "calibrated")))
 
 
 def posterior(attempt: Attempt) -> Champion:
-    """Evolved with a robot of the posterior drawn for each trial; trials that are left choose as in select."""
+    """Evolve with a robot of the posterior for each trial, and choose by the trials that are left, as `select` does."""
     return best_on_target(attempt, attempt.champions(_fitted(attempt, "posterior")))
 
 
 def recommended(attempt: Attempt) -> Champion:
-    """Evolved with the numbers that the calibration recommends; trials that are left choose as in select."""
+    """Evolve with the numbers that the calibration recommends, and choose by the trials that are left."""
     return best_on_target(attempt, attempt.champions(_fitted(attempt, "recommended")))
 
 
@@ -109,7 +109,7 @@ class Calibrating:
     tell: Callable[[str], None]
 
     def __call__(self, condition: Condition, left: int) -> tuple[Calibration, RobotModel]:
-        """The calibration for a budget of `left` trials, and the robot on whose numbers it builds."""
+        """Return the calibration for a budget of `left` trials, and the robot on whose numbers it builds."""
         if self.file is None:
             return self._on_budget(condition, left - left // SELECTING), needs_sim(
                 condition, "calibrated"
@@ -134,7 +134,7 @@ class Calibrating:
             )
 
     def _on_budget(self, condition: Condition, n: int) -> Calibration:
-        """A calibration by n trials, or the one that is there."""
+        """Return a calibration by n trials, or the one that is there."""
         name = f"{n}-{self.observe}-{self.replicate}"
         path = self.folder / f"{name}.toml"
         if path.exists():

@@ -15,7 +15,7 @@ POPULATION = 8
 
 
 def direct(attempt: Attempt) -> Champion:
-    """Evolved on the target with the paper's population; of the last generation as many are tried as trials are left.
+    """Evolve on the target with the paper's population. The last generation is tried as far as trials are left.
 
     The champion is the individual with the best score in its one trial, as in the paper; of equals the first one.
     """
@@ -36,7 +36,7 @@ def direct(attempt: Attempt) -> Champion:
 
 
 def _untried(genome: Genome, attempt: Attempt) -> Champion:
-    """A champion of which the simulation knows nothing."""
+    """Return a champion of which the simulation knows nothing."""
     n_cells = attempt.target.arena.grid.n_cells
     return Champion(genome, float("nan"), np.full(n_cells, np.nan))
 

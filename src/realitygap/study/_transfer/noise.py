@@ -35,7 +35,7 @@ IR = {"amplitude": (0.7, 1.3), "decay": (0.7, 1.4)}
 
 
 def noise(attempt: Attempt) -> Champion:
-    """Evolved under each of the paper's levels of noise; these share the trials, and the best on average is kept.
+    """Evolve under each of the paper's levels of noise, which share the trials, and keep the best on average.
 
     Each level has a third of the runs and of the trials. Which one is kept the trials of the budget decide and nothing
     else; with fewer than three trials it is the middle one.
@@ -57,12 +57,12 @@ def noise(attempt: Attempt) -> Champion:
 
 
 def randomized(attempt: Attempt) -> Champion:
-    """Evolved with numbers of the robot drawn for each trial; the N best are tried as in select."""
+    """Evolve with numbers of the robot drawn for each trial, and try the N best as `select` does."""
     return best_on_target(attempt, attempt.champions(randomized_condition(attempt.condition)))
 
 
 def randomized_condition(condition: Condition) -> Condition:
-    """The condition with numbers of its robot drawn for each trial.
+    """Return the condition with numbers of its robot drawn for each trial.
 
     Raises:
         StudyError: It is not on platform `sim`, which alone has such numbers.
@@ -98,7 +98,7 @@ def needs_sim(condition: Condition, strategy: str) -> SimPlatform:
 
 
 def changed_condition(condition: Condition, name: str, **changes: object) -> Condition:
-    """The condition under another name, with other noise, or other settings of its platform."""
+    """Return the condition under another name, with other noise, or other settings of its platform."""
     settings = dict(condition.settings())
     if "noise" in changes:
         settings["noise"] = changes.pop("noise")

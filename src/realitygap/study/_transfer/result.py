@@ -102,7 +102,7 @@ class TransferResult:
         return card_of(self).to_html()
 
     def to_dict(self) -> dict[str, Any]:
-        """As plain values, for JSON; `strategies` has `quality` and `regret` with `estimate`, `low`, `high`, `n`.
+        """Return plain values for JSON. `strategies` has `quality` and `regret` with `estimate`, `low`, `high`, `n`.
 
         Scores of champions are named `coverage` if they are that; otherwise `scores`, and `score` says of what.
         """
@@ -121,7 +121,7 @@ def summarize_transfer(
     known: Sequence[float] = (),
     score_range: tuple[float, float] = (0.0, 1.0),
 ) -> tuple[tuple[Strategist, ...], float]:
-    """Quality and regret by strategy and budget, in the order in which they come, and the best known quality.
+    """Return the quality and regret by strategy and budget, in the order of the strategies, and the best known quality.
 
     Intervals are of means over replicates; of a single replicate they are of its fresh trials, and nothing is said of
     another evolution. Regret is to the best, taken as it is.
@@ -148,7 +148,7 @@ def summarize_transfer(
 
 
 def estimate_mean(values: NDArray[np.float64], within: tuple[float, float] = (0.0, 1.0)) -> Estimate:
-    """The mean of scores (r, t), t trials of each of r replicates, with Student's interval over replicates.
+    """Return the mean of scores (r, t), t trials of each of r replicates, with Student's interval over replicates.
 
     A resampling of two or three would repeat each of them, and end at the extremes. Replicates that happen to be alike
     are as uncertain as their trials make them. Of one replicate the interval is over its trials; of one trial there is

@@ -9,17 +9,17 @@ from .simulated import Champion
 
 
 def plain(attempt: Attempt) -> Champion:
-    """The best champion in simulation; no trial on the target."""
+    """Return the best champion in simulation, without a trial on the target."""
     return attempt.champions()[0]
 
 
 def select(attempt: Attempt) -> Champion:
-    """The N best champions in simulation, each tried once on the target: the best there; of equals the first."""
+    """Try each of the N best champions in simulation once on the target, and return the first of the best."""
     return best_on_target(attempt, attempt.champions())
 
 
 def halving(attempt: Attempt) -> Champion:
-    """Champions tried in rounds, each with half of what is left on those that were best so far.
+    """Try champions in rounds, and give half of the trials that are left to those that were best so far.
 
     Source: successive halving (Karnin, Koren & Somekh, 2013). Differs: one trial each in a round, so that rounds halve
     the trials as well; means are over all rounds.

@@ -49,7 +49,7 @@ def refuse_unevolved(condition: Condition) -> None:
 
 
 def evolve_champions(condition: Condition, runs: range, *, repeats: int) -> list[Champion]:
-    """The champions of some runs, the best in simulation first.
+    """Return the champions of some runs, the best in simulation first.
 
     An individual is worth its mean score over its repeats; novelty, where that selects, is of the first repeat. A
     champion is the individual with the best mean score in all generations of its run.
@@ -85,7 +85,7 @@ def evolve_champions(condition: Condition, runs: range, *, repeats: int) -> list
 
 
 def rank_genomes(condition: Condition, genomes: Sequence[Genome], first: int = 0) -> list[Champion]:
-    """Genomes tried `RETRIES` times in simulation, the best first.
+    """Return genomes tried `RETRIES` times in simulation, the best first.
 
     Args:
         condition: Whose platform and noise.
@@ -105,7 +105,7 @@ def rank_genomes(condition: Condition, genomes: Sequence[Genome], first: int = 0
 def try_repeatedly(
     condition: Condition, genomes: Sequence[Genome], keys: Sequence[NoiseKey], repeats: range
 ) -> tuple[TrialBatch, NDArray[np.float64]]:
-    """Genomes tried on the condition's platform and scored by its task, each once for each repeat.
+    """Return genomes tried on the condition's platform and scored by its task, each once for each repeat.
 
     Returns:
         As `score_genomes`.
@@ -125,7 +125,7 @@ def try_repeatedly(
 
 
 def crossed_cells(batch: TrialBatch, repeats: int) -> NDArray[np.bool_]:
-    """(n, repeats, c) whether each of n genomes crosses each cell in each of its trials, which lie together."""
+    """Return (n, repeats, c) whether each of n genomes crosses each cell in each of its trials, which lie together."""
     n_trials, n_cells = batch.cells.shape
     crossed = np.zeros((n_trials, n_cells), np.bool_)
     rows, places = np.nonzero(np.arange(n_cells) < batch.n_line[:, None])
@@ -134,7 +134,7 @@ def crossed_cells(batch: TrialBatch, repeats: int) -> NDArray[np.bool_]:
 
 
 def visited_share(batch: TrialBatch, repeats: int) -> NDArray[np.float64]:
-    """(n, c) share of the repeats in which each of n genomes visits each cell; repeats of one lie together."""
+    """Return (n, c) share of the repeats in which each of n genomes visits each cell; repeats of one lie together."""
     return np.asarray(crossed_cells(batch, repeats).mean(axis=1), np.float64)
 
 

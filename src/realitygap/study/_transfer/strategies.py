@@ -209,7 +209,7 @@ def transfer(
 
 
 def strategy_names(strategies: str | Sequence[str]) -> tuple[str, ...]:
-    """Names of strategies, 'all' resolved.
+    """Return names of strategies, 'all' resolved.
 
     Raises:
         StudyError: One is unknown.
@@ -223,7 +223,7 @@ def strategy_names(strategies: str | Sequence[str]) -> tuple[str, ...]:
 
 
 def choose_condition(study: Study | str | Path, name: str | None, seed: int) -> Condition:
-    """The condition of a study that is evolved, with a seed.
+    """Return the condition of a study that is evolved, with a seed.
 
     Raises:
         StudyError: No such study or condition, or one that cannot be transferred.
@@ -256,7 +256,7 @@ def choose_condition(study: Study | str | Path, name: str | None, seed: int) -> 
 
 
 def _at_the_pace_of(target: Target, condition: Condition) -> Condition:
-    """The condition with a robot whose commands last as long as the target's, unless it says itself how long."""
+    """Return the condition with a robot whose commands last as long as the target's, unless it says itself how long."""
     if not target.is_paced:
         return condition
     return condition.model_copy(update={"on": condition.on.at_pace(target.step_s)})
@@ -296,7 +296,7 @@ class _Work:
                     self._calibration(0).refuse(self.condition, budget)
 
     def carry_out(self, strategy: str, budget: int, replicate: int) -> Transferred:
-        """The champion of a strategy, with its fresh trials."""
+        """Return the champion of a strategy, with its fresh trials."""
         spends = strategy not in WITHOUT_TRIALS
         name = f"{strategy}-{budget if spends else 0}-{replicate}"
         self.tell(f"{strategy}, {budget} trials, replicate {replicate + 1} of {self.plan.replicates}")
@@ -319,7 +319,7 @@ class _Work:
         return Transferred(strategy, budget, kept.spent, replicate, genome, simulated, scores)
 
     def known(self) -> list[float]:
-        """Mean scores of all champions that were tried in this folder, by this call or an earlier one."""
+        """Return the mean scores of all champions that were tried in this folder, by this call or an earlier one."""
         files = sorted((self.folder / "fresh").glob("*.jsonl"))
         tried = [[each for each in read_observations(file).trials if is_whole(each)] for file in files]
         return [
@@ -338,7 +338,7 @@ class _Work:
         )
 
     def _looks_at(self, strategy: str) -> Observe:
-        """The least that a strategy has to see of a trial on the target."""
+        """Return the least that a strategy has to see of a trial on the target."""
         needs_cells = strategy == "transferability" or (
             strategy == "direct" and self.condition.selection == "novelty"
         )
@@ -346,7 +346,7 @@ class _Work:
         return max(task.observe, "cells", key=OBSERVATIONS.index) if needs_cells else task.observe
 
     def _fresh(self, genome: Genome, name: str, first: int) -> tuple[float, ...]:
-        """The scores of a champion in fresh trials."""
+        """Return the scores of a champion in fresh trials."""
         n, task = self.plan.fresh_trials, self.condition.task_of_trials
         path = self.folder / "fresh" / f"{name}.jsonl"
         with KeptTarget(self.target, path, n, first, observe=task.observe) as fresh:
@@ -382,7 +382,7 @@ def _adopt(folder: Path, plan: TransferPlan) -> None:
 
 
 def _fit_of(calibration: str | Path) -> str:
-    """SHA-256 of what the file of a calibration says, but in words, or of when, where and by what it was made.
+    """Return the SHA-256 of a calibration's file without its words, and without when, where, and by what it was made.
 
     Of the robot on whose numbers it builds counts what it is, and not where its file lies.
     """

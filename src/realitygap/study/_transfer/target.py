@@ -66,7 +66,7 @@ class KeptTarget(WrappedTarget):
         return [self._checked(plan, observe) for plan in numbered]
 
     def _checked(self, plan: TrialPlan, observe: Observe) -> TrialRecord:
-        """The trial of a plan, if it is that."""
+        """Return the trial of a plan, if it is that."""
         trial = self._kept[plan.number]
         genome = "" if plan.genome is None else plan.genome.to_json()
         enough = OBSERVATIONS.index(trial.observe) >= OBSERVATIONS.index(observe)

@@ -26,7 +26,7 @@ SMALLEST = 1e-6
 
 
 def transferability(attempt: Attempt) -> Champion:
-    """Evolved for fitness, predicted disparity and diversity; the budget's trials teach the prediction one by one.
+    """Evolve for fitness, predicted disparity and diversity. The budget's trials train the prediction one by one.
 
     A behavior is the share of an individual's trials in simulation that visit each cell; behaviors are compared by the
     generalized Jaccard distance. Disparity is that distance to the cells visited on the target, and is predicted from
@@ -76,7 +76,7 @@ def _generations(attempt: Attempt) -> int:
 def _simulate(
     attempt: Attempt, genomes: Sequence[Genome], replicate: int, generation: int
 ) -> tuple[Values, Values]:
-    """(n,) mean score, and (n, c) share of repeats in which each cell was visited."""
+    """Return (n,) mean score, and (n, c) share of repeats in which each cell was visited."""
     key, repeats = attempt.condition.key, attempt.simulation.repeats
     keys = [NoiseKey(key, replicate, generation, k) for k in range(len(genomes))]
     batch, scores = try_repeatedly(attempt.condition, genomes, keys, range(repeats))
@@ -106,11 +106,11 @@ class _Known:
         return int(distances(visits, np.stack(self.visits)).min(axis=1).argmax())
 
     def disparity(self, visits: Values) -> Values:
-        """(n,) predicted."""
+        """Return the predicted values, (n,)."""
         return self._interpolated(visits, self.disparities)
 
     def difference(self, visits: Values) -> Values:
-        """(n,) predicted score on the target less that in simulation."""
+        """Return the predicted score on the target less that in simulation, (n,)."""
         return self._interpolated(visits, self.differences)
 
     def _interpolated(self, visits: Values, values: Sequence[float]) -> Values:
@@ -143,14 +143,14 @@ class _Fronts:
 
 
 def distances(one: Values, other: Values) -> Values:
-    """(n, m) generalized Jaccard distance of shares (n, c) and (m, c): 1 - sum of the lesser / sum of the greater."""
+    """Return the generalized Jaccard distances (n, m) of shares (n, c) and (m, c): 1 - sum of min / sum of max."""
     lesser = np.minimum(one[:, None], other[None]).sum(axis=2)
     greater = np.maximum(one[:, None], other[None]).sum(axis=2)
     return np.where(greater > 0, 1 - lesser / np.where(greater > 0, greater, 1), 0.0)
 
 
 def nsga2_order(objectives: Values) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Individuals by front and, within a front, by crowding distance, the best first; and those of the first front.
+    """Return individuals by front and then by crowding distance, the best first; and those of the first front.
 
     Args:
         objectives: (n, m) more is better.
@@ -170,7 +170,7 @@ def nsga2_order(objectives: Values) -> tuple[NDArray[np.intp], NDArray[np.intp]]
 
 
 def _crowding(objectives: Values) -> Values:
-    """(n,) how far the neighbors of each are apart, over all objectives; inf at the ends."""
+    """Return (n,) how far the neighbors of each are apart, over all objectives; inf at the ends."""
     crowding = np.zeros(len(objectives))
     for values in objectives.T:
         order = np.argsort(values, kind="stable")

@@ -119,7 +119,7 @@ def fit_camera(
 
 
 def _placed(lens: Lens, points: Floats, pixels: Floats) -> Camera:
-    """A camera whose lens is known."""
+    """Return a camera whose lens is known."""
     cv2 = from_extra("cv2", "vision")
     distortion = np.array(lens.distortion)
     _, turn, shift = cv2.solvePnP(points, pixels, lens.matrix, distortion, flags=cv2.SOLVEPNP_ITERATIVE)
@@ -133,7 +133,7 @@ def _rms(camera: Camera, points: Floats, pixels: Floats) -> float:
 
 
 def _spread(robot: Floats) -> Floats:
-    """Views of the robot's tag from all over the picture, no more than are of use."""
+    """Return views of the robot's tag from all over the picture, no more than are of use."""
     if len(robot) <= MOST_ROBOT_VIEWS:
         return robot
     middles = robot.mean(axis=1)
@@ -146,7 +146,7 @@ def _spread(robot: Floats) -> Floats:
 
 
 def _with_lens(size: tuple[int, int], points: Floats, pixels: Floats, views: Floats, tag: RobotTag) -> Camera:
-    """A camera with the lens that fits best."""
+    """Return a camera with the lens that fits best."""
     found = [
         _fit_from(_lens(size, guess * size[0], 0.0, 0.0), points, pixels, views, tag)
         for guess in FOCAL_GUESSES
@@ -205,7 +205,7 @@ def _fit_from(
 
 
 def square_poses(corners: Floats, tag: RobotTag) -> tuple[Floats, Floats, Floats]:
-    """Middle and direction of squares from their corners in the plane, and how far they are from that square.
+    """Return the middle and direction of squares from their corners in the plane, and their distance from a square.
 
     Args:
         corners: (n, 4, 2) [m].

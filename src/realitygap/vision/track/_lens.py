@@ -51,7 +51,7 @@ class Lens:
         return np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
 
     def to_pixels(self, directions: Floats) -> Floats:
-        """Pixels of (n, 2) directions x / z, y / z of the camera's own axes."""
+        """Return pixels of (n, 2) directions x / z, y / z of the camera's own axes."""
         x, y = directions[:, 0], directions[:, 1]
         k1, k2, p1, p2, k3 = self.distortion
         r2 = x * x + y * y
@@ -101,7 +101,7 @@ class Lens:
 
 
 def read_lens(path: Path | str) -> Lens:
-    """The lens that a file of `realitygap lens` describes.
+    """Return the lens that a file of `realitygap lens` describes.
 
     Raises:
         VisionError: There is no such file, or it is none.
@@ -131,7 +131,7 @@ def read_lens(path: Path | str) -> Lens:
 
 
 def fit_lens(images: Iterable[NDArray[np.uint8]], columns: int, rows: int, square: float) -> Lens:
-    """The lens of a camera that was shown a chessboard from several sides.
+    """Return the lens of a camera that was shown a chessboard from several sides.
 
     Args:
         images: Gray pictures. Pictures without the whole board are left out, and so are those with the board at the

@@ -84,7 +84,7 @@ def _at(points: np.ndarray, z: float) -> np.ndarray:
 
 
 def _parts(seen: np.ndarray, *, is_seen: bool) -> list[tuple[int, int]]:
-    """First and last row of each stretch that is of one kind."""
+    """Return the first and last row of each stretch that is of one kind."""
     rows = np.flatnonzero(seen == is_seen)
     stretches = np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1) if len(rows) else []
     return [(int(each[0]), int(each[-1])) for each in stretches]

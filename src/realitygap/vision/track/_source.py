@@ -37,7 +37,7 @@ class Source(Protocol):
     rate: float
 
     def __iter__(self) -> Iterator[tuple[float, Image]]:
-        """Time [s] and picture (height, width, 3) blue, green, red, or (height, width) gray, in order."""
+        """Return the time [s] and picture (height, width, 3) blue, green, red, or (height, width) gray, in order."""
         ...
 
     def close(self) -> None:
@@ -96,7 +96,7 @@ class VideoFile:
         return _capture(str(self.path))
 
     def __iter__(self) -> Iterator[tuple[float, Image]]:
-        """All pictures."""
+        """Yield all pictures."""
         cv2 = from_extra("cv2", "vision")
         capture = self._open()
         last = -1.0
@@ -156,7 +156,7 @@ class CameraDevice(ClosedOnExit):
 
 
 def open_source(name: str) -> VideoFile | CameraDevice:
-    """A camera by its number, or a video by its file.
+    """Return a camera by its number, or a video by its file.
 
     Raises:
         VisionError: There is no such thing.

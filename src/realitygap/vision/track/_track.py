@@ -62,7 +62,7 @@ class Track:
         return np.column_stack([np.interp(times, self.times, column) for column in self.poses.T])
 
     def between(self, first_s: float, last_s: float) -> Track:
-        """The part from one time to another [s], with poses at both ends."""
+        """Return the part from one time to another [s], with poses at both ends."""
         inside = (self.times > first_s) & (self.times < last_s)
         ends = self.at(np.array([first_s, last_s]))
         poses = np.concatenate([ends[:1], self.poses[inside], ends[1:]])
@@ -81,7 +81,7 @@ class Track:
         return Track(times[there], poses[there], seen[there], self.size_error)
 
     def cells(self, grid: Grid) -> tuple[int, ...]:
-        """The cells that its line crosses, in the order of their first visits."""
+        """Return the cells that its line crosses, in the order of their first visits."""
         return cells_along(self.poses[:, :2], grid)
 
     def to_csv(self) -> str:

@@ -25,7 +25,7 @@ FASTEST = 1.5  # sides of the tag from one picture to the next, beyond what it m
 
 
 def make_detector(family: str) -> Any:
-    """OpenCV's detector of a family, with corners to parts of a pixel."""
+    """Return OpenCV's detector of a family, with corners to parts of a pixel."""
     aruco = from_extra("cv2", "vision").aruco
     rules = aruco.DetectorParameters()
     rules.cornerRefinementMethod = aruco.CORNER_REFINE_SUBPIX

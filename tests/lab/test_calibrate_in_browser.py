@@ -61,7 +61,7 @@ def n_plotted(page) -> int:
 def test_cards_state_the_trials_and_minutes_of_each_kind():
     robot = load_robot(class_of("scribbler:port").base_robot)
     for kind, (_, _, n_trials, minutes) in _KINDS.items():
-        plans = KINDS[kind].plans(load_arena("paper"), robot, None)
+        plans = KINDS[kind].plans(load_arena("paper"), robot)
         seconds = sum(len(plan.commands) * STEP_S + PLACING_S for plan in plans)
         assert (n_trials, minutes) == (len(plans), round(seconds / 60)), kind
 

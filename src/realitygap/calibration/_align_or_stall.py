@@ -16,7 +16,7 @@ import numpy as np
 from realitygap.records import TrialRecord
 from realitygap.world import Arena, RobotModel
 
-from ._simulate import Bools, Floats, plain_numbers
+from ._simulate import Bools, Floats
 
 TOUCHES_M = 0.006
 ALIGNED = math.radians(1.0)  # turned by so much in the step after the first touch
@@ -43,7 +43,7 @@ class Encounters:
 def encounters_of(trials: Sequence[TrialRecord], robot: RobotModel, arena: Arena) -> Encounters:
     """Return all first touches in trials with poses, on which another step of the same command follows."""
     outline = np.array([point for part in robot.body for point in part.outline()])
-    axle = plain_numbers(robot)["drive.axle"]
+    axle = robot.centers()["drive.axle"]
     margins, aligned = [], []
     for trial in trials:
         for row in _straight_rows(trial):

@@ -13,7 +13,7 @@ import numpy as np
 
 from realitygap.platforms import SimEnsemble
 from realitygap.records import TrialRecord
-from realitygap.world import Arena, Distribution, RobotModel
+from realitygap.world import Arena, RobotModel
 
 from ._abc import Posterior
 from ._posterior import N_DRAWS
@@ -86,10 +86,7 @@ def fit_from_poses(
 
 def own_places(robot: RobotModel, parameters: Sequence[Parameter]) -> Floats:
     """Return the places of the robot's own numbers for parameters, (p,); the middle if it has none."""
-    numbers = {
-        name: value.center if isinstance(value, Distribution) else value
-        for name, value in robot.numbers().items()
-    }
+    numbers = robot.centers()
     own = {
         "drive.gain": numbers["drive.gain_left"],
         "drive.asymmetry": 0.0,
@@ -130,15 +127,14 @@ def sensors_of(
     )
     names = [scale.name for scale in model.scales]
     free = [p for p in parameters if p.name.removeprefix("range.") in names]
-    own = robot.numbers()
+    own = robot.centers()
     k = robot.range.index(first)
 
     def values_of_model(places: Floats) -> Floats:
         values = values_at(free, places)
         columns = []
         for name in names:
-            plain = own.get(f"range.{k}.{name}", 0.0)
-            center = plain.center if isinstance(plain, Distribution) else plain
+            center = own.get(f"range.{k}.{name}", 0.0)
             columns.append(values.get(f"range.{name}", np.full(len(places), center)))
         return np.stack(columns, axis=1)
 

@@ -18,7 +18,7 @@ from ._motion import N_DRAWS, MotionFit, fitted_parameter, nothing_known, observ
 from ._posterior import sample_clusters
 from ._prior import Parameter
 from ._shooting import Problem, make_problem
-from ._simulate import Floats, Simulate, motor_noise, plain_numbers
+from ._simulate import Floats, Simulate, motor_noise
 from ._windows import CHANNELS, make_windows, wrapped
 
 METHOD = (
@@ -75,7 +75,7 @@ def fit_contact(
         raise ValueError(
             "In no trial the robot was seen to meet a wall, expected some. Record trials of contact_plans."
         )
-    own = plain_numbers(robot)
+    own = robot.centers()
     noise = {name: own[name] for name in motor_noise(robot)}
     problem = make_problem(simulate, robot, known, windows, CONTACT)
     return _report(problem, noise, np.random.default_rng(seed), encounters_of(seen, robot, arena))

@@ -9,7 +9,7 @@ import numpy as np
 from realitygap.world import RobotModel
 
 from ._prior import Parameter, numbers_of, scribbler_prior
-from ._simulate import Floats, plain_numbers
+from ._simulate import Floats
 
 MOTION = (
     "drive.gain", "drive.asymmetry", "drive.track", "drive.axle", "drive.lag", "drive.delay", "drive.slip",
@@ -51,7 +51,7 @@ def place_of(parameter: Parameter, value: float) -> float:
 
 def own_values(robot: RobotModel) -> dict[str, float]:
     """Return values of the parameters with the robot's own numbers."""
-    now = plain_numbers(robot)
+    now = robot.centers()
     left, right = now["drive.gain_left"], now["drive.gain_right"]
     return {**now, "drive.gain": (left + right) / 2, "drive.asymmetry": left - right}
 

@@ -26,7 +26,7 @@ from ._shooting import (
     widening,
     widening_of_noise,
 )
-from ._simulate import Bools, Floats, Ints, Simulate, plain_numbers
+from ._simulate import Bools, Floats, Ints, Simulate
 from ._windows import CHANNELS, make_windows
 
 METHOD = (
@@ -149,7 +149,7 @@ def nothing_known(names: Sequence[str], known: Known, robot: RobotModel, method:
 
 def _solve(problem: Problem) -> tuple[Problem, Floats, DeadBand, Floats]:
     noise = FIRST_NOISE
-    problem = problem.fixed_at(**{"drive.dead_band": plain_numbers(problem.robot)["drive.dead_band"]})
+    problem = problem.fixed_at(**{"drive.dead_band": problem.robot.centers()["drive.dead_band"]})
     scatter = scatter_of(problem, problem.own)
     place = _first_place(problem, scatter, noise)
     for turn in range(MOST_ROUNDS):

@@ -13,7 +13,7 @@ from realitygap.world import Fitted, RobotModel
 
 from ._held_out import HeldOut, HeldOutFit
 from ._log_model import MotionLog, encoder_likelihood, seen_rows, track, wheel_steps
-from ._simulate import Floats, plain_numbers
+from ._simulate import Floats
 
 N_DRAWS = 200
 ENDS = (0.05, 0.95)
@@ -319,7 +319,7 @@ class _Problem:
 
     @classmethod
     def of(cls, logs: Sequence[MotionLog], robot: RobotModel) -> _Problem:
-        now = plain_numbers(robot)
+        now = robot.centers()
         left, right = now["drive.gain_left"], now["drive.gain_right"]
         own = {name: value for name, value in now.items() if name.startswith("drive.")}
         own |= {"drive.gain": (left + right) / 2, "drive.asymmetry": left - right}

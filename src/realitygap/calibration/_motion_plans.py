@@ -9,7 +9,7 @@ import numpy as np
 from realitygap.trials import TrialPlan
 from realitygap.world import Arena, Pose, RobotModel
 
-from ._simulate import Floats, plain_numbers
+from ._simulate import Floats
 
 STEPS = 100  # of a trial
 N_PLANS = 10
@@ -40,7 +40,7 @@ def motion_plans(arena: Arena, robot: RobotModel, n: int = N_PLANS) -> list[Tria
     """
     start, room = roomiest_place(arena, robot)
     reach = max(room[0] / TOO_FAST, 0.0), max(room[1] / TOO_FAST, 0.0)
-    step_m = plain_numbers(robot)["drive.speed"] * robot.step_s
+    step_m = robot.centers()["drive.speed"] * robot.step_s
     kinds: list[Callable[[np.random.Generator, float, float], Commands]] = [
         _straight,
         _spin,

@@ -80,10 +80,7 @@ def numbers_of(
     prior: Sequence[Parameter], values: Mapping[str, Floats], robot: RobotModel
 ) -> dict[str, Floats]:
     """Return (m,) each number of the robot that the parameters decide, by dotted name."""
-    plain = {
-        name: value.center if isinstance(value, Distribution) else value
-        for name, value in robot.numbers().items()
-    }
+    plain = robot.centers()
     numbers: dict[str, Floats] = {}
     for how in ("is", "times", "plus"):
         for parameter in prior:
@@ -155,8 +152,7 @@ def scribbler_prior(robot: RobotModel) -> tuple[Parameter, ...]:
     Args:
         robot: The robot as its file has it.
     """
-    numbers = robot.numbers()
-    plain = {name: v.center if isinstance(v, Distribution) else v for name, v in numbers.items()}
+    plain = robot.centers()
     track, ang = plain["drive.track"], plain["contact.ang"]
     both = ("drive.gain_left", "drive.gain_right")
     prior = [
@@ -167,7 +163,7 @@ def scribbler_prior(robot: RobotModel) -> tuple[Parameter, ...]:
         ),
         Parameter("drive.track", _ratio(0.75 * track, 1.35 * track), "m", (Effect("drive.track"),), "turns in place"),
         Parameter("drive.axle", _even(-0.03, 0.03), "m", (Effect("drive.axle"),), "turns, with --observe track"),
-        *_plain("drive", DRIVE, numbers),
+        *_plain("drive", DRIVE, plain),
         Parameter("contact.friction", _even(0.0, 1.0), "", (Effect("contact.friction"),), "walls met at slant angles"),
         Parameter("contact.lat", _ratio(0.05, 5.0), "", (Effect("contact.lat"),), "walls scraped along"),
         Parameter("contact.ang", _ratio(ang / 64, ang * 8), "1/m2", (Effect("contact.ang"),), "walls met head on"),

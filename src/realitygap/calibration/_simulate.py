@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from realitygap.platforms import NOISE
 from realitygap.records import TrialRecord
-from realitygap.world import Distribution, RobotModel
+from realitygap.world import RobotModel
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -72,14 +72,6 @@ class Simulate(Protocol):
             same_noise: True if all sets draw the same random numbers. Otherwise each set draws its own.
         """
         ...
-
-
-def plain_numbers(robot: RobotModel) -> dict[str, float]:
-    """Return the robot's numbers by dotted name; of those that are drawn, the centers."""
-    return {
-        name: value.center if isinstance(value, Distribution) else value
-        for name, value in robot.numbers().items()
-    }
 
 
 def motor_noise(robot: RobotModel) -> tuple[str, ...]:

@@ -10,7 +10,7 @@ import numpy as np
 from realitygap.world import RobotModel
 
 from ._handles import Known, robot_numbers
-from ._simulate import Floats, Simulate, motor_noise, plain_numbers, starts_of
+from ._simulate import Floats, Simulate, motor_noise, starts_of
 from ._windows import Windows
 
 LEAST_LAG = 1e-6  # [s] what stands for none
@@ -49,7 +49,7 @@ def wheel_ways(
     numbers = dict.fromkeys(motor_noise(robot), np.zeros(1)) | robot_numbers(known, robot, prompt)
     done = simulate(starts_of(windows.trials), windows.commands, numbers, 0, keep=("wheels",))
     target = np.diff(np.asarray(done.wheels[0], np.float64), axis=1) / windows.step_s
-    now = plain_numbers(robot)
+    now = robot.centers()
     delay, lag = (
         float(values[name][0]) if name in values else now[name] for name in ("drive.delay", "drive.lag")
     )

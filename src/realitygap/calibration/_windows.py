@@ -11,7 +11,7 @@ from realitygap.records import TrialRecord
 from realitygap.world import Arena, RobotModel
 
 from ._handles import Known, robot_numbers
-from ._simulate import Bools, Floats, Ints, Simulate, motor_noise, padded_commands, plain_numbers, starts_of
+from ._simulate import Bools, Floats, Ints, Simulate, motor_noise, padded_commands, starts_of
 from ._step import step_of
 
 CLEAR_M = 0.006  # from walls: nearer, a camera's error could hide a touch
@@ -159,7 +159,7 @@ def differences(
     error of the turn is subtracted from the direction of motion, because that part of it is expected.
     """
     before, after, way = windows.seen
-    axle = values.get("drive.axle", np.full(len(simulated.after), plain_numbers(robot)["drive.axle"]))
+    axle = values.get("drive.axle", np.full(len(simulated.after), robot.centers()["drive.axle"]))
     seen = _moved(before, after, axle)
     made = _moved(before, simulated.after, axle)
     turn_off = wrapped(seen[..., 2] - made[..., 2])

@@ -95,10 +95,6 @@ class RuledTarget(WrappedTarget):
                 "HOST:PORT), or be led through at a terminal."
             )
 
-        def with_ruler(trial: TrialRecord) -> TrialRecord:
-            trial = ruled(trial)
-            return replace(trial, wheels=np.empty((0, 2))) if observe == "cells" else trial
-
         trials = []
         for k, plan in enumerate(plans):
             is_path = plan.purpose == PATH
@@ -106,7 +102,7 @@ class RuledTarget(WrappedTarget):
                 _tell_begun, tell, k
             )  # and no more: a ruler sees less than is observed here
             (trial,) = self.target.carry_out([plan], "track" if is_path else observe, begun)
-            trials.append(with_ruler(trial) if is_path else trial)
+            trials.append(ruled(trial).seen_as(observe) if is_path else trial)
             if tell is not None:
                 tell(k, trials[-1])
         return trials

@@ -116,6 +116,11 @@ class Described(Settings):
         """Return every number by its dotted name, in the order of the description."""
         return {name: self.vary.get(name, value) for name, (value, _) in _walk(self)}
 
+    def centers(self) -> dict[str, float]:
+        """Return every number by its dotted name; of those that are drawn, the centers."""
+        numbers = self.numbers().items()
+        return {name: value.center if isinstance(value, Distribution) else value for name, value in numbers}
+
     def limits(self) -> dict[str, Limits]:
         """Return the range of every number, by dotted name."""
         return {name: limits for name, (_, limits) in _walk(self)}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from realitygap.calibration import PREDICTED, Evidence, Floats, Vectors, evidenc
 from realitygap.evolution import Genome
 from realitygap.platforms import SimEnsemble
 from realitygap.records import TrialRecord
-from realitygap.world import Distribution
+from realitygap.world import Arena
 
 from .hold_out import FITTED, NOMINAL, POSTERIOR, Compared
 from .parts import Parts
@@ -69,7 +70,7 @@ def compare_on_trials(
     if not any(held):
         return parts
     unseen = [trial for trial, is_held in zip(trials, held, strict=True) if is_held]
-    evidence, every = _evidence(unseen, ensemble), _evidence(trials, ensemble)
+    evidence, every = evidence_in(ensemble.arena, unseen), evidence_in(ensemble.arena, trials)
     try:
         estimate, draws = fit([trial for trial, is_held in zip(trials, held, strict=True) if not is_held])
     except ValueError as error:
@@ -78,8 +79,8 @@ def compare_on_trials(
         )
     if not evidence or not estimate:
         return parts
-    own = ensemble.platform.robot.numbers()
-    nominal = {name: _center(own[name]) for name in estimate}
+    own = ensemble.platform.robot.centers()
+    nominal = {name: own[name] for name in estimate}
     some = np.linspace(0, len(next(iter(draws.values()))) - 1, N_ROBOTS).astype(int)
     robots = {
         FITTED: {name: np.full(N_ROBOTS, value) for name, value in estimate.items()},
@@ -87,9 +88,7 @@ def compare_on_trials(
         POSTERIOR: {name: np.asarray(values, np.float64)[some] for name, values in draws.items()},
     }
 
-    def simulate(one: Evidence, numbers: Mapping[str, Floats], key: int) -> Vectors:
-        return ensemble.summarize(one.play, numbers, key, one.of, keep=one.keep)
-
+    simulate = partial(simulate_evidence, ensemble)
     by_kind = {
         name: prediction_errors(evidence, every, simulate, numbers, kinds=kinds, key=seed)
         for name, numbers in robots.items()
@@ -117,13 +116,17 @@ def _mean_error(errors: Iterable[float]) -> float:
     return float(np.exp(np.mean(np.log(np.maximum(list(errors), LEAST_ERROR)))))
 
 
-def _center(value: float | Distribution) -> float:
-    return value.center if isinstance(value, Distribution) else value
-
-
-def _evidence(trials: Sequence[TrialRecord], ensemble: SimEnsemble) -> list[Evidence]:
+def evidence_in(arena: Arena, trials: Sequence[TrialRecord]) -> list[Evidence]:
+    """Return the information in recorded trials."""
     genomes = [Genome.from_json(trial.genome) if trial.genome else None for trial in trials]
-    return evidence_of(trials, genomes, ensemble.arena.grid.n_cells)
+    return evidence_of(trials, genomes, arena.grid.n_cells)
+
+
+def simulate_evidence(
+    ensemble: SimEnsemble, one: Evidence, numbers: Mapping[str, Floats], key: int
+) -> Vectors:
+    """Return the observations (m, d) of m simulated robots in the trials of evidence."""
+    return ensemble.summarize(one.play, numbers, key, one.of, keep=one.keep)
 
 
 def _advice(compared: Compared, n: int) -> str:

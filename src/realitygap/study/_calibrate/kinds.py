@@ -39,7 +39,7 @@ from realitygap.world import Arena, Pose, RobotModel, distance_to_segment
 
 from .held_out_trials import Numbers, compare_on_trials
 from .parts import Parts
-from .whole import ALL_TRIALS, all_plans, fit_everything
+from .whole import all_plans, fit_everything
 
 
 @dataclass(frozen=True)
@@ -47,13 +47,13 @@ class Kind:
     """A kind of calibration.
 
     Attributes:
-        plans: Trials for an arena, a robot and a budget.
+        plans: Trials for an arena, a robot and, if it is given, a budget.
         fit: From trials, the robot to build on, the arena, how much was observed, and the seed of draws.
         least: Trials that it takes.
         observes: How much has to be observed for anything to be told.
     """
 
-    plans: Callable[[Arena, RobotModel, int | None], Sequence[TrialPlan]]
+    plans: Callable[..., Sequence[TrialPlan]]
     fit: Callable[[Sequence[TrialRecord], RobotModel, Arena, Observe, int], Parts]
     least: int = 1
     observes: tuple[Observe, ...] = CALIBRATES
@@ -100,10 +100,6 @@ _PATH_METHOD = (
     "Full-speed paths, straight and turning (Rosenzweig & Remy, section 2.2): ways and turns against those of the "
     "simulated robot; Student's intervals from repeats and from the step to which was read."
 )
-
-
-def _path_plans(arena: Arena, robot: RobotModel, budget: int | None) -> Sequence[TrialPlan]:
-    return path_plans(arena) if budget is None else path_plans(arena, budget)
 
 
 def _fit_path(
@@ -205,10 +201,6 @@ MISPLACED = 0.1
 readings any model is found wrong somewhere."""
 
 
-def _sensor_plans(arena: Arena, robot: RobotModel, budget: int | None) -> Sequence[TrialPlan]:
-    return sensor_plans(arena, robot, budget)
-
-
 def _fit_sensors(
     trials: Sequence[TrialRecord], robot: RobotModel, arena: Arena, observe: Observe, seed: int
 ) -> Parts:
@@ -277,10 +269,6 @@ OF_MOTION = ("ahead", "turn", "wheels")
 """Kinds of observation that a fit of motors can predict."""
 
 
-def _motion_plans(arena: Arena, robot: RobotModel, budget: int | None) -> Sequence[TrialPlan]:
-    return motion_plans(arena, robot) if budget is None else motion_plans(arena, robot, budget)
-
-
 def _fit_motion(
     trials: Sequence[TrialRecord], robot: RobotModel, arena: Arena, observe: Observe, seed: int
 ) -> Parts:
@@ -296,10 +284,6 @@ def _fit_motion(
 
     parts = _told_of_ends(_parts_of(fit(moving)), is_cut=True)
     return compare_on_trials(parts, moving, numbers, ensemble, kinds=OF_MOTION, seed=seed)
-
-
-def _contact_plans(arena: Arena, robot: RobotModel, budget: int | None) -> Sequence[TrialPlan]:
-    return contact_plans(arena, robot) if budget is None else contact_plans(arena, robot, budget)
 
 
 def _fit_contact(
@@ -331,10 +315,6 @@ def _parts_of(fit: MotionFit) -> Parts:
 # all
 
 
-def _all_plans(arena: Arena, robot: RobotModel, budget: int | None) -> Sequence[TrialPlan]:
-    return all_plans(arena, robot, ALL_TRIALS if budget is None else budget)
-
-
 def _fit_all(
     trials: Sequence[TrialRecord], robot: RobotModel, arena: Arena, observe: Observe, seed: int
 ) -> Parts:
@@ -342,9 +322,9 @@ def _fit_all(
 
 
 KINDS: dict[str, Kind] = {
-    "path": Kind(_path_plans, _fit_path, least=2),
-    "sensors": Kind(_sensor_plans, _fit_sensors),
-    "motion": Kind(_motion_plans, _fit_motion, observes=("encoders", "track")),
-    "contact": Kind(_contact_plans, _fit_contact, observes=("track",)),
-    "all": Kind(_all_plans, _fit_all),
+    "path": Kind(lambda arena, _, *budget: path_plans(arena, *budget), _fit_path, least=2),
+    "sensors": Kind(sensor_plans, _fit_sensors),
+    "motion": Kind(motion_plans, _fit_motion, observes=("encoders", "track")),
+    "contact": Kind(contact_plans, _fit_contact, observes=("track",)),
+    "all": Kind(all_plans, _fit_all),
 }

@@ -271,7 +271,7 @@ def _check_kind(kind: str) -> None:
 
 def _plans(kind: Kind, arena: Arena, robot: RobotModel, budget: int | None) -> Sequence[TrialPlan]:
     try:
-        return kind.plans(arena, robot, budget)
+        return kind.plans(arena, robot, *([] if budget is None else [budget]))
     except ValueError as error:
         raise StudyError(str(error)) from error
 
@@ -295,9 +295,9 @@ def _fit(
 
 def _seen_as(trial: TrialRecord, observe: Observe) -> TrialRecord:
     """Return a trial with no more than was to be observed."""
-    if observe != "track" and len(trial.poses):
-        trial = ruled(trial) if trial.purpose == PATH else replace(trial, poses=np.empty((0, 3)))
-    return replace(trial, wheels=np.empty((0, 2))) if observe == "cells" else trial
+    if observe != "track" and len(trial.poses) and trial.purpose == PATH:
+        trial = ruled(trial)
+    return trial.seen_as(observe)
 
 
 def calibration_of(

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from datetime import UTC, datetime
+from functools import partial
 
 import numpy as np
 
@@ -18,7 +18,6 @@ from realitygap.calibration import (
     Misfit,
     Parameter,
     Posterior,
-    Vectors,
     evidence_of,
     excitation,
     fit_all,
@@ -37,13 +36,12 @@ from realitygap.calibration import (
     values_of,
 )
 from realitygap.errors import whole_number
-from realitygap.evolution import Genome
 from realitygap.platforms import SimEnsemble, SimPlatform
 from realitygap.records import Observe, TrialRecord
 from realitygap.trials import Target, TrialPlan
-from realitygap.world import Arena, Calibration, Distribution, Fitted, RobotModel
+from realitygap.world import Arena, Calibration, Fitted, RobotModel
 
-from .held_out_trials import compare_on_trials
+from .held_out_trials import compare_on_trials, evidence_in, simulate_evidence
 from .parts import SOFTWARE, Parts
 
 METHOD = (
@@ -140,7 +138,7 @@ def calibrate_all(
     )
 
 
-def all_plans(arena: Arena, robot: RobotModel, budget: int, seed: int = 0) -> list[TrialPlan]:
+def all_plans(arena: Arena, robot: RobotModel, budget: int = ALL_TRIALS, seed: int = 0) -> list[TrialPlan]:
     """Return the trials of a calibration of everything: excitation and random controllers in turn."""
     rng = np.random.default_rng([seed, 1])
     given = excitation(arena, robot.radius, (budget + 1) // 2, STEPS, rng)
@@ -186,13 +184,10 @@ class _Fit:
             platform, arena, ranges=ranges_of(self.prior, self.robot), threads=threads
         )
 
-    def simulate(self, one: Evidence, numbers: Mapping[str, Floats], key: int) -> Vectors:
-        """Return (m, d) what is seen of m robots."""
-        return self.ensemble.summarize(one.play, numbers, key, one.of, keep=one.keep)
+        self.simulate = partial(simulate_evidence, self.ensemble)
 
     def evidence(self, trials: Sequence[TrialRecord]) -> list[Evidence]:
-        genomes = [Genome.from_json(trial.genome) if trial.genome else None for trial in trials]
-        return evidence_of(trials, genomes, self.arena.grid.n_cells)
+        return evidence_in(self.arena, trials)
 
     def posterior(self, trials: Sequence[TrialRecord], effort: Effort) -> Posterior:
         """Return the part of the prior that remains.
@@ -208,7 +203,7 @@ class _Fit:
             sharp = fit_from_poses(
                 told, self.ensemble, self.prior, self.robot, self.arena, seed=self.seed, tell=self.tell
             )
-            blind = [replace(trial, poses=np.empty((0, 3)), wheels=np.empty((0, 2))) for trial in told]
+            blind = [trial.seen_as("cells") for trial in told]
             whole = self._posterior_of_trials(blind, effort)
         else:
             whole = self._posterior_of_trials(trials, effort)
@@ -297,10 +292,7 @@ class _Fit:
 
     def _as_it_is(self) -> Parts:
         """Return the calibration without trials: the robot's own numbers."""
-        plain = {
-            name: value.center if isinstance(value, Distribution) else value
-            for name, value in self.robot.numbers().items()
-        }
+        plain = self.robot.centers()
         numbers = {e.number: plain[e.number] for parameter in self.prior for e in parameter.expand}
         return Parts(
             fitted=(),

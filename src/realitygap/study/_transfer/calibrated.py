@@ -118,7 +118,7 @@ class Calibrating:
         return calibration, load_robot(calibration.robot)
 
     def refuse(self, condition: Condition, left: int) -> None:
-        """Return where there can be a calibration for a budget of `left` trials.
+        """Raise an error if there can be no calibration for a budget of `left` trials.
 
         Raises:
             StudyError: The one that was given took more trials than that, or the target has other sensors than the

@@ -68,7 +68,7 @@ def randomized_condition(condition: Condition) -> Condition:
         StudyError: It is not on platform `sim`, which alone has such numbers.
     """
     sim = needs_sim(condition, "randomized")
-    numbers = sim.model.numbers()
+    numbers = sim.model.centers()
     drawn: dict[str, Distribution] = {}
     for name, (low, high) in SPREAD.items():
         if name in numbers:
@@ -108,6 +108,5 @@ def changed_condition(condition: Condition, name: str, **changes: object) -> Con
     return made.model_copy(update={"task": condition.task})  # which may have the permission to run code
 
 
-def _times(value: float | Distribution, low: float, high: float) -> Distribution:
-    center = value.center if isinstance(value, Distribution) else value
+def _times(center: float, low: float, high: float) -> Distribution:
     return Distribution(uniform=tuple(sorted((low * center, high * center))))

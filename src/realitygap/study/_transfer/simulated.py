@@ -84,7 +84,7 @@ def evolve_champions(condition: Condition, runs: range, *, repeats: int) -> list
     return rank_genomes(condition, champions, runs.start)
 
 
-def rank_genomes(condition: Condition, genomes: Sequence[Genome], first: int = 0) -> list[Champion]:
+def rank_genomes(condition: Condition, genomes: Sequence[Genome], first: int) -> list[Champion]:
     """Return genomes tried `RETRIES` times in simulation, the best first.
 
     Args:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -181,7 +181,7 @@ def transfer(
     )
     chosen = allowed_task(choose_condition(study, condition, plan.seed), allow_code)
     chosen = _at_the_pace_of(target, chosen)
-    plan = _with(plan, condition=chosen.name, settings=chosen.settings())
+    plan = replace(plan, condition=chosen.name, settings=chosen.settings())
     names = strategy_names(strategies)
     folder = Path(out)
     work = _Work(plan, chosen, target, folder, tell or (lambda _: None))
@@ -407,7 +407,3 @@ def _known_observation(observe: str) -> Observe:
         if observe == known:
             return known
     raise StudyError(f"Unknown observation {observe!r}. {did_you_mean(observe, CALIBRATES)}")
-
-
-def _with(plan: TransferPlan, **changes: Any) -> TransferPlan:
-    return TransferPlan(**{**asdict(plan), **changes, "budgets": plan.budgets})

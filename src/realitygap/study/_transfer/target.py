@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from realitygap.errors import RecordError
-from realitygap.records import OBSERVATIONS, ObservationsFile, Observe, TrialRecord
+from realitygap.records import ObservationsFile, Observe, TrialRecord, sees
 from realitygap.trials import Target, TellTrial, TrialPlan, is_whole
 
 from .._targets import carry_out_missing, observations_head
@@ -31,7 +31,7 @@ class KeptTarget(WrappedTarget):
     """
 
     def __init__(
-        self, target: Target, path: Path, budget: int, first_number: int = 0, *, observe: Observe = "cells"
+        self, target: Target, path: Path, budget: int, first_number: int, *, observe: Observe
     ) -> None:
         super().__init__(target)
         self.budget = budget
@@ -69,7 +69,7 @@ class KeptTarget(WrappedTarget):
         """Return the trial of a plan, if it is that."""
         trial = self._kept[plan.number]
         genome = "" if plan.genome is None else plan.genome.to_json()
-        enough = OBSERVATIONS.index(trial.observe) >= OBSERVATIONS.index(observe)
+        enough = sees(trial.observe, observe)
         is_driven_so = genome or (
             trial.commands.shape == np.shape(plan.commands)
             and np.allclose(trial.commands, plan.commands, atol=1e-6)

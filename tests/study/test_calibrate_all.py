@@ -136,7 +136,7 @@ def test_held_out_trials_are_spread_and_recommend_what_predicts_them():
     assert wrong.numbers == dict.fromkeys(truth, 0.4)  # a recommendation changes no number
     few = compare_on_trials(right, trials[:4], lambda _: 1 / 0, SimEnsemble(SimPlatform(), ARENA, threads=1))
     assert few is right
-    assert np.flatnonzero(is_held_out(20, 0.2)).tolist() == [4, 9, 14, 19]  # of both kinds of trials
+    assert np.flatnonzero(is_held_out(20)).tolist() == [4, 9, 14, 19]  # of both kinds of trials
 
 
 def test_kind_that_nothing_predicts_does_not_outweigh_one_that_the_fit_predicts():

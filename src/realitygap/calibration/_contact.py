@@ -26,7 +26,6 @@ METHOD = (
     "differences have a t distribution, as encounters near the border between aligning and stalling flip. Population "
     "Monte Carlo (Cappe et al. 2004); intervals from trials weighed anew (Newton & Raftery 1994)."
 )
-WINDOW = 1  # commands: pushes are not linear, and longer ones less so
 FREEDOM = 4.0  # degrees, of the t distribution
 REACHES = (0.12, 0.04, 0.02)  # from where draws begin, in turn with what noise makes of windows
 N_PLACES = 300  # of each look around
@@ -69,7 +68,7 @@ def fit_contact(
     seen = observed_as(trials, observe)
     if not any(len(trial.poses) for trial in seen):
         return nothing_known(CONTACT, known, robot, METHOD)
-    windows = make_windows(seen, robot, arena, WINDOW)
+    windows = make_windows(seen, robot, arena)
     windows = windows.only(windows.touching & np.isfinite(windows.seen[1]).all(axis=1))
     if not len(windows.trial):
         raise ValueError(

@@ -75,7 +75,6 @@ def fit_motion(
     *,
     observe: Observe | None = None,
     prior: Sequence[Parameter] | None = None,
-    window: int = 1,
     seed: int = 0,
 ) -> MotionFit:
     """Fit the drive of a robot to windows of trials in which it touched nothing.
@@ -87,7 +86,6 @@ def fit_motion(
         arena: Arena of the trials.
         observe: Use no more than this of the trials.
         prior: Prior of each parameter. Default: `scribbler_prior`.
-        window: Commands from one observed pose to the next that is compared.
         seed: Seed of the draws.
 
     Raises:
@@ -101,7 +99,7 @@ def fit_motion(
     known = parameters_of(robot, prior)
     if seen and all(trial.observe == "cells" for trial in seen):
         return nothing_known((*MOTION, *MOTION_NOISE, "drive.dead_band"), known, robot, METHOD)
-    windows = make_windows(seen, robot, arena, window)
+    windows = make_windows(seen, robot, arena)
     windows = windows.only(
         ~windows.touching & np.isfinite(np.concatenate([windows.seen[1], windows.seen[2]], 1)).any(1)
     )

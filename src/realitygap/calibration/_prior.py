@@ -14,6 +14,9 @@ from realitygap.world import Distribution, RobotModel
 
 Floats = NDArray[np.float64]
 
+N_CORNERS = 4096
+"""Robots at ends of the prior by which ranges of numbers are found."""
+
 
 @dataclass(frozen=True)
 class Effect:
@@ -96,9 +99,9 @@ def numbers_of(
     return numbers
 
 
-def ranges_of(prior: Sequence[Parameter], robot: RobotModel, n: int = 4096) -> dict[str, tuple[float, float]]:
+def ranges_of(prior: Sequence[Parameter], robot: RobotModel) -> dict[str, tuple[float, float]]:
     """Return least and most of the robot's numbers over the prior."""
-    corners = np.random.default_rng(0).choice([-8.0, 8.0], (n, len(prior)))
+    corners = np.random.default_rng(0).choice([-8.0, 8.0], (N_CORNERS, len(prior)))
     numbers = numbers_of(prior, values_of(prior, corners), robot)
     return {name: (float(value.min()), float(value.max())) for name, value in numbers.items()}
 

@@ -22,13 +22,13 @@ wheels [m]."""
 
 @dataclass(frozen=True)
 class Windows:
-    """w windows of some commands each, in k trials.
+    """w windows of one command each, in k trials.
 
     Attributes:
         trials: Trials of the windows.
         trial: (w,) index of the trial.
-        first, last: (w,) rows of poses at its ends.
-        touching: (w,) True if the robot was near a wall at any row of it, or stalled.
+        first: (w,) row of the pose before it; the next row is the pose after it.
+        touching: (w,) True if the robot was near a wall at either end of it, or stalled.
         seen: Observations: (w, 3) poses before and after, (w, 2) distance of the wheels [m]; nan if not observed.
         commands: (k, t, 2).
         anchors: (k, t + 1, 3) poses at the starts of windows.
@@ -38,7 +38,6 @@ class Windows:
     trials: tuple[TrialRecord, ...]
     trial: Ints
     first: Ints
-    last: Ints
     touching: Bools
     seen: tuple[Floats, Floats, Floats]
     commands: Floats
@@ -49,7 +48,7 @@ class Windows:
         """Return some of the windows; all trials are still simulated."""
         before, after, wheels = self.seen
         return Windows(
-            self.trials, self.trial[which], self.first[which], self.last[which], self.touching[which],
+            self.trials, self.trial[which], self.first[which], self.touching[which],
             (before[which], after[which], wheels[which]), self.commands, self.anchors, self.step_s,
         )  # fmt: skip
 
@@ -67,8 +66,8 @@ def wrapped(angle: Floats) -> Floats:
     return np.asarray(np.remainder(angle + np.pi, 2 * np.pi) - np.pi)
 
 
-def make_windows(trials: Sequence[TrialRecord], robot: RobotModel, arena: Arena, length: int = 1) -> Windows:
-    """Return all windows of `length` commands, end to end.
+def make_windows(trials: Sequence[TrialRecord], robot: RobotModel, arena: Arena) -> Windows:
+    """Return a window for each command.
 
     Raises:
         ValueError: No trial, or steps of different lengths.
@@ -80,22 +79,21 @@ def make_windows(trials: Sequence[TrialRecord], robot: RobotModel, arena: Arena,
     outline = outline_of(robot)
     for k, trial in enumerate(trials):
         t = len(trial.commands)
-        first = np.arange(0, t - length + 1, length)
+        first = np.arange(t)
         poses = trial.poses if len(trial.poses) else np.full((t + 1, 3), np.nan)
         wheels = trial.wheels if len(trial.wheels) else np.full((t + 1, 2), np.nan)
         anchors[k, first] = poses[first]
         near = is_near(poses, outline, arena)
         near[:t] |= trial.stalled
         near[1 : t + 1] |= trial.stalled
-        touching = np.array([near[at : at + length + 1].any() for at in first], np.bool_)
-        parts.append((np.full(len(first), k), first, touching, poses[first], poses[first + length],
-                      wheels[first + length] - wheels[first]))  # fmt: skip
+        parts.append((np.full(t, k), first, near[first] | near[first + 1], poses[first], poses[first + 1],
+                      wheels[first + 1] - wheels[first]))  # fmt: skip
     trial_of, first, touching, before, after, way = (
         np.concatenate(part) for part in zip(*parts, strict=True)
     )
     return Windows(
-        tuple(trials), trial_of.astype(np.int64), first.astype(np.int64), first.astype(np.int64) + length,
-        touching, (before, after, way), commands, anchors, step_s,
+        tuple(trials), trial_of.astype(np.int64), first.astype(np.int64), touching,
+        (before, after, way), commands, anchors, step_s,
     )  # fmt: skip
 
 
@@ -145,8 +143,8 @@ def simulate_windows(
     )
     wheels = np.asarray(done.wheels, np.float64)
     return Simulated(
-        np.asarray(done.poses[:, windows.trial, windows.last], np.float64),
-        wheels[:, windows.trial, windows.last] - wheels[:, windows.trial, windows.first],
+        np.asarray(done.poses[:, windows.trial, windows.first + 1], np.float64),
+        wheels[:, windows.trial, windows.first + 1] - wheels[:, windows.trial, windows.first],
     )
 
 

@@ -33,12 +33,12 @@ Numbers = tuple[Mapping[str, float], Mapping[str, Sequence[float] | Floats]]
 """The estimate and draws of the robot's numbers, by dotted name."""
 
 
-def is_held_out(n: int, share: float) -> list[bool]:
+def is_held_out(n: int) -> list[bool]:
     """Return which of n trials are held out: evenly spread, so that all kinds of trials that take turns are among them.
 
     No trial is held out if there are fewer than `LEAST_TRIALS`.
     """
-    n_held_out = round(share * n) if n >= LEAST_TRIALS else 0
+    n_held_out = round(SHARE_OF_TRIALS * n) if n >= LEAST_TRIALS else 0
     return [(2 * k + 1) * n_held_out // (2 * n) < (2 * k + 3) * n_held_out // (2 * n) for k in range(n)]
 
 
@@ -49,7 +49,6 @@ def compare_on_trials(
     ensemble: SimEnsemble,
     *,
     kinds: Sequence[str] = PREDICTED,
-    share: float = SHARE_OF_TRIALS,
     seed: int = 0,
 ) -> Parts:
     """Return the parts of a fit with the errors on held-out trials, and with a recommendation as the first note.
@@ -63,10 +62,9 @@ def compare_on_trials(
         fit: The second fit: from some trials, the estimate and draws of the robot's numbers, by dotted name.
         ensemble: Simulates the robot on whose numbers the fits build.
         kinds: Kinds of observation that count.
-        share: Share of the trials that are held out; 0 for none.
         seed: Seed of the predictions.
     """
-    held = is_held_out(len(trials), share)
+    held = is_held_out(len(trials))
     if not any(held):
         return parts
     unseen = [trial for trial, is_held in zip(trials, held, strict=True) if is_held]

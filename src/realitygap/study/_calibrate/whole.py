@@ -154,11 +154,7 @@ def fit_everything(
     trials: Sequence[TrialRecord],
     robot: RobotModel,
     arena: Arena,
-    seed: int = 0,
-    *,
-    effort: Effort = "full",
-    tell: Callable[[str], None] | None = None,
-    threads: int | None = None,
+    seed: int,
 ) -> Parts:
     """Return the fit of all parameters to trials that were recorded; arguments as in `calibrate_all`.
 
@@ -166,7 +162,7 @@ def fit_everything(
         ValueError: Trials with commands of several lengths of time.
     """
     platform = SimPlatform(robot=robot, **({"step_s": step_of(trials)} if trials else {}))
-    return _Fit(platform, arena, seed, tell or (lambda _: None), threads).parts(trials, effort)
+    return _Fit(platform, arena, seed, lambda _: None, None).parts(trials, "full")
 
 
 class _Fit:

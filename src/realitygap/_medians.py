@@ -68,7 +68,7 @@ def interval_ranks(n: int, confidence: float = CONFIDENCE) -> IntervalRanks | No
 
     Args:
         n: Number of values, at least 0.
-        confidence: Between 0 and 1.
+        confidence: Probability, between 0 and 1.
 
     Returns:
         The ranks, or None if n is too small: then not even the range contains the median with this probability.

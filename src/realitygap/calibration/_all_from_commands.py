@@ -103,7 +103,7 @@ def fit_from_commands(
         arena: Arena of the trials.
         whole: Posterior of whole trials by simulation: the sensors' noise is as in its draws while the mean is fitted.
         seed: Seed of all random numbers.
-        effort: How many fits the draws are made of.
+        effort: Number of fits of which the draws are made.
     """
     fit = _Fit(_seen(trials), ensemble, prior, robot, whole, seed)
     center, shape = fit.grown()

@@ -23,9 +23,9 @@ class Effect:
     """The effect of a parameter's value on a number of the robot: replace it, or change it.
 
     Attributes:
-        number: By dotted name.
+        number: Dotted name of the number.
         how: `is`: v * factor; `times`: the number is multiplied by v; `plus`: v * factor is added.
-        factor: See there.
+        factor: Factor in `is` and `plus`.
     """
 
     number: str
@@ -39,10 +39,10 @@ class Parameter:
 
     Attributes:
         name: Such as drive.gain.
-        prior: What is thought possible; a distribution without an atom.
+        prior: Possible values; a distribution without an atom.
         unit: Such as m.
-        expand: What it does to the robot's numbers.
-        advice: What to record where observations do not identify it.
+        expand: Effects on the robot's numbers.
+        advice: Data to record if observations do not identify it.
     """
 
     name: str
@@ -143,7 +143,7 @@ RANGE: tuple[tuple[str, Distribution, str, str], ...] = (
     ("drop_width", _ratio(0.005, 0.1), "m", "readings at several distances"),
     ("incidence", _even(0.0, 4.0), "", "readings near walls that are not faced"),
 )
-"""Of range sensors, the same for all."""
+"""Numbers that all range sensors share."""
 
 
 def scribbler_prior(robot: RobotModel) -> tuple[Parameter, ...]:

@@ -59,7 +59,7 @@ def operated_under_camera(spec: str | None, study: Study, operator: Operator) ->
     Args:
         spec: Camera, as given by the user; None for none.
         study: Study whose first physical condition gives the arena.
-        operator: Without a camera.
+        operator: Observer without a camera.
 
     Raises:
         StudyError: The camera's options cannot be, or the robot is an emulated one.

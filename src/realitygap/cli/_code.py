@@ -67,7 +67,7 @@ def _ask(task: PythonTask) -> None:
     """Show the file of a task and remember that it may run.
 
     Raises:
-        TaskError: It may not.
+        TaskError: The file may not run.
     """
     from realitygap.settings import visible
     from realitygap.tasks import remember_allowed

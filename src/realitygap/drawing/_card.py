@@ -90,7 +90,7 @@ class Card:
         title: Title.
         labels: Labels of its numbers: SIM, TWIN, EMULATED, or REAL.
         lead: The finding, or the size, in a sentence.
-        warning: What a reader must know before using it; empty if there is nothing.
+        warning: Warning for readers; empty if there is none.
         parts: Tables, pictures, and paragraphs, in order.
         code: Calls that lead on, one a line.
     """

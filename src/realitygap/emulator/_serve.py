@@ -302,7 +302,7 @@ class Server(ClosedOnExit):
             witness lets it.
         witness: The port on which its witness is served, 0 for any; None for not at all.
         watch: Called about every `watch_s`, with the emulator.
-        watch_s: See there [s].
+        watch_s: Time between two calls of `watch` [s].
 
     Attributes:
         name: Name that a client opens.

@@ -141,7 +141,7 @@ def interval(
     Args:
         resamples: (b,) a statistic of resamples; nan is left out.
         n: Controllers.
-        confidence: Between 0 and 1.
+        confidence: Probability, between 0 and 1.
 
     Source: Hesterberg (2015), The American Statistician 69(4), 371-386: percentiles are too narrow as if t were
     normal and n were n - 1, and are taken farther out by as much.

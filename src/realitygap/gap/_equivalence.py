@@ -46,7 +46,7 @@ def prove_equivalence(differences: Values, margin: float | None) -> Equivalence:
 
     Args:
         differences: (c,) differences of means, target minus source; c is at least 2.
-        margin: Above 0, in their unit; None for the interval alone.
+        margin: Margin above 0, in the unit of the values; None for the interval alone.
 
     Raises:
         ValueError: One controller, or a margin that is not above 0.
@@ -80,7 +80,7 @@ def equivalence_power(margin: float, spread: float, n: int, difference: float = 
     """Return the probability that n controllers show equivalence.
 
     Args:
-        margin: Above 0.
+        margin: Margin above 0.
         spread: Standard deviation of differences over controllers.
         n: Controllers, at least 2.
         difference: The true one.

@@ -59,7 +59,7 @@ def rank_violation_interval(
     Args:
         source: (c,) means in simulation.
         target: (c,) means on the target.
-        confidence: Between 0 and 1.
+        confidence: Probability, between 0 and 1.
 
     Raises:
         ValueError: The violation is 0, which has no logarithm.

@@ -35,7 +35,7 @@ def rms_interval(
         squares: (c,) unbiased squares of the true differences (`square_differences`).
         resampled: (b,) mean of the squares of resampled controllers.
         more_variance: Variance of the mean square that controllers do not show, such as that of a fit's draws.
-        confidence: Between 0 and 1.
+        confidence: Probability, between 0 and 1.
 
     Returns:
         Both ends, at least 0.

@@ -48,7 +48,7 @@ def clock_offset(told: Floats, seen: Floats, step_s: float, *, seed: int = 0) ->
     Args:
         told: (n, k) signals, such as speed and turn rate by the wheels.
         seen: (n, k) the same signals, from the poses; nan if unknown.
-        step_s: Between two rows [s].
+        step_s: Time between two rows [s].
         seed: Seed of the draws.
 
     Source: peak of the cross-correlation, with a parabola through its neighbors; interval by a bootstrap of blocks

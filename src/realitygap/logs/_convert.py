@@ -33,7 +33,7 @@ def converter(part: Part, speed: float, track: float) -> Convert:
     Args:
         part: Part of the mapping.
         speed: Speed of a wheel at full command [m/s].
-        track: Between the wheels [m].
+        track: Distance between the wheels [m].
 
     Raises:
         LogError: A unit is unknown, or a number that it needs is missing.

@@ -51,7 +51,7 @@ class Diagnosis:
     Attributes:
         mistakes: List of mistakes.
         offset: Delay of poses after commands; None if the log does not show it.
-        track: Between the wheels, by the poses [m]; nan if unknown.
+        track: Distance between the wheels, by the poses [m]; nan if unknown.
         gain: Distance by the poses divided by the distance by the wheels; nan if unknown.
     """
 
@@ -67,7 +67,7 @@ def diagnose(log: Log, speed: float, track: float) -> Diagnosis:
     Args:
         log: A trial.
         speed: Speed of a wheel at full command [m/s].
-        track: Between the wheels, as the robot's file has it [m].
+        track: Distance between the wheels in the robot's file [m].
     """
     log = _begin(log)
     ways = log.commands * speed * log.step_s

@@ -25,7 +25,7 @@ class Grid:
 
     Attributes:
         start_s: The first one [s].
-        step_s: Between two [s].
+        step_s: Time between two points [s].
     """
 
     def __init__(self, start_s: float, step_s: float) -> None:

@@ -198,7 +198,7 @@ class PlatformSettings(Settings):
         """Raise an error if level a cannot be added to its readings.
 
         Raises:
-            ValueError: It cannot.
+            ValueError: The platform takes no noise.
         """
         if noise and not self.takes_noise:
             raise ValueError(
@@ -210,7 +210,7 @@ class PlatformSettings(Settings):
         """Raise an error if there are several robots in the arena, and the platform takes one.
 
         Raises:
-            ValueError: There are.
+            ValueError: There are several, and it takes one.
         """
         if arena.others and not self.takes_several:
             raise ValueError(
@@ -222,7 +222,7 @@ class PlatformSettings(Settings):
         """Raise an error if the robot does not fit at the start.
 
         Raises:
-            ValueError: It does not.
+            ValueError: The robot does not fit.
         """
         check_start(arena, self.body)
 

@@ -22,7 +22,7 @@ from ._moving import MovingTrial, RobotShape
 from ._player import check_speed, pack_rays, pack_scene, pack_trials, player_class
 
 PERIOD_S = 0.05
-"""Between two messages to a page: at most 20 a second."""
+"""Minimum time between two messages to a page [s]: at most 20 a second."""
 
 _FAN = 1.0
 """Angle between the outermost sensors if their mounts are unknown [rad]."""

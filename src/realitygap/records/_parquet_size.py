@@ -24,7 +24,7 @@ def check_size(parquet: bytes) -> None:
     """Raise an error if a Parquet file holds more than memory has room for.
 
     Raises:
-        LimitError: It does.
+        LimitError: The file holds more.
         ValueError: It is not a Parquet file.
     """
     try:

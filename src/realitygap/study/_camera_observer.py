@@ -45,7 +45,7 @@ class CameraObserver:
         camera: Follows the robot.
         arena: Arena in the camera's view.
         beside: Another observer, which puts the robot at its start and reads its encoders; None if that is not needed.
-        say: Told why a trial has to be counted by hand.
+        say: Called with the reason if a trial has to be counted by hand.
     """
 
     who = "camera"

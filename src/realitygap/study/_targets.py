@@ -28,7 +28,7 @@ def refuse_more_than_is_seen(target: Target, observe: Observe) -> None:
     """Raise an error if a target does not support an observation level.
 
     Raises:
-        StudyError: It cannot.
+        StudyError: The target does not support it.
     """
     if not sees(target.observes, observe):
         raise StudyError(

@@ -52,12 +52,12 @@ class WrappedTarget(ClosedOnExit):
 
 
 class CountingTarget(WrappedTarget):
-    """Says after each trial how many of how many are there.
+    """A target that reports the number of finished trials after each trial.
 
     Args:
         target: Target that runs the trials.
         n: Total number of trials.
-        count: Told of how many there are, and of n.
+        count: Called with the number of finished trials, and n.
     """
 
     def __init__(self, target: Target, n: int, count: Callable[[int, int], None] | None) -> None:

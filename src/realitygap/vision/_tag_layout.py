@@ -31,7 +31,7 @@ class RobotTag:
     Attributes:
         number: Number in its family.
         size: Side of its black square [m].
-        height: Above the floor [m].
+        height: Height above the floor [m].
         family: Key of `FAMILIES`; empty to detect the family.
         ahead: Position ahead of the robot's reference point [m].
         left: Position to the left of the robot's reference point [m].

@@ -23,7 +23,7 @@ class LorentzReadings(MixtureReadings):
 
     Args:
         placements: Placements with their readings.
-        sensor: Its reach, `peak`, cone, and `keeps_edge` are not fitted.
+        sensor: Sensor, whose reach, `peak`, cone, and `keeps_edge` are not fitted.
         weight: Weight of a reading: below 1 if readings have less information than as many independent ones.
     """
 

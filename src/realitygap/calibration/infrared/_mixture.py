@@ -30,7 +30,7 @@ ROWS = 32
 """Sets of parameters whose likelihoods are computed together: their arrays fit into a processor's cache."""
 
 BINS = 20
-"""Between 0 and 1, for checks and figures, of a sensor that answers in finer steps."""
+"""Number of bins between 0 and 1, for checks and figures, if a sensor answers in finer steps."""
 
 
 def step_of(readings: Array) -> float:

@@ -208,7 +208,7 @@ def parts_of_step(
     Args:
         robot: Robot with the bodies.
         most: The largest magnitude of each of the numbers `IN_PARTS`; of any number of robots.
-        step_s: Between commands [s].
+        step_s: Time between commands [s].
         halves: The half width of each body, of as many robots [m]; the robot's own when not given.
 
     Raises:

@@ -17,7 +17,7 @@ from ..sim._platform import SimPlatform
 from ..sim._robot import SimRobot
 
 TWIN_KEY = 0x7477_696E_0000_0000
-"""Added to a twin's seed: `sim` asked for by its own name draws other numbers than a twin that is one."""
+"""Number added to a twin's seed, so that `sim` draws other numbers under its own name than as a twin."""
 
 
 class SimTwin(SimRobot):

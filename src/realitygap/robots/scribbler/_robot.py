@@ -59,7 +59,7 @@ class Scribbler(Driving, Channels, SoundAndLight, Camera, Board, PortDriver):
     """
 
     least_battery_v = 6.15
-    """Below it, the firmware of the Fluke 1 blinks for new batteries, and with weak cells Bluetooth drops out."""
+    """Voltage below which the firmware of the Fluke 1 blinks for new batteries, and Bluetooth may fail [V]."""
     blinded_advice = ", or lower ir_power"
 
     def __init__(

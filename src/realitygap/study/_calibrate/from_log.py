@@ -32,7 +32,7 @@ from .parts import Parts
 BLOCKS = 4
 """Parts of a log, each of which is fitted in its first half and predicted in its second."""
 FEWEST_STEPS = 20
-"""Of a log: fewer tell nothing of a half that is held out."""
+"""Minimum number of steps of a log: fewer say nothing about a half that is held out."""
 NOISE_DRAWS = 100
 N_SPEEDS = 3
 LEFT_OUT = " The others are too short, stand still, or show no poses or encoders."
@@ -56,12 +56,12 @@ def calibrate_from_log(
 
     Args:
         path: The log.
-        map_file: Its mapping; that next to the log, or a guess by the names of its columns, if not given.
+        map_file: Mapping of the log. Default: that next to the log, or a guess by the names of its columns.
         base: The robot that drove, by name or file; as the mapping says if not given.
         hold_out: The part that the fit does not see. A share: the end of each trial; a trial that is too short is seen
             wholly. blocks: each trial is cut into four, each is fitted in its first half and predicted in its second,
             and the numbers are those of a fit to everything.
-        seed: Of draws.
+        seed: Seed of the draws.
         step_s: Length of a step, in place of the mapping's [s].
         drop_bad_rows: Whether rows with mistakes are left out.
 
@@ -130,7 +130,7 @@ def _refuse_mistakes(path: str | Path, diagnosis: Diagnosis) -> None:
     """Raise an error if wheels and poses contradict each other.
 
     Raises:
-        StudyError: They do; the message has every mistake.
+        StudyError: They contradict each other; the message has every mistake.
     """
     found = [mistake.message for mistake in diagnosis.mistakes if mistake.kind not in HARMLESS]
     if found:

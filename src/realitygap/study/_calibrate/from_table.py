@@ -41,13 +41,13 @@ def calibrate_from_table(
 
     Args:
         path: The table, in the `.sample` format or as text.
-        map_file: Its mapping; that next to the table if not given.
+        map_file: Mapping of the table. Default: that next to the table.
         base: The robot that was measured, by name or file; as the mapping says if not given.
-        hold_out: What the fit does not see: blocks for every second place, like a chessboard over distances and
-            bearings, or a share of the places at random. With 0 it sees everything, and nothing is compared.
-        seed: Of draws, and of the places that are held out at random.
-        radius: Of a round robot that has no file [m]: one is written, with the sensors where the table has them.
-        robot_file: Where it is written.
+        hold_out: The part that the fit does not see: blocks for every second place, like a chessboard over distances
+            and bearings, or a share of the places at random. With 0 it sees everything, and nothing is compared.
+        seed: Seed of the draws, and of the places that are held out at random.
+        radius: Radius of a round robot without a file [m]. Its file is written, with the sensors of the table.
+        robot_file: Path of that file.
 
     Raises:
         StudyError: The table and the robot do not go together.

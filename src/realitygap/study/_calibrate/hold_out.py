@@ -27,9 +27,9 @@ class Compared:
 
     Attributes:
         measure: The error, in words.
-        unit: Its unit; empty for readings.
+        unit: Unit of the errors; empty for readings.
         n: Observations in the unseen part.
-        errors: By prediction.
+        errors: Error of each prediction.
         more: Further errors in the same unit, by their name and by prediction.
         by: Error of the fit and of the nominal numbers by condition: kind of condition, its value, prediction.
     """

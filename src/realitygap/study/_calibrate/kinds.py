@@ -48,9 +48,9 @@ class Kind:
 
     Attributes:
         plans: Trials for an arena, a robot and, if it is given, a budget.
-        fit: From trials, the robot to build on, the arena, how much was observed, and the seed of draws.
-        least: Trials that it takes.
-        observes: How much has to be observed for anything to be told.
+        fit: Fit to trials, with the robot to build on, the arena, the observation level, and the seed of the draws.
+        least: Minimum number of trials.
+        observes: Observation levels with which it works.
     """
 
     plans: Callable[..., Sequence[TrialPlan]]
@@ -65,7 +65,7 @@ def _told_of_ends(parts: Parts, *, is_cut: bool) -> Parts:
     Noise is left out: a robot without any lies at the lower end, and what `sim` cannot make looks like more of it.
 
     Args:
-        parts: Of a fit that has no predictive check.
+        parts: Parts of a fit that has no predictive check.
         is_cut: Whether the fit keeps within what was thought possible, so that at an end it is misspecified.
     """
     at_end = [each for each in parts.fitted if each.is_at_end and each.name in MOTION]
@@ -82,13 +82,13 @@ def _told_of_ends(parts: Parts, *, is_cut: bool) -> Parts:
 # path
 
 AT_A_WALL = 0.01
-"""What is less than twice so far ahead of a robot may have stopped it [m]."""
+"""A wall that is less than twice this distance ahead of a robot may have stopped it [m]."""
 
 FRONT_M = 0.03
-"""What of a robot's outline lies at most so far behind its foremost point is its front [m]."""
+"""Depth of a robot's front: the part of its outline behind the foremost point [m]."""
 
 MOST_TURN = 0.9 * math.pi
-"""By a command, of which a camera sees the beginning and the end [rad]."""
+"""Largest turn by one command, so that its beginning and end show how far the robot turned [rad]."""
 
 FAR_M = 20.0
 """Nothing stands nearer where a path is simulated [m]."""

@@ -39,10 +39,10 @@ from .parts import SOFTWARE, Parts
 from .whole import ALL_TRIALS, LEAST_TO_CHOOSE, calibrate_all
 
 SEED_STRIDE = 10_000
-"""Between the numbers of trials of calibrations with different seeds."""
+"""Distance between the numbers of trials of calibrations with different seeds."""
 
 Tell = Callable[[int, int], None]
-"""Told of how many of how many trials are there."""
+"""Called with the number of finished trials and of all trials."""
 
 
 def calibrate(
@@ -62,14 +62,14 @@ def calibrate(
 
     Args:
         kind: path, sensors, motion, contact or all.
-        target: What is calibrated.
-        robot: On whose numbers the fit builds: a name, a file, or an earlier calibration, whose numbers stay where this
+        target: Target of the calibration.
+        robot: Robot on which the fit builds: a name, a file, or an earlier calibration, whose numbers stay where this
             one has none.
-        observe: How much to look at.
+        observe: Observation level.
         budget: Trials in all; what the kind needs when not given.
-        seed: Of trials and draws.
-        trials_file: Where trials are kept as they end, and taken up from; nowhere when not given.
-        choose: Of all: whether the last trials are chosen after a first fit, as those that tell most.
+        seed: Seed of the trials and draws.
+        trials_file: File in which trials are saved as they end, to resume from. Default: none.
+        choose: True to choose the last trials of `all` after a first fit, as the most informative ones.
         operator: Puts the robot where it has to stand; None if the target places itself.
         tell: Called after each trial.
 
@@ -175,7 +175,7 @@ def refuse_other_sensors(robot: RobotModel, target: Target, named: str = "") -> 
     Args:
         robot: The robot.
         target: The target.
-        named: What the user called the robot; its name if not given.
+        named: The user's word for the robot. Default: its name.
 
     Raises:
         StudyError: The numbers differ.
@@ -198,9 +198,9 @@ def calibrate_from(
     Args:
         kind: As in `calibrate`.
         data: A file of observed trials.
-        robot: On whose numbers the fit builds; the one that the file names when not given.
-        observe: To use less than was recorded.
-        seed: Of draws.
+        robot: Robot on which the fit builds. Default: the one in the file.
+        observe: Observation level, to use less than was recorded.
+        seed: Seed of the draws.
 
     Raises:
         StudyError: There is no such kind, or the file has nothing to fit it to.
@@ -375,7 +375,7 @@ def _refuse_no_robot(parts: Parts, robot: str | Path, target: str) -> None:
     """Return where a robot can have the numbers that were fitted.
 
     Raises:
-        StudyError: It cannot: a wheel's gain below 0, say.
+        StudyError: There can be no such robot, for example with a gain below 0.
     """
     try:
         load_robot(robot).with_numbers(parts.numbers)

@@ -80,17 +80,17 @@ def calibrate_all(
     the arena's start.
 
     Args:
-        target: What is calibrated.
-        robot: On whose numbers the fit builds, by name, file or as it is; the default one of `sim` when not given.
-        observe: How much of the target is seen.
-        budget: Trials to carry out; with 0 the robot stays as its file has it.
-        seed: Of all random numbers.
-        effort: How many simulations.
-        choose: Whether the last trials of 10 and more are chosen after a first fit, as those that tell most of how
+        target: Target of the calibration.
+        robot: Robot on which the fit builds: a name, a file, or a model. Default: that of `sim`.
+        observe: Observation level.
+        budget: Number of trials; with 0, the robot stays as in its file.
+        seed: Seed of all random numbers.
+        effort: Amount of simulation.
+        choose: True to choose the last trials of 10 and more after a first fit, as those that say most about how
             controllers that were not tried will do.
-        tell: Told what is going on.
-        keep: Given each trial as it comes, to be kept.
-        threads: Of the simulations.
+        tell: Called with the progress in words.
+        keep: Called with each trial when it ends.
+        threads: Number of threads of the simulations.
 
     Raises:
         RobotError: The target failed; what `keep` was given is not lost.

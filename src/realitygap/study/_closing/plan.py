@@ -40,27 +40,27 @@ class ClosingPlan:
 
     Attributes:
         study: Study whose first condition on `sim` is evolved, the paper's objective search on a robot.
-        families: Of twins: `close` for what is hardly wrong, and three for what goes wrong with robots most: motors,
+        families: Families of twins: `close` is hardly wrong, and three have the most common faults of robots: motors,
             friction and time. Or names of `platforms`.
         platforms: Platforms that take the place of families of twins, by family, as users name them.
         unseen: Pairs of a family and what cannot be seen of its robots.
         fewer: Numbers of twins of the families that have fewer than the others, by family.
-        twins: Of each family.
-        first_seed: Of the first twin in each family. Results on seeds 1000 to 1009 were published while the methods
-            changed, so these twins are not unseen.
+        twins: Number of twins of each family.
+        first_seed: Seed of the first twin in each family. Results on seeds 1000 to 1009 were published while the
+            methods changed, so these twins are not unseen.
         budgets: Trials on the twin for calibrating; 0 is the simulator as it is.
-        observations: What is seen of these trials.
+        observations: Observation levels of these trials.
         controllers: Held out: half of them random, half champions of runs of their own.
-        trials: Of each of them, in simulation and on the twin.
+        trials: Trials of each of them, in simulation and on the twin.
         transfer_budget: Trials on the twin for each strategy of transfer; half of them calibrate for `posterior`, which
             chooses by the others.
-        replicates: Of each transfer, with evolution of their own.
-        fresh_trials: By which what a strategy chose is judged.
+        replicates: Replicates of each transfer, each with its own evolution.
+        fresh_trials: Trials that judge the choice of a strategy.
         runs: Evolutions in simulation of each replicate.
         repeats: Trials of each individual in simulation.
-        effort: How much is simulated for a calibration.
+        effort: Amount of simulation for a calibration.
         numbers: The numbers of a calibration by which it is judged.
-        seed: Of all random numbers.
+        seed: Seed of all random numbers.
         controllers_seed: Seed of the held-out controllers.
         has_own_controllers: Whether each twin has held-out controllers of its own. Otherwise all twins share them.
         transfers: Whether what evolves is transferred to the twins.
@@ -197,7 +197,7 @@ PLANS = {
 """The plans by name: at full size, and small."""
 
 EXTENDED = ("families", "twins", "budgets")
-"""What may differ between calls on one folder: the rest of its plan is fixed."""
+"""Parts of a plan that may differ between calls on one folder."""
 
 
 _PARTS = ("twins", "units", "calibrations", "transfers")

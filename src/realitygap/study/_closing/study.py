@@ -32,9 +32,9 @@ class ClosingProgress:
     """The progress of the study.
 
     Attributes:
-        n_done: Units that are there.
-        n_units: Of so many.
-        seconds: Since this call began.
+        n_done: Number of finished units.
+        n_units: Number of all units.
+        seconds: Time since this call began [s].
     """
 
     n_done: int
@@ -58,9 +58,9 @@ def closing_the_gap(
 
     Args:
         out: Folder for the results.
-        plan: What is done; the study at its full size when not given. `realitygap.study.SMALL` is one of minutes.
-        processes: Twins at once; as many as there are processors when not given.
-        tell: Told how far it is, now and then.
+        plan: Plan of the study. Default: its full size. `realitygap.study.SMALL` takes minutes.
+        processes: Number of twins in parallel. Default: the number of processors.
+        tell: Called with the progress, now and then.
 
     Returns:
         The summary, which is in `summary.json` of the folder as well: see `summarize_closing`.
@@ -95,7 +95,7 @@ def closing_the_gap(
 
 
 def n_done(folder: Path, plan: ClosingPlan) -> int:
-    """Return units that are there."""
+    """Return the number of finished units."""
     return sum(path.exists() for name in plan.names for path in _paths(folder, plan, name))
 
 

@@ -42,12 +42,12 @@ class ClosingTwin:
     """A twin, and what is done with it.
 
     Attributes:
-        plan: Of the study.
-        name: Which twin.
-        folder: Of the study.
-        open_twin: Opens it as a target.
-        calibrate: As `calibrate_all`.
-        tell: Told of each unit that is done.
+        plan: Plan of the study.
+        name: Name of the twin.
+        folder: Folder of the study.
+        open_twin: Function that opens it as a target.
+        calibrate: Function like `calibrate_all`.
+        tell: Called with each finished unit.
     """
 
     plan: ClosingPlan
@@ -235,7 +235,7 @@ def held_out(n: int, study: str, seed: int, *, are_founders: bool) -> list[Genom
     """Return controllers by which simulators are judged: first random ones, then as many champions of separate runs.
 
     Args:
-        n: How many.
+        n: Number of controllers.
         study: Study whose condition on the simulator as it is evolves the champions, one run for each.
         seed: Seed that no other evolution and no calibration uses.
         are_founders: Whether the random ones are founders of the champions' runs. Otherwise they are of other runs.

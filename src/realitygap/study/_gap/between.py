@@ -199,7 +199,7 @@ def _refuse_elsewhere(evolved: Sequence[Controller], named: str, platform: str) 
     """Raise an error if a controller was evolved on another platform, before trials are spent on it.
 
     Raises:
-        StudyError: One was not.
+        StudyError: A controller was evolved elsewhere.
     """
     for each in evolved:
         where = each.selected_on or "nowhere"

@@ -143,7 +143,7 @@ def plan_gap(
         arena: Arena of the pilot.
         spread: Standard deviation of true differences over controllers, in units of the score; half the spread of
             controllers when not given.
-        least: Above which a correlation shall be shown.
+        least: Correlation that is to be exceeded.
         power: Statistical power: the probability of detecting the effect.
         trials: Number of trials of each controller on each platform.
         seed: Seed of simulated studies.

@@ -113,7 +113,7 @@ def study_gap(
         source: The simulator.
         target: Target, on which trials are expensive. Its trials alternate between controllers, so that changes over
             time, such as a falling battery, affect all controllers equally.
-        controllers: At least 2 controllers, see `sample_controllers`. For champions, the result includes the part of
+        controllers: At least 2 controllers of `sample_controllers`. For champions, the result includes the part of
             their score that was luck.
         task: Scores the trials of both sides, from what an observer has of them: with the noise of readings. Coverage
             of the driven line if not given.
@@ -207,7 +207,7 @@ def refuse_inputs(controllers: Sequence[Controller], platform: Target) -> None:
     """Refuse controllers that see what a platform lacks, before a trial is spent.
 
     Raises:
-        ControllerError: One does.
+        ControllerError: A controller sees what the platform lacks.
     """
     for each in controllers:
         if platform.inputs is not None:

@@ -38,9 +38,9 @@ class Simulation:
         """Return the champions of a replicate's runs under a condition, the best in simulation first.
 
         Args:
-            condition: As `evolve_champions` wants it.
-            replicate: Of the transfer.
-            runs: How many of the replicate's runs; all when not given.
+            condition: Condition for `evolve_champions`.
+            replicate: Replicate of the transfer.
+            runs: Number of runs of the replicate. Default: all.
         """
         n = self.runs if runs is None else runs
         key = (condition.hash(), replicate, n)
@@ -66,11 +66,11 @@ class Attempt:
     """The resources of a strategy.
 
     Attributes:
-        condition: Evolved in simulation.
-        target: Where trials cost; it allows `budget` of them.
+        condition: Condition that is evolved in simulation.
+        target: Target, which allows `budget` trials.
         budget: Trials on the target.
-        replicate: Of the transfer, from 0 on.
-        simulation: That evolves.
+        replicate: Replicate of the transfer, from 0 on.
+        simulation: Simulation that evolves.
         calibration: Makes or reads a calibration.
     """
 

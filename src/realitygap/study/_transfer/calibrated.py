@@ -31,7 +31,7 @@ Numbers = Literal["calibrated", "posterior", "recommended"]
 """The numbers of a calibration with which a simulator runs."""
 
 _RECOMMENDED = {FITTED: "calibrated", POSTERIOR: "posterior", NOMINAL: "nominal", "": "posterior"}
-"""What runs, by `Calibration.recommended`."""
+"""Numbers to simulate with, by `Calibration.recommended`."""
 
 
 def calibrated(attempt: Attempt) -> Champion:
@@ -89,14 +89,14 @@ class Calibrating:
     """Reads the calibration that was given, or makes one on the budget; all strategies that calibrate share it.
 
     Attributes:
-        target: What is observed.
-        folder: Where calibrations and their trials are kept.
-        first_number: Of the trials.
-        replicate: Of the transfer.
-        seed: Of the trials' commands, and of what is drawn while fitting.
-        observe: How much is seen.
-        file: The calibration that was given; None where there is none.
-        tell: Told what is going on.
+        target: Observed target.
+        folder: Folder of calibrations and their trials.
+        first_number: Number of the first trial.
+        replicate: Replicate of the transfer.
+        seed: Seed of the trials' commands, and of the fit.
+        observe: Observation level.
+        file: Given calibration; None if there is none.
+        tell: Called with the progress in words.
     """
 
     target: Target

@@ -21,17 +21,17 @@ SPREAD: dict[str, tuple[float, float]] = {
     "drive.lag": (0.5, 2.0),
     "contact.friction": (0.5, 1.5),
 }
-"""What `randomized` draws, as multiples of what the robot's file has, uniformly for each trial."""
+"""Ranges of numbers that `randomized` draws for each trial, as multiples of those in the robot's file."""
 
 ADDED: dict[str, tuple[float, float]] = {
     "drive.delay": (0.0, 0.15),
     "drive.slip": (0.0, 0.1),
     "drive.drift_per_m": (-0.1, 0.1),
 }
-"""What it draws between two values."""
+"""Ranges of numbers that it draws between two values."""
 
 IR = {"amplitude": (0.7, 1.3), "decay": (0.7, 1.4)}
-"""What it draws of each infrared sensor, as multiples of what the file has."""
+"""Ranges of numbers of each infrared sensor, as multiples of those in the file."""
 
 
 def noise(attempt: Attempt) -> Champion:
@@ -85,7 +85,7 @@ def needs_sim(condition: Condition, strategy: str) -> SimPlatform:
     """Return the platform of a condition whose robot has numbers to change.
 
     Raises:
-        StudyError: It has none.
+        StudyError: Its robot has no such numbers.
     """
     sim = as_sim(condition.on)
     if sim is None:

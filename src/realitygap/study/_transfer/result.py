@@ -20,12 +20,12 @@ class Transferred:
     """One champion on the target.
 
     Attributes:
-        strategy: That chose it.
+        strategy: Strategy that chose it.
         budget: Trials on the target that the strategy was given.
-        spent: Of these, how many it used.
-        replicate: Of the transfer.
-        genome: As JSON text.
-        simulated: Its mean score in the simulation in which it was ranked; None where in none.
+        spent: Number of these trials that it used.
+        replicate: Replicate of the transfer.
+        genome: Genome as JSON text.
+        simulated: Mean score in the simulation that ranked it; None if none did.
         scores: (t,) the same on the target, in each fresh trial.
     """
 
@@ -48,10 +48,10 @@ class Strategist:
     """The result of a strategy with one budget.
 
     Attributes:
-        strategy: Its name.
+        strategy: Name of the strategy.
         budget: Trials on the target.
         quality: Score on the target in fresh trials, over replicates.
-        regret: How much less that is than the best known champion's on this target.
+        regret: Difference to the quality of the best known champion on this target.
         simulated: Mean score in simulation; None where it evolved in none.
     """
 
@@ -68,16 +68,16 @@ class TransferResult:
 
     Attributes:
         study: Folder or catalogue name of what was evolved.
-        condition: Of the study, that was evolved.
-        target: Where it was tried.
-        label: What the target says it is.
-        replicates: Of each strategy.
-        fresh_trials: Of each champion; they are not of the budget.
-        strategies: By strategy and budget, in the order asked.
+        condition: Evolved condition of the study.
+        target: Name of the target.
+        label: Label of the target, such as TWIN.
+        replicates: Replicates of each strategy.
+        fresh_trials: Fresh trials of each champion, which don't count toward the budget.
+        strategies: Rows by strategy and budget, in the requested order.
         best_known: Mean score of the champion that is best in its fresh trials: as the best of many, luck
             lifts it somewhat, and regret with it.
         champions: Each with its fresh trials.
-        score: What trials were scored by, with its unit.
+        score: Score of the trials, with its unit.
     """
 
     study: str
@@ -127,7 +127,7 @@ def summarize_transfer(
     another evolution. Regret is to the best, taken as it is.
 
     Args:
-        champions: With their fresh trials.
+        champions: Champions with their fresh trials.
         known: Qualities of others on the same target.
         score_range: The least and the greatest score that there can be.
     """

@@ -25,7 +25,7 @@ class Champion:
     """The best individual of a run in simulation.
 
     Attributes:
-        genome: Its genes.
+        genome: Genome of the individual.
         simulated: Its mean score in simulation, over fresh trials.
         visits: (c,) share of these trials in which it visits each cell.
     """
@@ -55,7 +55,7 @@ def evolve_champions(condition: Condition, runs: range, *, repeats: int) -> list
     champion is the individual with the best mean score in all generations of its run.
 
     Args:
-        condition: Of the runs, on platform `sim` or `jyro`.
+        condition: Condition of the runs, on platform `sim` or `jyro`.
         runs: Numbers of the replicates.
         repeats: Trials of each individual, every one on noise of its own.
 
@@ -88,9 +88,9 @@ def rank_genomes(condition: Condition, genomes: Sequence[Genome], first: int) ->
     """Return genomes tried `RETRIES` times in simulation, the best first.
 
     Args:
-        condition: Whose platform and noise.
-        genomes: At least one.
-        first: Which random numbers: those of this replicate.
+        condition: Condition with the platform and the noise.
+        genomes: At least one genome.
+        first: Replicate whose random numbers are used.
     """
     # beyond the generations that evolution uses, so that the noise is fresh
     key = NoiseKey(condition.key, first, condition.neat.generations)

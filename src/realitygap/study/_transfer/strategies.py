@@ -55,7 +55,7 @@ STRATEGIES: Mapping[str, Callable[[Attempt], Champion]] = {
     "transferability": transferability,
     "direct": direct,
 }
-"""What each does is in the docstring of the function."""
+"""Strategies by name; the docstring of each function describes its strategy."""
 
 CALIBRATE = ("calibrated", "posterior", "recommended")
 """Strategies that share calibrations."""
@@ -67,7 +67,7 @@ WITHOUT_TRIALS = ("plain",)
 """Strategies that spend nothing: carried out once for all budgets."""
 
 SEED_STRIDE = 1_000
-"""Between the seeds of calibrations of transfers with different seeds: there are at most so many replicates."""
+"""Distance between seeds of calibrations of transfers with different seeds, and the most replicates."""
 
 NUMBERS = 10_000
 """Trials of a replicate have numbers of their own, so many apart; the fresh ones are in the upper half."""
@@ -79,19 +79,19 @@ class TransferPlan:
 
     Attributes:
         study: Name or file.
-        condition: Of the study.
-        settings: Of that condition, as resolved.
-        target: Its name.
-        identity: What tells it from others whatever its name; empty where only the name does.
+        condition: Condition of the study.
+        settings: Settings of that condition, as resolved.
+        target: Name of the target.
+        identity: Identity of the target, whatever its name; empty if it has only a name.
         budgets: Trials on the target, one transfer each.
-        replicates: Times that everything is done, each with evolution of its own.
-        fresh_trials: Of each champion.
-        runs: Evolutions in simulation that a replicate has.
+        replicates: Number of repetitions of everything, each with its own evolution.
+        fresh_trials: Fresh trials of each champion.
+        runs: Number of evolutions in simulation in a replicate.
         repeats: Trials of each individual in simulation.
-        observe: How much calibrating sees of a trial.
-        calibration: File of one that was made before; empty to calibrate on the budget.
-        fit: SHA-256 of what that file says: it may lie elsewhere the next time.
-        seed: Of all random numbers.
+        observe: Observation level of calibrations.
+        calibration: File of an existing calibration; empty to calibrate on the budget.
+        fit: SHA-256 of the content of that file, which may be elsewhere the next time.
+        seed: Seed of all random numbers.
     """
 
     study: str
@@ -136,20 +136,20 @@ def transfer(
 
     Args:
         study: A study, its name or its file.
-        target: Where trials cost.
+        target: Target, on which trials are expensive.
         strategies: Names in `STRATEGIES`; all of them when 'all'.
         budget: Trials on the target that each strategy may spend; several are carried out one by one.
         out: Folder for trials and result.
-        condition: Of the study; when not given, its first one that selects for the score, best on `sim`.
-        replicates: Times that everything is done, each with evolution of its own.
-        fresh_trials: By which each champion is judged; they are not of the budget.
+        condition: Condition of the study. Default: the first one that selects for the score, preferably on `sim`.
+        replicates: Number of repetitions of everything, each with its own evolution.
+        fresh_trials: Trials that judge each champion. They don't count toward the budget.
         runs: Evolutions in simulation of each replicate, at least the largest budget.
         repeats: Trials of each individual in simulation.
-        observe: How much calibrating sees of a trial.
+        observe: Observation level of calibrations.
         calibration: File of a calibration; its trials count as spent. Without one, calibrating spends of the budget.
-        seed: Of all random numbers.
-        allow_code: Whether the Python file of a task may run that the user has not allowed before.
-        tell: Told what is going on, in words.
+        seed: Seed of all random numbers.
+        allow_code: True to run the Python file of a task that the user has not allowed before.
+        tell: Called with the progress in words.
 
     Raises:
         StudyError: No such study, condition or strategy, or so much cannot be seen of the target.
@@ -280,7 +280,7 @@ class _Work:
         """Raise an error if any strategy cannot run on this target.
 
         Raises:
-            StudyError: One cannot be.
+            StudyError: A strategy cannot run.
         """
         task = self.condition.task_of_trials
         check_task(task, self.target.arena)

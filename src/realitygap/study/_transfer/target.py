@@ -23,11 +23,11 @@ class KeptTarget(WrappedTarget):
     what is in the file, and the rest is carried out. One that was cut off is kept, too, and carried out again.
 
     Args:
-        target: What carries out trials.
-        path: The file; its folder is there.
-        budget: How many trials it allows.
-        first_number: Added to the number of each plan, so that parts of a study draw other random numbers.
-        observe: The most that is looked at; kept as `looks_at`.
+        target: Target that runs the trials.
+        path: File, in an existing folder.
+        budget: Number of trials that it allows.
+        first_number: Number added to that of each plan, so that parts of a study draw other random numbers.
+        observe: Highest observation level; stored as `looks_at`.
     """
 
     def __init__(

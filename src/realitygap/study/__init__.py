@@ -1,6 +1,7 @@
 """Studies: conditions x replicates, read from a file, run, and resumed."""
 
 from realitygap.platforms import open_target
+from realitygap.trials import usable_processors
 
 from . import _cards  # noqa: F401  # what notebooks show
 from ._bench import measure_speed
@@ -18,7 +19,6 @@ from ._closing.study import ClosingProgress, closing_the_gap
 from ._closing.summary import summarize_closing
 from ._code import AllowCode, check_files, python_tasks, task_named
 from ._controllers import Controller, sample_controllers
-from ._executors import usable_processors
 from ._file import DEFAULT_NEAT, SECTIONS, load_study, named_studies, parse_study, platform_sections
 from ._gap.between import GapBetween, gap_between
 from ._gap.plan import GapPlan, pilot_spreads, plan_gap, recorded_spreads

@@ -22,9 +22,8 @@ from realitygap.kernels.math.peak import peak_flops
 from realitygap.platforms import JyroPlatform, jyro_rules, jyro_scene
 from realitygap.records import ResultsFolder
 from realitygap.runs import Condition, run_replicates, run_rows
-from realitygap.trials import NoiseKey, counters_of
+from realitygap.trials import NoiseKey, counters_of, usable_processors
 
-from ._executors import usable_processors
 from ._file import load_study
 from ._run import machine_facts
 
@@ -53,8 +52,7 @@ def measure_speed(seconds: float = 2.0) -> dict[str, Any]:
     Raises:
         ValueError: `seconds` is not more than 0 and at most 3600.
     """
-    if not 0 < seconds <= MOST_SECONDS:
-        raise ValueError(f"seconds is {seconds}, expected more than 0 and at most {MOST_SECONDS}.")
+    check_seconds(seconds)
     study = load_study("paper")
     coverage, novelty = (
         next(item for item in study.conditions if item.name == name) for name in ("coverage-50", "novelty-50")
@@ -72,7 +70,7 @@ def measure_speed(seconds: float = 2.0) -> dict[str, Any]:
                 "paper_runs_recorded_per_second": _rates(_recorded_work(coverage, folder), seconds),
                 "neat_share": _share_without_trials(coverage, runs["per_core"], seconds),
                 "peak_gflops": peak_gflops,
-                "robot_steps_per_gflop": _fastest_rate(_trial_work(coverage, 0), seconds) / peak_gflops,
+                "robot_steps_per_gflop": fastest_rate(_trial_work(coverage, 0), seconds) / peak_gflops,
                 "machine": machine_facts(),
                 "versions": {
                     "realitygap": __version__,
@@ -83,6 +81,16 @@ def measure_speed(seconds: float = 2.0) -> dict[str, Any]:
                     "polars": polars.__version__,
                 },
             }
+
+
+def check_seconds(seconds: float) -> None:
+    """Raise an error if a measuring time is out of range.
+
+    Raises:
+        ValueError: `seconds` is not more than 0 and at most 3600.
+    """
+    if not 0 < seconds <= MOST_SECONDS:
+        raise ValueError(f"seconds is {seconds}, expected more than 0 and at most {MOST_SECONDS}.")
 
 
 def _share_without_trials(condition: Condition, rate: float, seconds: float) -> float:
@@ -119,7 +127,7 @@ def _rate(work: Callable[[int], int], threads: int, seconds: float) -> float:
     return done / (time.perf_counter() - since)
 
 
-def _fastest_rate(work: Callable[[int], int], seconds: float) -> float:
+def fastest_rate(work: Callable[[int], int], seconds: float) -> float:
     """Return the work a second of the fastest call, in time of the thread, which other programs hardly change."""
     work(0)
     until, fastest, call = time.perf_counter() + seconds, 0.0, 1

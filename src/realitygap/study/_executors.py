@@ -11,9 +11,6 @@ from realitygap._interrupts import kept_interrupts
 from realitygap.platforms import close_twins, release_twins
 from realitygap.records import ResultsFolder
 from realitygap.runs import Condition, prepare_kernels, run_replicates
-from realitygap.trials import usable_processors
-
-__all__ = ["ChunkTask", "Executor", "Listener", "Threads", "usable_processors"]
 
 
 @dataclass(frozen=True)

@@ -11,9 +11,9 @@ from realitygap.errors import StudyError, did_you_mean, whole_number
 from realitygap.evolution import NeatSettings
 from realitygap.runs import MAZE_REWARDS, MazeRun, MazeTrials, run_maze
 from realitygap.tasks import MAZE_TASKS, MazeTask
+from realitygap.trials import usable_processors
 from realitygap.world import load_arena
 
-from ._executors import usable_processors
 from ._run import Progress
 from ._task import checked_settings, run_in_threads
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import platform as python_platform
-import time
 from typing import Any
 
 import numba
@@ -19,7 +18,7 @@ from realitygap.kernels.sim.shape import half_width, make_sim_shape, sim_table, 
 from realitygap.kernels.sim.trial import run_sim_trials
 from realitygap.world import Arena, load_arena, load_robot, paper_arena
 
-from ._bench import MOST_SECONDS
+from ._bench import check_seconds, fastest_rate
 from ._run import machine_facts
 
 N_TRIALS = 1_280
@@ -78,8 +77,7 @@ def measure_realism(seconds: float = 2.0) -> dict[str, Any]:
     Raises:
         ValueError: `seconds` is not more than 0 and at most 3600.
     """
-    if not 0 < seconds <= MOST_SECONDS:
-        raise ValueError(f"seconds is {seconds}, expected more than 0 and at most {MOST_SECONDS}.")
+    check_seconds(seconds)
     kinds = {"avoiding": (AVOIDING, False), "pressed": (PRESSED, False), "boxes": (AVOIDING, True)}
     rates, stalled, visited = {}, {}, {}
     for name, (weights, boxes) in kinds.items():
@@ -170,14 +168,12 @@ class RealisticTrials:
 
     def rate(self, seconds: float) -> float:
         """Return the robot-steps per second of the fastest call within the given seconds."""
-        self.run()
-        until = time.perf_counter() + seconds
-        fastest = np.inf
-        while time.perf_counter() < until or not np.isfinite(fastest):
-            since = time.thread_time()
+
+        def work(_: int) -> int:
             self.run()
-            fastest = min(fastest, time.thread_time() - since)
-        return float(N_TRIALS * N_STEPS / fastest)
+            return N_TRIALS * N_STEPS
+
+        return fastest_rate(work, seconds)
 
 
 def _numbers(arena: Arena) -> dict[str, float]:

@@ -15,10 +15,10 @@ from realitygap.platforms import built_in_platforms
 from realitygap.records import LEDGER_NAME, Ledger, ResultsFolder
 from realitygap.runs import Condition
 from realitygap.tasks import source_hash
-from realitygap.trials import Operator
+from realitygap.trials import Operator, usable_processors
 
 from ._code import AllowCode, with_code_allowed
-from ._executors import ChunkTask, Executor, Threads, usable_processors
+from ._executors import ChunkTask, Executor, Threads
 from ._file import load_study
 from ._physical import OpenRobot, PhysicalResult, PhysicalStudy, n_complete, physical_conditions
 from ._robot import connect_robot, default_operator

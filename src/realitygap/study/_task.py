@@ -12,8 +12,8 @@ from realitygap.errors import StudyError, did_you_mean, whole_number
 from realitygap.evolution import NAMED_SETTINGS, NeatSettings
 from realitygap.runs import TaskRun, run_task
 from realitygap.tasks import CLASSICAL_TASKS, ClassicalTask
+from realitygap.trials import usable_processors
 
-from ._executors import usable_processors
 from ._problems import Problems
 from ._run import Progress
 

@@ -17,10 +17,9 @@ from typing import Any
 from realitygap.errors import RealityGapError, RobotError, from_extra, whole_number
 from realitygap.platforms import Opening, TwinTarget, platform_of
 from realitygap.records import write_whole
-from realitygap.trials import Target
+from realitygap.trials import Target, usable_processors
 
 from .._calibrate.whole import calibrate_all
-from .._executors import usable_processors
 from .._transfer.strategies import choose_condition
 from .plan import ClosingPlan, TwinName, adopt_plan
 from .summary import summarize_closing

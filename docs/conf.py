@@ -131,6 +131,14 @@ def in_section(lines):
     return False
 
 
+def make_accessible(app, page, template, context, doctree):
+    """Let the keyboard scroll blocks of code, and give the headings of the navigation their level."""
+    if "body" in context:
+        context["body"] = context["body"].replace("<pre>", '<pre tabindex="0">')
+    tree = context.get("furo_navigation_tree", "")
+    context["furo_navigation_tree"] = tree.replace('role="heading"', 'role="heading" aria-level="2"')
+
+
 def setup(app):
     """Write the generated pages before Sphinx looks for pages."""
     more = {
@@ -145,3 +153,4 @@ def setup(app):
     reference_pages.write_all(HERE / "generated", more)
     app.connect("autodoc-skip-member", skip_pydantic)
     app.connect("autodoc-process-docstring", as_restructured, priority=1)
+    app.connect("html-page-context", make_accessible, priority=900)  # after the theme has made its navigation

@@ -172,6 +172,12 @@ def test_tables_on_the_page_of_closing_the_gap_follow_from_its_data():
         assert (make_closing.TABLES / name).read_text("utf-8") == text, name
 
 
+def test_tables_and_figure_of_the_fresh_twins_follow_from_their_data():
+    make_closing_fresh = _load("make_closing_fresh")
+    for path, text in make_closing_fresh.texts(make_closing_fresh.stored_summary()).items():
+        assert path.read_text("utf-8") == text, path
+
+
 def test_means_of_controllers_are_the_points_of_the_figure():
     make_closing = _load("make_closing")
     summary = make_closing.stored_summary()

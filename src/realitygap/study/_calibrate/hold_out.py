@@ -32,6 +32,7 @@ class Compared:
         errors: Error of each prediction.
         more: Further errors in the same unit, by their name and by prediction.
         by: Error of the fit and of the nominal numbers by condition: kind of condition, its value, prediction.
+        choices: The predictions whose numbers can be recommended.
     """
 
     measure: str
@@ -40,6 +41,7 @@ class Compared:
     errors: Mapping[str, float]
     more: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     by: Mapping[str, Mapping[str, Mapping[str, float]]] = field(default_factory=dict)
+    choices: tuple[str, ...] = (NOMINAL, FITTED, POSTERIOR)
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain values, for the evidence of a calibration."""
@@ -67,9 +69,8 @@ class Compared:
 
     @property
     def recommended(self) -> str:
-        """The numbers with the smallest error: `NOMINAL`, also if others are equal, `FITTED`, or `POSTERIOR`."""
-        numbers = [name for name in (NOMINAL, FITTED, POSTERIOR) if name in self.errors]
-        return min(numbers, key=self.errors.__getitem__)
+        """The one of the choices with the smallest error, and the first of those with equal errors."""
+        return min((name for name in self.choices if name in self.errors), key=self.errors.__getitem__)
 
 
 def chosen_parts(parts: Parts, compared: Compared | None, given: Mapping[str, float]) -> Parts:

@@ -1,5 +1,6 @@
 """Kernels take tuples and arrays apart as Python does."""
 
+import itertools
 from typing import NamedTuple
 
 import numpy as np
@@ -127,3 +128,25 @@ def test_items_of_arrays_with_gaps_are_found() -> None:
     for array in (whole, whole[::2, ::3], whole[::-1, 1:], np.asfortranarray(whole)):
         assert item(array, 1, -2) == 2 * array[1, -2] + array[-1, -1]
     assert item(whole, np.int32(-1), np.uint8(3)) == 2 * whole[-1, 3] + whole[-1, -1]
+
+
+def _extremes(a, b, i, j, out):
+    out[0] = min(a, b)
+    out[1] = max(a, b)
+    out[2] = min(i, a)
+    out[3] = max(min(a, 1.0), -1.0)
+    for _ in range(min(i, out.size)):
+        out[4] += 1
+    return max(i, j)
+
+
+def test_min_and_max_of_two_numbers_are_those_of_python() -> None:
+    compiled = kernel(_extremes)
+    numbers = [0.0, -0.0, 1.5, -3.0, np.inf, np.nan]
+    for a, b in itertools.product(numbers, numbers):
+        for real, i, j in ((float, 3, 5), (np.float32, 5, 3), (float, np.int32(2), -7)):
+            mine, plain = np.zeros(5), np.zeros(5)
+            largest = compiled(real(a), real(b), i, j, mine)
+            expected = _extremes(real(a), real(b), i, j, plain)
+            assert largest == expected
+            assert mine.tobytes() == plain.tobytes(), (a, b, i, j)

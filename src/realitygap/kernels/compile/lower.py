@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import functools
+import operator
 from collections import Counter
 from typing import Any
 
 from llvmlite import ir as llvm
 from numba import _dynfunc
-from numba.core import analysis, ir, lowering, types
+from numba.core import analysis, ir, lowering, types, typing
 from numba.core.compiler_machinery import register_pass
 from numba.core.typed_passes import NativeLowering
 from numba.np import arrayobj
 
-from . import parts
+from . import parts, unpack
 from .parts import PartsBuilder
 
 # Of the symbol of a function that unpacks what Python calls with.
@@ -22,6 +23,21 @@ PYTHON_WRAPPER = "_ZN7cpython"
 
 # Attributes of arrays that are members of Numba's struct.
 _MEMBERS = {"shape": parts.SHAPE, "size": parts.N_ITEMS}
+
+
+# `min(a, b)` is b if b < a.
+_COMPARED_BY = {min: operator.lt, max: operator.gt}
+
+
+def is_min_or_max(function: Any, kinds: Any) -> bool:
+    """Whether a call is that of `min` or `max` with two numbers, for which Numba would compile a function."""
+    numbers = (types.Integer, types.Float)
+    return (
+        type(function) is types.Function
+        and len(kinds) == 2
+        and function.typing_key in _COMPARED_BY
+        and all(isinstance(types.unliteral(kind), numbers) for kind in kinds)
+    )
 
 
 def _assigned_once(blocks: dict[int, Any]) -> set[str]:
@@ -104,6 +120,10 @@ class _Lower(lowering.Lower):
                 for one in expr.args
             ]
             return parts.make_range(self.context, resty, numbers)
+        if expr.op == "call" and not expr.kws and not expr.vararg:
+            function, kinds = self.typeof(expr.func.name), [self.typeof(one.name) for one in expr.args]
+            if is_min_or_max(function, kinds):
+                return self._lower_min_or_max(resty, expr, _COMPARED_BY[function.typing_key], kinds)
         if expr.op == "getiter":
             value = self.loadvar(expr.value.name)
             loop = parts.begin_loop(self.context, self.builder, self.typeof(expr.value.name), value)
@@ -113,10 +133,43 @@ class _Lower(lowering.Lower):
             return parts.next_of_loop(self.context, self.builder, resty, loop)
         return super().lower_expr(resty, expr)
 
+    def _lower_min_or_max(self, kind: Any, expr: Any, compared_by: Any, kinds: Any) -> Any:
+        first, second = (
+            self.context.cast(self.builder, self.loadvar(one.name), one_kind, kind)
+            for one, one_kind in zip(expr.args, kinds, strict=True)
+        )
+        compare = self.context.get_function(compared_by, typing.signature(types.boolean, kind, kind))
+        return self.builder.select(compare(self.builder, (second, first)), second, first)
+
     def lower_assign(self, ty: Any, inst: Any) -> Any:
         if isinstance(ty, types.Dispatcher):
             return self.context.get_dummy_value()
         return super().lower_assign(ty, inst)
+
+
+class _LowerEntry(_Lower):
+    """For calls from Python: with the address of all arguments, as `unpack` writes them."""
+
+    def setup_function(self, fndesc: Any) -> None:
+        convention = self.call_conv
+        kind = convention.get_function_type(fndesc.restype, (types.voidptr,))
+        self.function = llvm.Function(self.module, kind, fndesc.mangled_name)
+        convention.decorate_function(self.function, ("memory",), (types.voidptr,))
+        self.entry_block = self.function.append_basic_block("entry")
+        self.builder = PartsBuilder(self.entry_block)
+        self.call_helper = convention.init_call_helper(self.builder)
+        self._layout = unpack.lay_out(fndesc.argtypes)
+        memory = convention.get_arguments(self.function)[0]
+        self._arguments = unpack.UnpackedArguments(
+            self.context, self.builder, fndesc.argtypes, self._layout, memory
+        )
+
+    def extract_function_arguments(self) -> Any:
+        self.fnargs = self._arguments.values
+        return self.fnargs
+
+    def create_cpython_wrapper(self, release_gil: bool = False) -> None:
+        unpack.add_wrapper(self.context, self.library, self.fndesc, self.env, release_gil, self._layout)
 
 
 class _LowerInner(_Lower):
@@ -150,7 +203,10 @@ class _LowerInner(_Lower):
 def _lowering(inner: bool, context: Any, *arguments: Any, **named: Any) -> lowering.Lower:
     if context.enable_nrt:
         return lowering.Lower(context, *arguments, **named)
-    return (_LowerInner if inner else _Lower)(context, *arguments, **named)
+    if inner:
+        return _LowerInner(context, *arguments, **named)
+    fndesc = arguments[1]
+    return (_Lower if unpack.lay_out(fndesc.argtypes) is None else _LowerEntry)(context, *arguments, **named)
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)

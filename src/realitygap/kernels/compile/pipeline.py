@@ -30,7 +30,7 @@ from numba.core.untyped_passes import (
     TranslateByteCode,
 )
 
-from .lower import LowerForCallers, LowerKernel, LowerShared, register_call
+from .lower import LowerForCallers, LowerKernel, LowerShared, is_min_or_max, register_call
 
 
 class _Flags(Flags):
@@ -56,6 +56,9 @@ class _RememberedTyping:
     def resolve_function_type(self, function: Any, arguments: Any, named: Any) -> Any:
         if type(function) is not types.Function or named:
             return self._context.resolve_function_type(function, arguments, named)
+        if is_min_or_max(function, arguments):
+            kind = self._context.unify_types(*map(types.unliteral, arguments))
+            return typing.signature(kind, *arguments)
         key = (function.typing_key, arguments)
         try:
             owner, signature = self._known[key]

@@ -133,7 +133,7 @@ bad:
 
 
 class Layout(NamedTuple):
-    """How arguments are unpacked into memory."""
+    """The layout of unpacked arguments in memory."""
 
     table: list[int]  # four numbers for each row
     # Place of each array or number, by argument and members [bytes], and the number of dimensions.

@@ -8,6 +8,7 @@ from pathlib import Path
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE))
 
+import api_pages  # noqa: E402
 import make_billion  # noqa: E402
 import make_faults  # noqa: E402
 import make_gallery  # noqa: E402
@@ -53,6 +54,7 @@ html_theme_options = {
         "color-brand-content": colors["accent"],
         "color-foreground-primary": colors["text"],
         "color-foreground-secondary": colors["muted"],
+        "color-foreground-muted": colors["muted"],
         "color-background-primary": colors["card"],
         "color-background-secondary": colors["ground"],
         "color-background-border": colors["rule"],
@@ -120,7 +122,7 @@ def as_restructured(app, what, name, obj, options, lines):
 
 def skip_pydantic(app, what, name, obj, skip, options):
     """Leave out what pydantic adds to a model."""
-    return True if name.startswith("model_") else None
+    return True if what == "class" and name.startswith("model_") else None
 
 
 def in_section(lines):
@@ -132,9 +134,10 @@ def in_section(lines):
 
 
 def make_accessible(app, page, template, context, doctree):
-    """Let the keyboard scroll blocks of code, and give the headings of the navigation their level."""
+    """Let the keyboard scroll blocks of code and tables, and give the headings of the navigation their level."""
     if "body" in context:
-        context["body"] = context["body"].replace("<pre>", '<pre tabindex="0">')
+        body = context["body"].replace("<pre>", '<pre tabindex="0">')
+        context["body"] = body.replace('<div class="table-wrapper', '<div tabindex="0" class="table-wrapper')
     tree = context.get("furo_navigation_tree", "")
     context["furo_navigation_tree"] = tree.replace('role="heading"', 'role="heading" aria-level="2"')
 
@@ -144,6 +147,7 @@ def setup(app):
     more = {
         "parts/billion.md": make_billion.page_tables(),
         "parts/gallery.md": make_gallery.page_part(),
+        **api_pages.page_parts(),
         **make_speed.page_parts(),
         **make_faults.page_parts(),
         **make_lab.page_parts(),

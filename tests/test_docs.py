@@ -270,14 +270,14 @@ def test_parameters_that_the_page_of_inference_calls_missed_are_those_held_too_s
         observe: make_calibration.held_by_name(rows)
         for observe, rows in make_calibration.by_observation(make_calibration.measured()).items()
     }
-    jitter = [part["drive.delay_jitter"] for part in held.values()]
-    assert (sum(part.count for part in jitter), sum(part.n for part in jitter)) == (33, 48)
     seldom = {name for name, part in held["track"].items() if make_calibration.chance(part) <= 0.05}
     assert seldom == {"drive.delay", "drive.delay_jitter", "drive.dead_band"}
     assert {held["track"][name].count for name in seldom} == {18}
-    assert {name for name, part in held["cells"].items() if make_calibration.chance(part) <= 0.05} == {
-        "drive.delay_jitter"
+    n_parameters = sum(len(parts) for parts in held.values())
+    corrected = {
+        name for name, part in held["cells"].items() if n_parameters * make_calibration.chance(part) <= 0.05
     }
+    assert (n_parameters, corrected) == (59, {"drive.drift_per_m"})
 
 
 @pytest.mark.slow

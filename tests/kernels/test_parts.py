@@ -1,12 +1,12 @@
 """Kernels take tuples and arrays apart as Python does."""
 
 import itertools
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
 
-from realitygap.kernels.compile.decorators import kernel, shared
+from realitygap.kernels.compile.decorators import kernel, maker, shared
 
 
 class Inner(NamedTuple):
@@ -140,8 +140,9 @@ def _extremes(a, b, i, j, out):
     return max(i, j)
 
 
-def test_min_and_max_of_two_numbers_are_those_of_python() -> None:
-    compiled = kernel(_extremes)
+@pytest.mark.parametrize("decorator", [kernel, maker])
+def test_min_and_max_of_two_numbers_are_those_of_python(decorator: Any) -> None:
+    compiled = decorator(_extremes)
     numbers = [0.0, -0.0, 1.5, -3.0, np.inf, np.nan]
     for a, b in itertools.product(numbers, numbers):
         for real, i, j in ((float, 3, 5), (np.float32, 5, 3), (float, np.int32(2), -7)):

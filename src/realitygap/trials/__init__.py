@@ -81,7 +81,6 @@ __all__ = [
     "is_taken_back",
     "is_whole",
     "kind_of",
-    "limited",
     "maze_exit",
     "maze_rules",
     "maze_scene",

@@ -44,11 +44,18 @@ class _Flags(Flags):
 
 
 class _RememberedTyping:
-    """The typing context, with what operations on numbers and arrays give remembered."""
+    """The typing context, with what operations on numbers and arrays give remembered.
 
-    def __init__(self, context: Any, known: dict[Any, Any]) -> None:
+    Args:
+        context: Numba's.
+        known: The remembered types.
+        is_lowered_here: Whether `_Lower` lowers the function. Numba's lowering has its own way for `min` and `max`.
+    """
+
+    def __init__(self, context: Any, known: dict[Any, Any], *, is_lowered_here: bool) -> None:
         self._context = context
         self._known = known
+        self._is_lowered_here = is_lowered_here
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._context, name)
@@ -56,7 +63,7 @@ class _RememberedTyping:
     def resolve_function_type(self, function: Any, arguments: Any, named: Any) -> Any:
         if type(function) is not types.Function or named:
             return self._context.resolve_function_type(function, arguments, named)
-        if is_min_or_max(function, arguments):
+        if self._is_lowered_here and is_min_or_max(function, arguments):
             kind = self._context.unify_types(*map(types.unliteral, arguments))
             return typing.signature(kind, *arguments)
         key = (function.typing_key, arguments)
@@ -86,7 +93,7 @@ class InferTypes(NopythonTypeInference):
         context = state.typingctx
         # An operation that Numba writes in Python is compiled with the options of its first caller.
         known = _KNOWN.setdefault(state.flags, {})
-        state.typingctx = _RememberedTyping(context, known)
+        state.typingctx = _RememberedTyping(context, known, is_lowered_here=not state.flags.nrt)
         try:
             return bool(super().run_pass(state))
         finally:

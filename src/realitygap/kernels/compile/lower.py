@@ -14,7 +14,7 @@ from numba.core.compiler_machinery import register_pass
 from numba.core.typed_passes import NativeLowering
 from numba.np import arrayobj
 
-from . import parts, unpack
+from . import parts
 from .parts import PartsBuilder
 
 # Of the symbol of a function that unpacks what Python calls with.
@@ -147,31 +147,6 @@ class _Lower(lowering.Lower):
         return super().lower_assign(ty, inst)
 
 
-class _LowerEntry(_Lower):
-    """For calls from Python: with the address of all arguments, as `unpack` writes them."""
-
-    def setup_function(self, fndesc: Any) -> None:
-        convention = self.call_conv
-        kind = convention.get_function_type(fndesc.restype, (types.voidptr,))
-        self.function = llvm.Function(self.module, kind, fndesc.mangled_name)
-        convention.decorate_function(self.function, ("memory",), (types.voidptr,))
-        self.entry_block = self.function.append_basic_block("entry")
-        self.builder = PartsBuilder(self.entry_block)
-        self.call_helper = convention.init_call_helper(self.builder)
-        self._layout = unpack.lay_out(fndesc.argtypes)
-        memory = convention.get_arguments(self.function)[0]
-        self._arguments = unpack.UnpackedArguments(
-            self.context, self.builder, fndesc.argtypes, self._layout, memory
-        )
-
-    def extract_function_arguments(self) -> Any:
-        self.fnargs = self._arguments.values
-        return self.fnargs
-
-    def create_cpython_wrapper(self, release_gil: bool = False) -> None:
-        unpack.add_wrapper(self.context, self.library, self.fndesc, self.env, release_gil, self._layout)
-
-
 class _LowerInner(_Lower):
     """For calls from other kernels: with an argument for each number that the function uses."""
 
@@ -203,10 +178,7 @@ class _LowerInner(_Lower):
 def _lowering(inner: bool, context: Any, *arguments: Any, **named: Any) -> lowering.Lower:
     if context.enable_nrt:
         return lowering.Lower(context, *arguments, **named)
-    if inner:
-        return _LowerInner(context, *arguments, **named)
-    fndesc = arguments[1]
-    return (_Lower if unpack.lay_out(fndesc.argtypes) is None else _LowerEntry)(context, *arguments, **named)
+    return (_LowerInner if inner else _Lower)(context, *arguments, **named)
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)

@@ -106,6 +106,13 @@ def sentences(summary: dict[str, Any]) -> str:
     return "\n\n".join([*parts, *_of_order(summary)]) + "\n"
 
 
+def done_parts(summary: Mapping[str, Any]) -> str:
+    """Return how much of a study is done, as a sentence."""
+    if summary["n_done"] == summary["n_units"]:
+        return "All parts of the study are done."
+    return f"**{summary['n_done']} of {summary['n_units']} parts of the study are done**; all figures are of these."
+
+
 def verdicts(summary: Mapping[str, Any]) -> list[str]:
     """Return the goals that are met, open, and missed, as lists of Markdown."""
     names: dict[bool | None, list[str]] = {True: [], False: [], None: []}

@@ -15,7 +15,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from make_closing import table, verdicts
+from make_closing import done_parts, table, verdicts
 
 from realitygap.report import GOAL_HEAD, draw_closing, goal_table, not_counted
 from realitygap.study import summarize_closing
@@ -43,15 +43,10 @@ Summary = dict[str, Any]
 def words(summary: Summary) -> str:
     """Return how much of the study is done, and which goals are met, as paragraphs of Markdown."""
     plan = summary["plan"]
-    done = (
-        "All parts of the study are done."
-        if summary["n_done"] == summary["n_units"]
-        else f"**{summary['n_done']} of {summary['n_units']} parts of the study are done**; all figures are of these."
-    )
     size = (
-        f"{plan['twins']} twins of each family, seeds from {plan['first_seed']} on. {done} {summary['n_counted']} of "
-        f"{len(summary['twins'])} twins count: they differ from the uncalibrated simulator by more than three standard "
-        "errors."
+        f"{plan['twins']} twins of each family, seeds from {plan['first_seed']} on. {done_parts(summary)} "
+        f"{summary['n_counted']} of {len(summary['twins'])} twins count: they differ from the uncalibrated simulator by "
+        "more than three standard errors."
     )
     return "\n\n".join([size, *verdicts(summary), *not_counted(summary)]) + "\n"
 

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from make_closing import table, verdicts
+from make_closing import done_parts, table, verdicts
 from numpy.typing import NDArray
 
 from realitygap.report import FAMILY_HEAD, GOAL_HEAD, draw_closing, family_table, goal_table
@@ -47,15 +47,13 @@ Values = NDArray[np.float64]
 def words(summary: Summary) -> str:
     """Return how much of the study is done, and which goals are met, as paragraphs of Markdown."""
     plan = summary["plan"]
-    done = (
-        "All parts of the study are done."
-        if summary["n_done"] == summary["n_units"]
-        else f"**{summary['n_done']} of {summary['n_units']} parts of the study are done**; all figures are of these."
-    )
     sizes = ", ".join(
         f"{plan['fewer'].get(family, plan['twins'])} with `{family}`" for family in plan["families"]
     )
-    return "\n\n".join([f"Sittings: {sizes}. {done}", *verdicts(summary), *_flagged(summary)]) + "\n"
+    return (
+        "\n\n".join([f"Sittings: {sizes}. {done_parts(summary)}", *verdicts(summary), *_flagged(summary)])
+        + "\n"
+    )
 
 
 def _flagged(summary: Summary) -> Iterable[str]:

@@ -299,6 +299,7 @@ def test_plan_of_other_platforms_has_sittings_and_leaves_out_what_cannot_be_seen
 def test_plan_of_the_playground_begins_with_a_robot_that_has_its_sensors():
     plan = PLANS["playground"][0]
     assert [str(name) for name in plan.names] == ["playground-31"]
+    assert list(plan.platforms) == ["playground"]
     robot = choose_condition(plan.study, None, plan.seed).on.robot
     assert all(sensor.keeps_edge for sensor in robot.range)
 

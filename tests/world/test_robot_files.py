@@ -158,6 +158,8 @@ def test_each_without_entries_is_put_over_every_entry_of_the_base(write):
         DescriptionError, match=r"\[each.line\] is only for \[\[line\]\], of which there are none"
     ):
         load_robot(write('base = "mine.toml"\n[each.line]\nnoise = 0.1\n', "third.toml"))
+    with pytest.raises(DescriptionError, match=r"each.range is 3, expected a table \[each.range\]"):
+        load_robot(write('base = "mine.toml"\n[each]\nrange = 3\n', "fourth.toml"))
 
 
 def test_thymio_of_the_playground_differs_by_what_its_rays_keep():

@@ -178,8 +178,10 @@ def _put_into_each(
     values: dict[str, Any], kind: str, common: Any, origin: str, *, is_over: bool = False
 ) -> None:
     """Put values that all entries of a kind have in common below those of each entry, or over them."""
+    if not isinstance(common, dict):
+        raise DescriptionError(f"{origin}: each.{kind} is {common!r}, expected a table [each.{kind}].")
     entries = values.get(kind)
-    if not isinstance(entries, list | tuple) or not entries or not isinstance(common, dict):
+    if not isinstance(entries, list | tuple) or not entries:
         raise DescriptionError(f"{origin}: [each.{kind}] is only for [[{kind}]], of which there are none.")
     values[kind] = [
         (entry | common if is_over else common | entry) if isinstance(entry, dict) else entry

@@ -180,6 +180,7 @@ PLAYGROUND = replace(
     THYMIO,
     study="sim-thymio-playground",
     families=("playground",),
+    platforms={"playground": THYMIO.platforms["playground"]},
     twins=1,
     first_seed=31,
     observations=("track",),

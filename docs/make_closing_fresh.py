@@ -45,8 +45,8 @@ def words(summary: Summary) -> str:
     plan = summary["plan"]
     size = (
         f"{plan['twins']} twins of each family, seeds from {plan['first_seed']} on. {done_parts(summary)} "
-        f"{summary['n_counted']} of {len(summary['twins'])} twins count: they differ from the uncalibrated simulator by "
-        "more than three standard errors."
+        f"{summary['n_counted']} of {len(summary['twins'])} twins count: they differ from the uncalibrated simulator "
+        "by more than three standard errors."
     )
     return "\n\n".join([size, *verdicts(summary), *not_counted(summary)]) + "\n"
 

@@ -586,6 +586,17 @@ def test_touch_plays(show):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(("used", "seen"), [("#replay-first", "#replay"), ("#lead-play", "#lead")])
+def test_a_replay_in_use_does_not_start_by_itself(show, used, seen):
+    page = show(size=(PHONE[0], 80))
+    page.locator(used).dispatch_event("pointerdown")
+    page.set_viewport_size({"width": DESKTOP[0], "height": DESKTOP[1]})
+    page.locator(f"{seen}-stage").scroll_into_view_if_needed()
+    page.wait_for_timeout(300)
+    assert page.locator(f"{seen}-play").text_content().strip() == "Play"
+
+
+@pytest.mark.slow
 def test_dark_mode_is_dark(show):
     colors = []
     for scheme in ("light", "dark"):

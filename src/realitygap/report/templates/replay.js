@@ -307,7 +307,7 @@
 
   const PLAY = "M4 2.5v11L13 8z", PAUSE = "M3.5 2.5h3.2v11H3.5zM9.3 2.5h3.2v11H9.3z";
 
-  // once in view, and only once; not with reduced motion
+  // once in view, and only once; not with reduced motion, and not for a reader who already uses the controls
   function playInView(element, clock, mayPlay) {
     if (still.matches || !("IntersectionObserver" in window)) return;
     const observer = new IntersectionObserver(([entry]) => {
@@ -316,6 +316,7 @@
       if (mayPlay()) clock.play();
     }, { threshold: [0.6] });
     observer.observe(element);
+    for (const use of ["pointerdown", "keydown"]) element.parentElement.addEventListener(use, () => observer.disconnect());
   }
 
   // state

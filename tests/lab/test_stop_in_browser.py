@@ -23,6 +23,8 @@ pytestmark = pytest.mark.slow
 
 STOP_S = 0.2
 """Within which the motors stand after a press [s]."""
+RELEASE_S = 0.5
+"""Within which they stand after a key was let go, or may have been [s]."""
 VIEWS = {"desktop": (1280, 800), "phone": PHONE, "phone with its keyboard": (390, 400)}
 
 NOTICES = """() => ["negative", "warning", "info"].forEach((type) => Quasar.Notify.create({
@@ -93,14 +95,22 @@ class Motors:
 
     def check_stop(self, driving: Any, press: Any, let_go: Any) -> None:
         """Press while they turn, three times at most: a machine with other work may delay one of them."""
-        times = []
-        while len(times) < 3 and (not times or times[-1] >= STOP_S):
-            hold(driving)
-            times.append(self._time_of_stop(press))
+
+        def end() -> None:
             let_go()
             driving.mouse.up()
-        print(f"the motors turned for {times} s after the press")
-        assert times[-1] < STOP_S
+
+        self.check(STOP_S, lambda: hold(driving), press, end)
+
+    def check(self, limit_s: float, begin: Any, act: Any, end: Any) -> None:
+        """Let them turn, act, and check how long they turn then; three times at most, for the same reason."""
+        times = []
+        while len(times) < 3 and (not times or times[-1] >= limit_s):
+            begin()
+            times.append(self._time_of_stop(act))
+            end()
+        print(f"the motors turned for {times} s afterwards")
+        assert times[-1] < limit_s
 
     def _time_of_stop(self, press: Any) -> float:
         """How long they turn after a press [s]."""
@@ -168,6 +178,63 @@ def test_stop_is_at_once_while_a_check_a_report_and_a_calibration_run(lab, visit
     make_busy(lab, visit)
     point_at_stop(pressing)
     motors.check_stop(driving, pressing.mouse.down, pressing.mouse.up)
+
+
+def test_motors_stop_within_half_a_second_once_keys_are_let_go_or_are_another_windows(
+    visit, emulated, motors
+):
+    page = visit("robot")
+    connect(page, emulated[0])
+    keyboard, window = page.keyboard, page.context.new_cdp_session(page)
+    window.send("Emulation.setFocusEmulationEnabled", {"enabled": False})  # otherwise each page has the focus
+
+    def press() -> None:
+        page.bring_to_front()
+        page.locator(".lab-pad").focus()
+        keyboard.down("ArrowLeft")
+
+    def let_go() -> None:
+        for key in ("ArrowLeft", "Meta", "Alt"):
+            keyboard.up(key)
+        for other in page.context.pages[1:]:
+            other.close()
+
+    def open_tab() -> None:
+        page.context.new_page().bring_to_front()
+
+    lost_keys = {
+        "key": lambda: keyboard.up("ArrowLeft"),
+        "Command": lambda: keyboard.down("Meta"),
+        "Alt": lambda: keyboard.down("Alt"),
+        "menu": lambda: page.locator(".lab-pad").dispatch_event("contextmenu"),
+        "dialog": lambda: page.evaluate("() => { window.dispatchEvent(new Event('blur')); }"),
+        "tab": open_tab,
+    }
+    for name, act in lost_keys.items():
+        print(name)
+        motors.check(RELEASE_S, press, act, let_go)
+
+
+@pytest.mark.parametrize("is_asked", [True, False])
+def test_motors_stop_within_half_a_second_when_the_tab_is_closed_with_a_key_down(
+    visit, emulated, motors, is_asked
+):
+    page = visit("robot")
+    connect(page, emulated[0])
+    pages = [page]
+
+    def press() -> None:
+        pages[-1].bring_to_front()
+        pages[-1].locator(".lab-pad").focus()
+        pages[-1].keyboard.down("ArrowLeft")
+
+    def open_again() -> None:
+        again = page.context.new_page()
+        again.goto(page.url)
+        again.get_by_text(f"Connected to {emulated[0]}").wait_for()
+        pages.append(again)
+
+    motors.check(RELEASE_S, press, lambda: pages[-1].close(run_before_unload=is_asked), open_again)
 
 
 def test_stop_needs_no_websocket(visit, emulated, motors):

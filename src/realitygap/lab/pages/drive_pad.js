@@ -1,4 +1,5 @@
 // A dead man's handle: while it is held, where to is said ten times a second; let go, it says so once.
+// A key that is down when the window or the keyboard's owner changes counts as let go: its release never arrives here.
 // A gamepad holds it, too, while the handle has the focus; each of its buttons lets go until the stick was in its middle.
 const DEAD_ZONE = 0.15;
 export default {
@@ -6,7 +7,7 @@ export default {
   template: `
     <svg viewBox="-1.4 -1.4 2.8 2.8" class="lab-pad" :class="{'lab-pad-off': disabled}" role="application" tabindex="0"
          :aria-label="name" :aria-disabled="String(disabled)" :data-stops="stops" ref="pad" @pointerdown="down" @pointermove="move"
-         @pointerup="release" @pointercancel="release" @keydown="key" @keyup="keyUp" @blur="release">
+         @pointerup="release" @pointercancel="release" @keydown="key" @keyup="keyUp" @blur="release" @contextmenu="menu">
       <circle r="1.1" class="lab-pad-rim" />
       <path d="M 0 -1 L 0.14 -0.78 L -0.14 -0.78 Z M 0 1 L 0.14 0.78 L -0.14 0.78 Z" class="lab-pad-way" />
       <path d="M -1 0 L -0.78 0.14 L -0.78 -0.14 Z M 1 0 L 0.78 0.14 L 0.78 -0.14 Z" class="lab-pad-way" />
@@ -18,12 +19,14 @@ export default {
     this.away = () => this.release();
     document.addEventListener("visibilitychange", this.away);
     window.addEventListener("pagehide", this.away);
+    window.addEventListener("blur", this.away);
   },
   unmounted() {
     clearInterval(this.beat);
     this.release();
     document.removeEventListener("visibilitychange", this.away);
     window.removeEventListener("pagehide", this.away);
+    window.removeEventListener("blur", this.away);
   },
   watch: { disabled(now) { if (now) this.release(); } },
   methods: {
@@ -71,7 +74,10 @@ export default {
         this.hold(-y, -x);
       } else if (this.isGamepad) this.release();
     },
+    menu() { if (this.keys.size) this.release(); }, // while it is open, it takes the releases of keys
     key(event) {
+      // With Command down, a Mac reports no release of other keys; with Alt, an arrow leaves the page.
+      if (event.metaKey || event.ctrlKey || event.altKey) return this.release();
       if (!event.key.startsWith("Arrow") || this.disabled) return;
       event.preventDefault();
       this.keys.add(event.key);

@@ -2,6 +2,7 @@
 
     uv run python docs/make_closing_fresh.py results/closing-the-gap-fresh
     uv run python docs/make_closing_fresh.py    # without results: from the stored data
+    uv run python docs/make_closing_fresh.py results/again --again    # beside the stored results of the same twins
 
 With results of `realitygap closing-the-gap --plan fresh`, complete or not, it writes summary.json. Tables, sentences,
 and the figure follow from it. The study takes an hour on two cores and is not run here.
@@ -34,6 +35,16 @@ FALL_HEAD = (
     "95 %, twins",
     "pooled fall",
     "95 %, seeds",
+)
+AGAIN_HEAD = (
+    "numbers",
+    "twins",
+    "RMS gap, fit then",
+    "fall",
+    "95 %, twins",
+    "RMS gap, fit now",
+    "fall",
+    "95 %, twins",
 )
 DRAWS, ESTIMATE, RECOMMENDED = "samples of the posterior", "estimate", "recommended"
 
@@ -69,6 +80,37 @@ def fall_table(summary: Summary) -> Iterable[Sequence[str]]:
         for kind, numbers, pairs in rows:
             figures = _fall([(a["estimate"], b["estimate"]) for a, b in pairs], seeds)
             yield (observe, kind, numbers, *figures)
+
+
+def again_table(stored: Summary, again: Summary) -> Iterable[Sequence[str]]:
+    """Yield `AGAIN_HEAD` for the twins that were measured again with crossed cells, with a later fit."""
+    twins = {twin["twin"]: twin for twin in stored["twins"]}
+    pairs = [
+        (twin, before, after)
+        for twin in again["twins"]
+        if (after := _after(again, twin, "cells"))
+        if (before := _after(stored, twins[twin["twin"]], "cells"))
+    ]
+    for numbers in (DRAWS, ESTIMATE, RECOMMENDED):
+        figures = []
+        for fit in (1, 2):
+            gaps = [(pair[0]["rms"], _gap_with(numbers, pair[0], pair[fit])) for pair in pairs]
+            falls = [1 - after["estimate"] / before["estimate"] for before, after in gaps]
+            figures += [
+                f"{median_interval([b['estimate'] for _, b in gaps])['estimate']:.3f}",
+                *_span(median_interval(falls)),
+            ]
+        yield (numbers, str(len(pairs)), *figures)
+
+
+def _gap_with(numbers: str, twin: Summary, after: Summary) -> Summary:
+    """Return the RMS gap of a calibrated simulator with some of its numbers."""
+    found: Summary = {
+        DRAWS: after["rms_draws"],
+        ESTIMATE: after["rms_point"],
+        RECOMMENDED: _recommended(twin, after),
+    }[numbers]
+    return found
 
 
 def _recommended(twin: Summary, after: Summary) -> Summary:
@@ -138,7 +180,16 @@ def main() -> None:
     parser.add_argument(
         "folder", type=Path, nargs="?", help="results of `realitygap closing-the-gap --plan fresh`"
     )
-    folder = parser.parse_args().folder
+    parser.add_argument(
+        "--again", action="store_true", help="compare them with the stored results; keep these"
+    )
+    options = parser.parse_args()
+    if options.again:
+        rows = again_table(stored_summary(), summarize_closing(options.folder))
+        (TABLES / "again.csv").write_text(table(AGAIN_HEAD, rows), "utf-8")
+        print(f"Written: {TABLES / 'again.csv'}")
+        return
+    folder = options.folder
     for place in (TABLES, FIGURES):
         place.mkdir(parents=True, exist_ok=True)
     summary = stored_summary() if folder is None else summarize_closing(folder)

@@ -48,12 +48,23 @@ def trials(request):
 def test_a_robot_is_found_from_whole_trials_without_poses(trials):
     numbers = fitted(trials)
     middle = {name: np.median(value) for name, value in numbers.items()}
-    moved = (1 - middle["drive.slip"]) if len(trials[0].wheels) else 1.0  # of which slip takes a share
-    assert middle["drive.gain_left"] * moved == pytest.approx(0.8, rel=0.02)
-    assert middle["drive.gain_right"] * moved == pytest.approx(0.84, rel=0.02)
+    for side, gain in (("left", 0.8), ("right", 0.84)):
+        moved = numbers[f"drive.gain_{side}"] * (1 - numbers["drive.slip"])
+        assert np.median(moved) == pytest.approx(gain, rel=0.02)
     assert middle["drive.track"] == pytest.approx(0.104, rel=0.02)
     assert middle["drive.lag"] + middle["drive.delay"] == pytest.approx(0.32, abs=0.05)
     assert middle["contact.ang"] == pytest.approx(150.0, rel=0.5)
+
+
+@pytest.mark.slow
+def test_slip_that_nothing_shows_keeps_its_prior():
+    with SimTarget(SimPlatform(robot="thymio", step_s=0.5, set=TRUTH), ARENA, key=3) as target:
+        numbers = fitted(target.carry_out(all_plans(ARENA, PLATFORM.robot, 4, 1), "cells"))
+    low, middle, high = np.quantile(numbers["drive.slip"], [0.05, 0.5, 0.95])
+    # evenly in 0 to 0.25, less where it would take the gain to an end of its prior
+    assert low < 0.05
+    assert 0.08 < middle < 0.17
+    assert high > 0.2
 
 
 @pytest.mark.slow

@@ -26,11 +26,11 @@ from realitygap.records import TrialRecord
 from realitygap.world import Arena, RobotModel
 
 from ._abc import Effort, Posterior
-from ._all_from_poses import own_places, sensors_of
+from ._all_from_poses import WITH_SLIP, own_places, sensors_of
 from ._posterior import N_DRAWS
 from ._prior import Floats, Parameter, numbers_of, standard_of
 from ._shots import shots_of
-from ._single_commands import MOST_OFF, NOISE, PARTS, SLIP, values_at
+from ._single_commands import MOST_OFF, NOISE, PARTS, SLIP, places_of, values_at
 from ._tempering import sample_posterior
 
 F = TypeVar("F", bound=np.floating)
@@ -38,20 +38,27 @@ F = TypeVar("F", bound=np.floating)
 SCATTER = (*NOISE, "range.burst", "range.noise_gain", "range.outlier_most")
 """Parameters that scatter observations and hardly move their mean."""
 
+OF_MEAN = ("drive.gain", "drive.asymmetry", "stall.share")
+"""Parameters of the mean that compensate for slip."""
+
 HORIZONS = (0.1, 0.2, 0.4, 0.7, 1.0)
 """Shares of the steps that the rounds see."""
 
 GENERATIONS, SIZE = 40, 32  # of each round
-WIDE, NARROW = 0.2, 0.08  # first standard deviations of places: of the fit, and of reweighted fits
+WIDE = 0.2  # first standard deviation of places
+LEAST_SPREAD = 0.01  # of places, with which a fit begins
 N_REFITS = {"least": 6, "small": 10, "full": 16}
-REFIT_GENERATIONS = 25
+REFITS = {"encoders": (0.08, 25), "without": (0.12, 40)}
+"""First standard deviation of places of reweighted fits, and generations: minima are flatter without encoders."""
+
 PREDICTED = 0.4  # share of the steps whose poses are predicted well enough for the sensors
 N_READINGS = 500  # few, as an error of a pose makes the readings of many steps wrong alike
-SPREAD = 1.4  # times that of reweighted fits: with it, about nine of ten intervals hold the numbers of robots of `sim`
+SPREAD = 1.4  # times that of reweighted fits, which are few
 ALIKE = 30  # differences that noise makes alike, as it moves the robot for all later steps
+N_NOISE = 200  # draws of noise
+N_TRIES = 50  # of slips, of which the first is taken with which the gain is within its prior
 N_SHAPE = 400  # places that show the shape of the minimum
 N_NOISY = 40  # robots that show the scatter of observations
-N_NOISE = 200  # draws of noise
 FREEDOM = 4.0  # degrees, of the t distribution
 PRIOR = 12.0  # precision of a place that is even in 0..1
 FINEST = {"readings": 0.03, "stall": 0.3, "wheels": 2e-3}
@@ -102,6 +109,7 @@ def fit_from_commands(
         robot: Robot whose numbers they change.
         arena: Arena of the trials.
         whole: Posterior of whole trials by simulation: the sensors' noise is as in its draws while the mean is fitted.
+            Without encoders, a second fit begins with it, and half of the draws of all noise are from it.
         seed: Seed of all random numbers.
         effort: Number of fits of which the draws are made.
     """
@@ -109,11 +117,36 @@ def fit_from_commands(
     center, shape = fit.grown()
     values = {
         **values_at(fit.free, fit.draws(center, shape, N_REFITS[effort])),
-        **_some_of(fit.noise, N_DRAWS, fit.rng),
+        **fit.noise_draws(),
         **_sensors(fit, center, trials, arena, whole),
     }
+    if SLIP in values and not fit.seen.has_wheels:
+        values |= _respread_slip(prior, values, fit.rng)
     values = {parameter.name: values[parameter.name] for parameter in prior}
     return Posterior(standard_of(prior, values), values, np.zeros(len(prior)), fit.n_simulated)
+
+
+def _respread_slip(
+    prior: Sequence[Parameter], values: Mapping[str, Floats], rng: np.random.Generator
+) -> dict[str, Floats]:
+    """Return draws of slip from its prior, and of the parameters that compensate for it, (N_DRAWS,) each.
+
+    Without encoders, only the product of (1 - slip) and the gain is known, and the fits spread too little along it.
+    """
+    priors = {parameter.name: parameter.prior for parameter in prior}
+    gain = priors["drive.gain"]
+    before = values[SLIP]
+    slip = before.copy()
+    is_left = np.ones(len(slip), np.bool_)
+    for _ in range(N_TRIES):
+        proposed = priors[SLIP].of(rng.uniform(size=len(slip)))
+        scaled = values["drive.gain"] * (1 - before) / (1 - proposed)
+        is_taken = is_left & (gain.lowest <= scaled) & (scaled <= gain.highest)
+        slip[is_taken] = proposed[is_taken]
+        is_left &= ~is_taken
+    kept = (1 - slip) / (1 - before)
+    respread = {name: values[name] * kept ** WITH_SLIP[name] for name in OF_MEAN if name in values}
+    return {SLIP: slip, **respread}
 
 
 def _sensors(
@@ -165,19 +198,46 @@ class _Fit:
         whole: Posterior,
         seed: int,
     ) -> None:
-        scatter = SCATTER if seen.has_wheels else (*SCATTER, SLIP)
-        self.seen, self.ensemble, self.prior, self.robot, self.seed = seen, ensemble, prior, robot, seed
-        self.free = [p for p in prior if p.name not in scatter]
-        self.noise = {p.name: whole.values[p.name] for p in prior if p.name in scatter}
+        self.seen, self.ensemble, self.prior, self.robot = seen, ensemble, prior, robot
+        self.whole, self.seed = whole, seed
+        self.free = [p for p in prior if p.name not in SCATTER]
+        self.noise = {p.name: whole.values[p.name] for p in prior if p.name in SCATTER}
         self.rng = np.random.default_rng([seed, 3])
         self.n_simulated = 0
 
     def grown(self) -> tuple[Floats, Floats]:
-        """Return (p,) places of the fit, from the robot's own numbers on, and (p, p) the shape of its minimum."""
-        center = own_places(self.robot, self.free)
-        p = len(center)
-        strategy = self._strategy(center, WIDE, np.eye(p))
-        weights, pull = np.ones(len(self.seen.starts)), np.full(p, 0.5)
+        """Return (p,) places of the fit, and (p, p) the shape of its minimum.
+
+        It begins with the robot's own numbers. Without encoders, a second fit begins with the draws from whole trials,
+        and the one with the better minimum is taken: each is worse than the true numbers for some robots of `sim`.
+        """
+        noise = self.noise
+        fit = self._grown_from(own_places(self.robot, self.free), WIDE, np.eye(len(self.free)))
+        if self.seen.has_wheels:
+            return fit
+        fits, noises = [fit], [self.noise]
+        self.noise = noise
+        fits.append(self._grown_from(*self._spread_of_whole()))
+        noises.append(self.noise)
+        t = self.seen.commands.shape[1]
+        scales = [self._scales(center, t) for center, _ in fits]
+        weights, pull = np.ones(len(self.seen.starts)), np.full(len(self.free), 0.5)
+        centers = np.stack([center for center, _ in fits])
+        best = int(np.argmin(self._costs(centers, t, np.mean(scales, axis=0), weights, pull)))
+        self.noise = noises[best]
+        return fits[best]
+
+    def _spread_of_whole(self) -> tuple[Floats, float, Floats]:
+        """Return the mean place (p,) of the draws from whole trials, their standard deviation, and its shape (p, p)."""
+        draws = np.stack([places_of(p, self.whole.values[p.name]) for p in self.free], axis=1)
+        spread = np.cov(draws, rowvar=False) + LEAST_SPREAD**2 * np.eye(len(self.free))
+        width = float(np.sqrt(np.diag(spread).mean()))
+        return draws.mean(axis=0), width, spread / width**2
+
+    def _grown_from(self, center: Floats, width: float, shape: Floats) -> tuple[Floats, Floats]:
+        """Return a fit as of `grown` that begins at places (p,), with a standard deviation and its shape (p, p)."""
+        strategy = self._strategy(center, width, shape)
+        weights, pull = np.ones(len(self.seen.starts)), np.full(len(self.free), 0.5)
         for share in HORIZONS:
             t = max(1, round(share * self.seen.commands.shape[1]))
             # the noise is not known before the first round
@@ -193,12 +253,13 @@ class _Fit:
         """Return (N_DRAWS, p) places around the fit, from n reweighted fits."""
         t, k = self.seen.commands.shape[1], len(self.seen.starts)
         scales = self._scales(center, t)
-        spread = NARROW / np.sqrt(np.diag(shape).mean())
+        narrow, generations = REFITS["encoders" if self.seen.has_wheels else "without"]
+        spread = narrow / np.sqrt(np.diag(shape).mean())
         refits = []
         for _ in range(n):
             strategy = self._strategy(center, spread, shape)
             weights, pull = k * self.rng.dirichlet(np.ones(k)), self.rng.uniform(size=len(center))
-            self._descend(strategy, t, scales, weights, REFIT_GENERATIONS, pull)
+            self._descend(strategy, t, scales, weights, generations, pull)
             # a fit may have left for a worse minimum
             both = np.stack([np.clip(strategy.mean, 0.0, 1.0), center])
             refits.append(both[np.argmin(self._costs(both, t, scales, weights, pull))])
@@ -206,6 +267,19 @@ class _Fit:
         normal = self.rng.standard_normal((N_DRAWS, n)) @ off
         tails = np.sqrt((n - 1) / self.rng.chisquare(n - 1, N_DRAWS))
         return np.asarray(np.clip(center + normal * tails[:, None], 0.0, 1.0))
+
+    def noise_draws(self) -> dict[str, Floats]:
+        """Return draws of the noise, (N_DRAWS,) of each kind.
+
+        They are fitted to the differences that the mean leaves. Without encoders, these hold few true numbers, as the
+        mean hides noise; then one half is of whole trials by simulation.
+        """
+        fitted = _some_of(self.noise, N_DRAWS, self.rng)
+        if self.seen.has_wheels:
+            return fitted
+        of_whole = _some_of({name: self.whole.values[name] for name in self.noise}, N_DRAWS, self.rng)
+        is_fitted = self.rng.random(N_DRAWS) < 0.5
+        return {name: np.where(is_fitted, value, of_whole[name]) for name, value in fitted.items()}
 
     def _strategy(self, center: Floats, spread: float, shape: Floats) -> CMA:
         """Return a strategy that begins at places (p,), with a spread and a shape (p, p) of its steps."""
@@ -285,9 +359,8 @@ class _Fit:
                 -0.5 * (np.log(variance) + np.minimum(squares / variance, MOST_OFF**2)) @ weights
             )
 
-        self.noise |= values_at(
-            parameters, sample_posterior(log_likelihood, len(parameters), self.rng, N_NOISE)
-        )
+        fitted = sample_posterior(log_likelihood, len(parameters), self.rng, N_NOISE)
+        self.noise = self.noise | values_at(parameters, fitted)
 
     def poses(self, center: Floats) -> NDArray[np.float32]:
         """Return (k, t + 1, 3) poses of a robot without noise."""

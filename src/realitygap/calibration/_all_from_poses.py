@@ -20,7 +20,7 @@ from ._posterior import N_DRAWS
 from ._prior import Floats, Parameter, standard_of
 from ._rays import rays_of
 from ._shots import Shooter, Shots, shots_of
-from ._single_commands import BLOCK, SLIP, MotionOfCommands, place_of, values_at
+from ._single_commands import BLOCK, SLIP, MotionOfCommands, places_of, values_at
 from ._tempering import sample_posterior
 from .infrared._mixture import MixtureReadings
 from .infrared._pulses import PulseReadings
@@ -95,7 +95,7 @@ def own_places(robot: RobotModel, parameters: Sequence[Parameter]) -> Floats:
     }
     own |= {p.name: numbers[p.expand[0].number] for p in parameters if p.name.startswith("range.")}
     own |= numbers
-    return np.array([place_of(p, own[p.name]) if p.name in own else 0.5 for p in parameters])
+    return np.array([places_of(p, np.array(own[p.name])) if p.name in own else 0.5 for p in parameters])
 
 
 def sensors_of(

@@ -233,11 +233,11 @@ def values_at(parameters: Sequence[Parameter], places: Floats) -> dict[str, Floa
     }
 
 
-def place_of(parameter: Parameter, value: float) -> float:
-    """Return the position of a value between the limits, 0..1."""
+def places_of(parameter: Parameter, values: Floats) -> Floats:
+    """Return the positions of values (m,) between the limits, 0..1."""
     low = parameter.scale(parameter.prior.lowest)
     with np.errstate(divide="ignore"):
-        return float(np.clip((parameter.scale(value) - low) / parameter.width, 0.002, 0.998))
+        return np.clip((parameter.scale(values) - low) / parameter.width, 0.002, 0.998)
 
 
 def _weights(off: Floats) -> Floats:

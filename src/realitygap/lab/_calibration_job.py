@@ -17,6 +17,7 @@ class CalibrationJob(Job):
 
     Attributes:
         name: Of its files.
+        values: The order, without the file.
         kind: What is calibrated.
         platform: The platform that is measured.
         n_done, n_trials: Number of trials: recorded, and total.
@@ -24,10 +25,11 @@ class CalibrationJob(Job):
         made: Result of the fit; None before.
     """
 
-    STOPPED = "Stopped. Recorded trials are saved. Calibrate again under the same name to continue."
+    STOPPED = "Stopped. Recorded trials are saved. Resume to continue."
 
     def __init__(self, order: dict[str, Any], root: Path, changed: Callable[[], None]) -> None:
         self.name = Path(order["out"]).stem
+        self.values = {key: value for key, value in order.items() if key != "out"}
         self.kind = str(order["kind"])
         self.platform = str(order["platform"])
         self.n_done = self.n_trials = 0
@@ -38,13 +40,18 @@ class CalibrationJob(Job):
 
     @property
     def has_robot(self) -> bool:
-        """Whether a robot is in use."""
+        """True if a robot is in use."""
         return names_a_port(self.platform) and not self.is_over
 
     @property
-    def is_lost(self) -> bool:
-        """Whether a robot was measured, and the link to it has failed."""
-        return self.is_link_lost and bool(self.n_trials) and names_a_port(self.platform)
+    def has_met(self) -> bool:
+        """True if a robot has been measured."""
+        return bool(self.n_trials) and names_a_port(self.platform)
+
+    @property
+    def can_resume(self) -> bool:
+        """True if it has ended without a result."""
+        return self.is_over and self.made is None
 
     @property
     def progress(self) -> str:
@@ -64,6 +71,14 @@ class CalibrationJob(Job):
     def _on_made(self, message: dict[str, Any]) -> None:
         self.made = message
         self.outcome = f"Complete. Saved as {self.name}.toml. Use it as sim:{self.name}.toml."
+
+    def _on_error(self, message: dict[str, Any]) -> None:
+        super()._on_error(message)
+        if self.is_lost:
+            self.outcome = (
+                f"Link lost after {self.n_done} of {self.n_trials} trials. They are saved. Resume once the robot is "
+                f"back.\n{message['text']}"
+            )
 
     def _on_paused(self, message: dict[str, Any]) -> None:
         self.outcome = self.STOPPED

@@ -46,13 +46,13 @@ class GapJob(Job):
 
     @property
     def has_robot(self) -> bool:
-        """Whether a robot is in use."""
+        """True if a robot is in use."""
         return names_a_port(self.platform) and not self.is_over
 
     @property
-    def is_lost(self) -> bool:
-        """Whether a robot has driven, and the link to it has failed."""
-        return self.is_link_lost and bool(self.trials) and names_a_port(self.platform)
+    def has_met(self) -> bool:
+        """True if a robot has driven."""
+        return bool(self.trials) and names_a_port(self.platform)
 
     @property
     def progress(self) -> str:
@@ -79,9 +79,20 @@ class GapJob(Job):
             self.intervals = [*self.intervals, (message["trials"], estimate, low, high)]
         self.n_reports += 1
 
-    def _on_interrupted(self, message: dict[str, Any]) -> None:
+    @property
+    def _done_words(self) -> str:
         n_done = next(iter(self.trials.values()), 0)  # the target is the first that is told of
-        self.outcome = f"Stopped after {n_done:,} of {self.n_trials:,} trials on the target. They are saved."
+        return f"{n_done:,} of {self.n_trials:,} trials on the target. They are saved."
+
+    def _on_error(self, message: dict[str, Any]) -> None:
+        super()._on_error(message)
+        if self.is_lost:
+            self.outcome = (
+                f"Link lost after {self._done_words} Resume once the robot is back.\n{message['text']}"
+            )
+
+    def _on_interrupted(self, message: dict[str, Any]) -> None:
+        self.outcome = f"Stopped after {self._done_words}"
 
     def _on_done(self, message: dict[str, Any]) -> None:
         self.outcome, self.is_complete = "Complete.", True

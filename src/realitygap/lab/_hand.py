@@ -65,9 +65,14 @@ class Hand(Job):
         super().__init__({"work": "robot", **order}, root, changed)
 
     @property
+    def has_met(self) -> bool:
+        """True if the robot has answered."""
+        return self.senses is not None
+
+    @property
     def is_lost(self) -> bool:
-        """Whether it was connected, and its link has failed."""
-        return self.is_failed and self.senses is not None
+        """True if it was connected, and its link has failed."""
+        return self.is_failed and self.has_met
 
     @property
     def age_s(self) -> float:
@@ -76,7 +81,7 @@ class Hand(Job):
 
     @property
     def is_silent(self) -> bool:
-        """Whether the robot is connected, but has not answered for a while."""
+        """True if the robot is connected, but has not answered for a while."""
         return not self.is_over and self.age_s > SILENT_S
 
     @property

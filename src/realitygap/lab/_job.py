@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import threading
-import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, ClassVar
@@ -26,7 +25,6 @@ class Job:
         outcome: What it ended with: a message; None while it goes on.
         is_failed: Whether that was a failure.
         is_link_lost: Whether it failed because the robot did not answer or did not obey.
-        began_s: Time of its begin, on the monotonic clock [s].
 
     Args:
         order: What the process is told first.
@@ -44,20 +42,24 @@ class Job:
         self.ask: dict[str, Any] | None = None
         self.outcome: str | None = None
         self.is_failed = self.is_link_lost = False
-        self.began_s = time.monotonic()
         self._asking = threading.Lock()
         self._changed = changed
         self._child = Child(order, root, self._hear)
 
     @property
     def is_over(self) -> bool:
-        """Whether it has ended."""
+        """True if it has ended."""
         return self.outcome is not None
 
     @property
+    def has_met(self) -> bool:
+        """True if a robot has answered."""
+        return False
+
+    @property
     def is_lost(self) -> bool:
-        """Whether it had a robot, and the link to it has failed."""
-        return self.is_link_lost
+        """True if it had a robot, and the link to it has failed."""
+        return self.is_link_lost and self.has_met
 
     def answer(self, number: int, **values: Any) -> bool:
         """Answer the question of this number; False where it is not asked any more.

@@ -74,7 +74,10 @@ class RobotRequest:
     state: Literal["asked", "kept", "unanswered"] = "asked"
 
 
-def _port_of(job: Hand | StudyJob | GapJob | CalibrationJob) -> str:
+_RobotUser = Hand | StudyJob | GapJob | CalibrationJob
+
+
+def _port_of(job: _RobotUser) -> str:
     """Return the port of the robot that something uses or used; empty if it needs none."""
     if isinstance(job, Hand | StudyJob):
         return job.port
@@ -123,6 +126,8 @@ class Lab:
         self.lives: dict[str, LiveJob] = {}
         self._lock = threading.RLock()
         self._stopped_s = -STOPPED_S
+        self._last_user: _RobotUser | None = None
+        self._lost_before = ""
 
     def changed(self) -> None:
         """Something has changed; may be called from any thread."""
@@ -257,6 +262,7 @@ class Lab:
             self.changed()
 
         job = self.jobs[name] = StudyJob(name, order, self.root, change)
+        self._note_user(job)
         self.changed()
         return job
 
@@ -311,6 +317,7 @@ class Lab:
             page.parent.mkdir(exist_ok=True)
             order = {"measure": values, "page": str(page), "kept": str(kept)}
             self.gap = GapJob(name, order, self.root, self.changed)
+            self._note_user(self.gap)
         self.changed()
 
     def gap_page(self, name: str) -> Path | None:
@@ -357,6 +364,7 @@ class Lab:
                 self.operator, self.request = visitor, None
             order = {**values, "out": str(out)}
             self.calibration = CalibrationJob(order, self.root, self.changed)
+            self._note_user(self.calibration)
         self.changed()
 
     # the robot
@@ -368,7 +376,7 @@ class Lab:
 
     @property
     def has_robot(self) -> bool:
-        """Whether something here has a robot."""
+        """True if something here has a robot."""
         others = (each for each in (self.gap, self.calibration) if each is not None)
         is_measured = any(each.has_robot for each in others)
         return is_measured or self.robot_job is not None or (self.hand is not None and not self.hand.is_over)
@@ -386,6 +394,7 @@ class Lab:
         with self._lock:
             self.refuse_second_robot()
             self.hand = self._hands[port] = Hand({"port": port, "witness": witness}, self.root, self.changed)
+            self._note_user(self.hand)
             self.operator, self.request = visitor, None
         self.changed()
 
@@ -468,7 +477,7 @@ class Lab:
         self.changed()
 
     def may_operate(self, visitor: Visitor) -> bool:
-        """Whether this visitor has the robot, or nobody has."""
+        """Return True if this visitor has the robot, or nobody has."""
         return not self.has_robot or self.operator is None or self.operator.key == visitor.key
 
     @property
@@ -501,12 +510,23 @@ class Lab:
 
     @property
     def lost_port(self) -> str:
-        """Port of the last robot if the link to it failed, and no robot has been connected since; empty otherwise."""
-        single = (self.hand, self.gap, self.calibration)
-        users = [*self.jobs.values(), *(each for each in single if each is not None)]
-        users = [each for each in users if _port_of(each)]
-        last = max(users, key=lambda each: each.began_s, default=None)
-        return _port_of(last) if last is not None and last.is_lost else ""
+        """Port of the last robot if the link to it failed, and no robot has answered since; empty otherwise."""
+        last = self._last_user
+        if last is None or not last.has_met:
+            return self._lost_before
+        return _port_of(last) if last.is_lost else ""
+
+    def _note_user(self, job: _RobotUser) -> None:
+        """Remember what uses the robot, and whether the link to the robot before it is lost."""
+        if _port_of(job):
+            self._lost_before, self._last_user = self.lost_port, job
+
+    @property
+    def is_robot_silent(self) -> bool:
+        """True if the robot in use has not answered for a while."""
+        if self.robot_job is not None:
+            return self.robot_job.silent_s > 0
+        return self.hand is not None and self.hand.is_silent
 
     @property
     def robot_action(self) -> str:
@@ -524,12 +544,12 @@ class Lab:
 
     @property
     def robot_moves(self) -> bool:
-        """Whether the robot is driving, as far as its process has reported."""
+        """True if the robot is driving, as far as its process has reported."""
         return bool(self.robot_action)
 
     @property
     def is_just_stopped(self) -> bool:
-        """Whether a visitor stopped the robot in the last seconds, and it has not been driven since."""
+        """True if a visitor stopped the robot in the last seconds, and it has not been driven since."""
         return time.monotonic() - self._stopped_s < STOPPED_S and not self.robot_moves
 
     def stop_robot(self) -> bool:

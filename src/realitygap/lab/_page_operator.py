@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import threading
 import time
 from collections.abc import Iterable, Sequence
@@ -9,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from realitygap.emulator import Witness
+from realitygap.errors import RobotError
 from realitygap.records import LEDGER_NAME, Ledger, Score, TrialRecord
 from realitygap.robots import Command, Observation, Robot
 from realitygap.study import CameraObserver
@@ -57,8 +59,11 @@ class _Live:
         self._ended.set()
 
     def _look(self, witness: Witness, ended: threading.Event) -> None:
-        while not ended.wait(LIVE_S):
-            self._channel.say("pose", pose=list(witness.pose()))
+        with contextlib.suppress(
+            RobotError
+        ):  # the trial ends with the emulator, and the loop that drives reports it
+            while not ended.wait(LIVE_S):
+                self._channel.say("pose", pose=list(witness.pose()))
 
 
 class _Shown:
@@ -82,7 +87,7 @@ class _Shown:
         self._channel.say("driving", card=card_values(card))
 
     def step(self, card: Card, step: int, seen: Observation, command: Command) -> bool:
-        """A step begins; whether a person pressed stop."""
+        """Report a step that begins; return True if a person pressed stop."""
         self._channel.say(
             "step",
             step=step,
@@ -126,7 +131,7 @@ class WatchedOperator(Operator):
         self._page.met(robot)
 
     def accept(self, preflight: Preflight) -> bool:
-        """Whether nothing was found; the page shows what."""
+        """Return True if the check found no problem; the page shows the problems."""
         self._channel.say("preflight", facts=preflight.facts, problems=list(preflight.problems))
         return super().accept(preflight)
 
@@ -143,7 +148,7 @@ class WatchedOperator(Operator):
         self._page.begun(card, self._witness)
 
     def watch(self, card: Card, step: int, seen: Observation, command: Command) -> bool:
-        """Tell of the step, and whether it was stopped."""
+        """Report the step; return True if the trial was stopped."""
         super().watch(card, step, seen, command)
         self._is_stopped = self._page.step(card, step, seen, command)
         if self._is_stopped:
@@ -219,7 +224,7 @@ class PageOperator(Operator):
         self._page.begun(card, self._witness)
 
     def watch(self, card: Card, step: int, seen: Observation, command: Command) -> bool:
-        """Tell of the step; whether a person pressed stop."""
+        """Report the step; return True if a person pressed stop."""
         super().watch(card, step, seen, command)
         return self._page.step(card, step, seen, command)
 

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 from ._job import MOST_POINTS, Job
+
+SILENT_S = 3.0
+"""Time without a step of a trial from which the robot counts as silent [s]. A step lasts half a second."""
+OPTIONS = ("port", "witness", "camera", "counts", "when")
+"""Keys of an order that state how a robot is connected."""
 
 
 class StudyJob(Job):
@@ -15,6 +21,7 @@ class StudyJob(Job):
     Attributes:
         name: Of the study.
         port: Of the robot that drives it; empty where none does.
+        options: How the robot is connected, by `OPTIONS`.
         progress: How far its simulated runs are; None before the first word.
         card: Of the trial that is being driven; None while none is.
         step: Its last step.
@@ -37,7 +44,7 @@ class StudyJob(Job):
     def __init__(self, name: str, order: Mapping[str, Any], root: Path, changed: Callable[[], None]) -> None:
         self.name = name
         self.port = str(order.get("port") or "")
-        self.counts = str(order.get("counts") or "page")
+        self.options = {key: str(order.get(key) or "") for key in OPTIONS}
         self.progress: dict[str, Any] | None = None
         self.card: dict[str, Any] | None = None
         self.step: dict[str, Any] | None = None
@@ -47,13 +54,20 @@ class StudyJob(Job):
         self.preflight: dict[str, Any] | None = None
         self.said = ""
         self.n_live = 0
+        self._stepped_s = 0.0
         self._ending: tuple[str, bool] | None = None
         super().__init__(order, root, changed)
 
     @property
-    def is_lost(self) -> bool:
-        """Whether a robot was connected, and the link to it has failed."""
-        return self.is_link_lost and bool(self.label)
+    def has_met(self) -> bool:
+        """True if a robot has answered."""
+        return bool(self.label)
+
+    @property
+    def silent_s(self) -> float:
+        """Time since the last step of the trial that is being driven [s]; 0 while its steps come."""
+        age = 0.0 if self.card is None or self.is_over else time.monotonic() - self._stepped_s
+        return age if age > SILENT_S else 0.0
 
     def stop_robot(self) -> None:
         """Stop the motors, and with them the trial."""
@@ -73,10 +87,11 @@ class StudyJob(Job):
         self.preflight = message
 
     def _on_driving(self, message: dict[str, Any]) -> None:
+        self._stepped_s = time.monotonic()
         self.card, self.step, self.line = message["card"], None, []
 
     def _on_step(self, message: dict[str, Any]) -> None:
-        self.step = message
+        self.step, self._stepped_s = message, time.monotonic()
         self.n_live += 1
 
     def _on_pose(self, message: dict[str, Any]) -> None:

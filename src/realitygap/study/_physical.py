@@ -336,9 +336,9 @@ class PhysicalStudy:
         self._ledger.interrupt(trial.trial, driven)
         if driven.end == EndReason.LOST:
             raise RobotError(
-                f"Trial {trial.trial}, step {len(driven.commands)} of {condition.on.steps}: {driven.problem} "
-                "Nothing that was scored is lost. Put the robot right, then run the same command again: it asks what "
-                "becomes of this trial."
+                f"Link lost in trial {trial.trial} at step {len(driven.commands)} of {condition.on.steps}: "
+                f"{driven.problem} The trial is saved as interrupted. Fix the robot, then connect it again to resume: "
+                "you then decide whether the trial counts."
             )
 
     def _condition(self, trial: Trial) -> Condition:

@@ -19,7 +19,7 @@ from ._fields import Form
 from ._frame import framed, hint, section, text_of, visitor_of
 from ._grid import CellGrid
 from ._handover import show_holder
-from ._notices import notify
+from ._notices import attempt, notify
 from ._part import Part, watching
 from ._steps import show_steps
 
@@ -77,6 +77,11 @@ class _Page:
         )
         self._steps = Part(self._step, lambda step: show_steps(_STEPS, step))
         self._steps.show()
+        self._unfinished = Part(
+            self._unfinished_state, self._show_unfinished
+        )  # above the form, which fills a screen
+        with ui.column().classes("lab-cards"):
+            self._unfinished.show()
         self._form_box = ui.element("div").classes("lab-form")
         with self._form_box:
             self._show_form()
@@ -135,7 +140,8 @@ class _Page:
         self._fold_form()
         self._steps.look()
         self._asked.look()
-        self._work.look()
+        for part in (self._unfinished, self._work):
+            part.look()
         before, now, job = self._seen, self._stand(), self._lab.calibration
         if now == before or job is None:
             return
@@ -259,11 +265,22 @@ class _Page:
             self._lab.operator,
         )
 
+    def _unfinished_state(self) -> tuple[Any, ...] | None:
+        job = self._lab.calibration
+        return self._work_state() if job is not None and job.can_resume else None
+
+    def _show_unfinished(self, state: tuple[Any, ...] | None) -> None:
+        if state is not None and self._lab.calibration is not None:
+            self._show_progress(self._lab.calibration)
+
     def _show_work(self, state: tuple[Any, ...] | None) -> None:
         job = self._lab.calibration
         if job is None or state is None:
             ui.label("No calibrations yet.")
-            return
+        elif not job.can_resume:
+            self._show_progress(job)
+
+    def _show_progress(self, job: CalibrationJob) -> None:
         section(f"{job.name}: {job.kind}")
         ui.label(job.progress).classes("lab-problem lab-lines" if job.is_failed else "").props(
             'role="status"'
@@ -275,6 +292,11 @@ class _Page:
             show_holder(self._lab, self._visitor)
         if not job.is_over:
             ui.button("Stop calibration", on_click=job.ask_to_end).props("outline no-caps").set_enabled(may)
+        elif job.can_resume:
+            ui.button("Resume", on_click=lambda: attempt(lambda: self._resume(job))).props("outline no-caps")
+
+    def _resume(self, job: CalibrationJob) -> None:
+        self._lab.calibrate(job.name, job.values, self._visitor)
 
     def _show_plot(self) -> None:
         """Show the mean reading of each sensor by distance from the wall, or by trial."""

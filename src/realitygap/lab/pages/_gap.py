@@ -54,6 +54,11 @@ class _Work:
     is_failed: bool
     share: float
 
+    @property
+    def can_resume(self) -> bool:
+        """True if it has ended before all trials were done."""
+        return self.is_over and not self.job.is_complete
+
 
 class _Page:
     def __init__(self, lab: Lab, visitor: Visitor, reports: list[str], sim: str) -> None:
@@ -64,6 +69,9 @@ class _Page:
             "Runs the same controllers on a simulator and on a target, and measures how much the two differ. "
             "The trials of the target are saved: measure again under the same name to continue."
         )
+        unfinished = Part(self._unfinished, self._show_unfinished)  # above the form, which fills a screen
+        with ui.column().classes("lab-cards"):
+            unfinished.show()
         with ui.element("div").classes("lab-form") as self._form_box:
             self._show_form()
         parts: list[Part[Any]] = [
@@ -74,6 +82,7 @@ class _Page:
         for part in parts:
             with ui.column().classes("lab-cards"):
                 part.show()
+        parts.append(unfinished)
         if self._reports:
             section("Saved reports")
         for name in self._reports:
@@ -189,11 +198,22 @@ class _Page:
         share = sum(job.trials.values()) / max(2 * job.n_trials, 1)
         return _Work(job, job.progress, job.is_over, job.is_failed, share)
 
+    def _unfinished(self) -> _Work | None:
+        work = self._work()
+        return work if work is not None and work.can_resume else None
+
+    def _show_unfinished(self, work: _Work | None) -> None:
+        if work is not None:
+            self._show_progress(work)
+
     def _show_work(self, work: _Work | None) -> None:
         if work is None:
             if not self._reports:
                 ui.label("No gaps measured yet.")
-            return
+        elif not work.can_resume:
+            self._show_progress(work)
+
+    def _show_progress(self, work: _Work) -> None:
         job = work.job
         with ui.row().classes("lab-row"):
             ui.label(f"Gap {job.name}").classes("lab-section")
@@ -202,7 +222,7 @@ class _Page:
             )
             if not work.is_over:
                 ui.button("Stop", on_click=job.ask_to_end).props("outline no-caps")
-            elif not job.is_complete:
+            elif work.can_resume:
                 ui.button("Resume", on_click=lambda: attempt(lambda: self._resume(job))).props(
                     "outline no-caps"
                 )

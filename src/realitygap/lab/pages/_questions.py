@@ -79,7 +79,7 @@ def _accept(asked: _Asked) -> None:
 
 def _settle(asked: _Asked) -> None:
     _title(asked.card)
-    ui.label(f"The trial was interrupted: {asked.ask['problem']}.").classes("lab-problem")
+    ui.label(_interrupted(asked.ask["problem"])).classes("lab-problem")
     step = asked.job.step
     if step is not None:
         ui.label(f"Last recorded step: {step['step'] + 1} of {step['n_steps']}.")
@@ -89,9 +89,14 @@ def _settle(asked: _Asked) -> None:
         asked.button("Count as driven", verdict="driven", is_main=False)
 
 
+def _interrupted(problem: str) -> str:
+    """Return why a trial was interrupted, as a sentence; a problem may be one already."""
+    return f"The trial was interrupted: {problem}" + ("" if problem.endswith((".", "?")) else ".")
+
+
 def _go_on(asked: _Asked) -> None:
     _title(asked.card)
-    ui.label(f"The trial was interrupted: {asked.ask['problem']}. It will be repeated.")
+    ui.label(f"{_interrupted(asked.ask['problem'])} It will be repeated.")
     asked.button("Continue")
 
 

@@ -69,7 +69,7 @@ class Stop:
             text = f"{_name_of(lost)}: link lost. If it moves, switch it off." if lost else ""
             return _State(text, "lost" if lost else "", lab.is_just_stopped)
         other = "" if lab.may_operate(self._visitor) else f"{lab.operator_name} is operating · "
-        is_silent = lab.hand is not None and lab.hand.is_silent
+        is_silent = lab.is_robot_silent
         silent = " · no readings" if is_silent else ""
         return _State(other + _name_of(port) + silent, "silent" if is_silent else "", lab.is_just_stopped)
 

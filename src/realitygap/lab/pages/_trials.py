@@ -354,6 +354,7 @@ class _Page:
         found = self._can_begin.ports
         last = self._lab.jobs.get(self._name)
         is_lost = last is not None and last.is_failed and bool(last.port)
+        before = {} if last is None or not last.port else last.options
         likely = [guess.port for guess in found if guess.seems != "a serial port"]
         self._form = form = Form()
         form.summary()
@@ -372,7 +373,7 @@ class _Page:
             port = form.text(
                 "port",
                 "Port",
-                last.port if last is not None and is_lost else likely[0] if likely else self._emulated,
+                before.get("port") or (likely[0] if likely else self._emulated),
                 options=[*(guess.port for guess in found), self._emulated],
                 is_needed=True,
                 explanation="For example /dev/rfcomm0 or COM3. Place the robot on free floor first.",
@@ -384,15 +385,19 @@ class _Page:
                 )
                 ui.button("Use an emulated robot", on_click=emulate).props("outline no-caps")
             with ui.expansion("Advanced").classes("lab-expansion"):
-                form.choice("counts", "Scored by", _SCORERS, "page")
-                form.choice("when", "When to score", _WHEN, "sheet")
+                form.choice("counts", "Scored by", _SCORERS, before.get("counts") or "page")
+                form.choice("when", "When to score", _WHEN, before.get("when") or "sheet")
                 form.text(
                     "witness",
                     "Witness",
+                    before.get("witness", ""),
                     explanation="HOST:PORT of the witness of an emulator in another program.",
                 )
                 form.text(
-                    "camera", "Camera", explanation="Number and options of an overhead camera: 0?tag=10."
+                    "camera",
+                    "Camera",
+                    before.get("camera", ""),
+                    explanation="Number and options of an overhead camera: 0?tag=10.",
                 )
 
     def _beginning(self) -> _Beginning | None:

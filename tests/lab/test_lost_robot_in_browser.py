@@ -1,0 +1,118 @@
+"""A robot whose link is lost while a gap or a calibration runs: the emulator is killed, and started again."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+
+import pytest
+
+from realitygap.records import read_observations
+from realitygap.trials import those_that_count
+
+from .conftest import open_advanced
+from .test_calibrate_in_browser import begin as calibrate
+
+pytestmark = pytest.mark.slow
+
+
+class Killable:
+    """An emulated robot in its own process, which can be killed and started again at the same addresses."""
+
+    def __init__(self) -> None:
+        self.port = self.witness = ""
+        self._process: subprocess.Popen[str] | None = None
+
+    def start(self, speed: float) -> None:
+        tcp, witness = (address.rpartition(":")[2] or "0" for address in (self.port, self.witness))
+        options = ["--tcp", tcp, "--witness", witness, "--speed", str(speed), "--quiet"]
+        command = [sys.executable, "-m", "realitygap", "emulate", "scribbler", *options]
+        self._process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+        assert self._process.stdout is not None
+        self.port, self.witness = (self._process.stdout.readline().split()[-1] for _ in range(2))
+
+    def kill(self) -> None:
+        assert self._process is not None
+        self._process.kill()
+        with self._process:
+            pass
+
+
+@pytest.fixture
+def robot() -> Iterator[Killable]:
+    robot = Killable()
+    yield robot
+    robot.kill()
+
+
+def readings_of(trials) -> list[list[list[float]]]:
+    return [trial.readings.tolist() for trial in trials]
+
+
+def is_lost(page, robot) -> None:
+    chip = f"Robot on {robot.port}: link lost. If it moves, switch it off."
+    page.locator(".lab-robot-lost .lab-chip", has_text=chip).wait_for()
+
+
+def test_robot_lost_in_a_gap_keeps_its_trials_and_the_gap_resumes(lab, visit, robot):
+    robot.start(speed=20)
+    page = visit("gap")
+    page.get_by_label("Target").fill(f"scribbler:{robot.port}")
+    for label in ("Controllers", "Trials per controller"):
+        page.get_by_label(label, exact=True).fill("2")
+    open_advanced(page, page.get_by_label("Witness"))
+    page.get_by_label("Witness").fill(robot.witness)
+    page.get_by_role("button", name="Measure the gap").click()
+    page.get_by_text(re.compile(r"[1-3] of 4 trials")).first.wait_for()
+    robot.kill()
+    problem = page.locator(".lab-problem", has_text="trials on the target. They are saved. Resume once")
+    problem.wait_for()
+    n_done = int(re.match(r"Link lost after (\d) of 4", problem.inner_text())[1])
+    is_lost(page, robot)
+    resume = page.get_by_role("button", name="Resume")
+    assert resume.bounding_box()["y"] < page.get_by_label("Simulator").bounding_box()["y"]
+    kept = lab.root / "gaps" / "gap.jsonl"
+    before = those_that_count(read_observations(kept).trials)
+    assert len(before) == n_done
+    resume.click()
+    page.locator(".lab-problem", has_text="No witness at").wait_for()
+    is_lost(page, robot)  # nothing has reached it since: it may still move
+    robot.start(speed=60)
+    resume.click()
+    page.get_by_text("Complete.", exact=True).wait_for()
+    after = those_that_count(read_observations(kept).trials)
+    assert len(after) == 4
+    assert readings_of(after[:n_done]) == readings_of(before)
+    assert not page.locator(".lab-robot-lost").is_visible()
+
+
+def test_robot_lost_in_a_calibration_keeps_its_trials_and_the_calibration_resumes(lab, visit, robot):
+    robot.start(speed=10)
+    page = visit("calibrate")
+    page.get_by_role("button", name="Next", exact=True).click()
+    open_advanced(page, page.get_by_label("Witness"))
+    page.get_by_label("Witness").fill(robot.witness)
+    page.get_by_role("button", name="Back").click()
+    calibrate(page, "sensors", Robot=f"scribbler:{robot.port}")
+    page.get_by_text(re.compile(r"^Trial [2-9] of 18")).wait_for()
+    robot.kill()
+    problem = page.locator(
+        ".lab-problem", has_text=re.compile(r"Link lost after \d+ of 18 trials\. They are")
+    )
+    problem.wait_for()
+    n_done = int(re.search(r"after (\d+) of", problem.inner_text())[1])
+    is_lost(page, robot)
+    page.reload()
+    resume = page.get_by_role("button", name="Resume")
+    resume.wait_for()
+    kept = lab.root / "my-robot.trials.jsonl"
+    before = those_that_count(read_observations(kept).trials)
+    assert len(before) == n_done
+    robot.start(speed=100)
+    resume.click()
+    page.get_by_text("Complete. Saved as my-robot.toml.").wait_for()
+    after = those_that_count(read_observations(kept).trials)
+    assert len(after) == 18
+    assert readings_of(after[:n_done]) == readings_of(before)

@@ -83,10 +83,10 @@ def visited(page) -> int:
 def test_the_slider_goes_through_the_trial(show):
     trial = straight(10)
     page = show(play(trial))
-    assert clock(page) == "step 0 of 10 · 0.0 s · coverage .014"
+    assert clock(page) == "step 0 of 10 · 0.0\u00a0s · coverage .014"
     assert visited(page) == 1
     scrub(page, 7)
-    assert clock(page).startswith("step 7 of 10 · 0.7 s · coverage ")
+    assert clock(page).startswith("step 7 of 10 · 0.7\u00a0s · coverage ")
     assert visited(page) == trial.at(0.7).n_cells
     x = float(page.locator(".rg-robot").get_attribute("transform").split("(")[1].split(" ")[0])
     left, _, _, _ = page.evaluate("() => window.model.get('scene').extent")
@@ -103,13 +103,13 @@ def test_it_plays_as_fast_as_asked_and_stops_at_the_end(show):
     page.select_option("select", "8")
     page.click("button[aria-label=Play]")
     page.wait_for_selector("button[aria-label=Play]", timeout=3000)
-    assert clock(page).startswith("step 10 of 10 · 1.0 s")
+    assert clock(page).startswith("step 10 of 10 · 1.0\u00a0s")
     assert page.evaluate("() => window.model.get('speed')") == 8
     page.select_option("select", "0.25")
     page.click("button[aria-label=Play]")
     page.wait_for_timeout(300)
     page.click("button[aria-label=Pause]")
-    shown = float(clock(page).split(" · ")[1].removesuffix(" s"))
+    shown = float(clock(page).split(" · ")[1].removesuffix("\u00a0s"))
     assert 0.0 < shown < 0.6, "it begins anew at its end, and a quarter as fast"
     assert page.text_content("[role=status]") == clock(page)
 
@@ -182,7 +182,7 @@ def test_several_trials_have_a_pen_each_and_letters_that_do_not_hide_each_other(
     assert len(places) == 4
     scrub(page, 10)
     assert "× " in page.locator(".rg-name").all_text_contents()[3], "blocked in its last step"
-    assert clock(page) == "step 4 of 4 · 1.0 s", "it lasts as long as the longest"
+    assert clock(page) == "step 4 of 4 · 1.0\u00a0s", "it lasts as long as the longest"
 
 
 @pytest.mark.slow
@@ -224,7 +224,7 @@ def test_a_robot_that_runs_is_followed_and_can_be_played_afterwards(show):
     page.evaluate(
         "message => window.tell(message)", {**now, "pose": [0.2, 0.2, 0.0], "step": 1, "cells": [13]}
     )
-    assert clock(page) == "step 1 · 0.1 s · coverage .014"
+    assert clock(page) == "step 1 · 0.1\u00a0s · coverage .014"
     page.evaluate(
         "message => window.tell(message)",
         {
@@ -238,7 +238,7 @@ def test_a_robot_that_runs_is_followed_and_can_be_played_afterwards(show):
         },
     )
     page.wait_for_timeout(250)
-    assert clock(page) == "step 2 · 0.2 s · coverage .042"
+    assert clock(page) == "step 2 · 0.2\u00a0s · coverage .042"
     x = float(page.locator(".rg-robot").get_attribute("transform").split("(")[1].split(" ")[0])
     left, _, _, _ = page.evaluate("() => window.model.get('scene').extent")
     assert x == pytest.approx(1000 * (0.4 - left), abs=0.2)

@@ -3,9 +3,11 @@ from __future__ import annotations
 import re
 import socket
 from html.parser import HTMLParser
+from pathlib import Path
 
 import pytest
 
+import realitygap
 from realitygap.errors import RecordError
 from realitygap.records import ResultsFolder
 from realitygap.report import summarize, write_report
@@ -314,6 +316,13 @@ def test_no_line_ends_between_a_number_and_its_unit(tiny_page):
     bare = re.sub(r"<(script|style|svg|pre|code)\b.*?</\1>|<[^>]*>", "|", html, flags=re.DOTALL)
     assert "95\u00a0%" in bare
     assert not re.findall(r"\d (?:%|m|s|in)(?!\w)", bare)
+
+
+def test_scripts_join_a_number_and_its_unit():
+    for path in Path(realitygap.__file__).parent.rglob("*.js"):
+        code = re.sub(r"(?:^|\s)//.*", "", path.read_text("utf-8"))
+        found = re.findall(r".*[\d}] (?:%|m?s|min|h|[cmk]?m|m?V|Hz|°|[kM]B|px)(?!\w).*", code)
+        assert found == [], path.name
 
 
 def test_script_that_shows_values_has_at_most_2_kb(tiny_page):

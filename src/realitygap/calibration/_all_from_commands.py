@@ -85,7 +85,7 @@ class _Seen:
 
     @property
     def has_wheels(self) -> bool:
-        """Whether wheels are observed."""
+        """True if wheels are observed."""
         return bool(self.finest[-1] == np.float32(FINEST["wheels"]))
 
 

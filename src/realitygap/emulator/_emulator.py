@@ -274,14 +274,14 @@ class Emulator:
 
     @property
     def is_overloaded(self) -> bool:
-        """Whether too much current has stopped it."""
+        """True if too much current has stopped it."""
         return isinstance(self.table.motors, S2Motors) and self.table.motors.tripped
 
     # what an observer sees
 
     @property
     def fluke_ahead(self) -> bool:
-        """Whether the end with the Fluke is ahead."""
+        """True if the end with the Fluke is ahead."""
         return self.fluke is not None and self.memory.fluke_ahead
 
     @property

@@ -63,7 +63,7 @@ class S1Motors:
 
     @property
     def turning(self) -> bool:
-        """Whether a wheel is meant to turn."""
+        """True if a wheel is meant to turn."""
         return self._bytes != (100, 100)
 
     def speeds(self) -> tuple[float, float]:
@@ -164,7 +164,7 @@ class S2Motors:
 
     @property
     def turning(self) -> bool:
-        """Whether a wheel is meant to turn."""
+        """True if a wheel is meant to turn."""
         return self._step > 0
 
     @property

@@ -144,7 +144,7 @@ class Scribbler:
 
     @property
     def busy(self) -> bool:
-        """Whether a command is being executed."""
+        """True if a command is being executed."""
         return self._busy
 
     # receiving

@@ -67,7 +67,7 @@ class ServedWitness(Witness, Protocol):
 
     @property
     def waits(self) -> bool:
-        """Whether the emulator's time passes only when a program advances it."""
+        """True if the emulator's time passes only when a program advances it."""
         ...
 
     def release(self) -> None:
@@ -246,7 +246,7 @@ class RemoteWitness(ClosedOnExit):
 
     @property
     def waits(self) -> bool:
-        """Whether the emulator's time passes only when a program advances it."""
+        """True if the emulator's time passes only when a program advances it."""
         return bool(self._ask("waits"))
 
     def hold(self) -> float | None:

@@ -132,7 +132,7 @@ class Access:
             return False
 
     def _is_own(self, scope: Scope) -> bool:
-        """Whether the page that asks is one of the lab's; what is no browser names none."""
+        """Return True if the request is of a page of the lab, or of a program that is no browser and names no page."""
         origin = _header(scope, b"origin")
         return not origin or origin.partition("://")[2] == _header(scope, b"host")
 

@@ -49,7 +49,7 @@ class Child:
 
     @property
     def is_alive(self) -> bool:
-        """Whether the process is still running."""
+        """True if the process is still running."""
         return self._process.poll() is None
 
     @property

@@ -44,7 +44,7 @@ def checked(
 
 
 def is_of_page(frame: str | None) -> bool:
-    """Whether a frame is one of Engine.IO's own, or an event in the shape that the pages' library expects."""
+    """Return True if a frame is one of Engine.IO, or an event in the form that the pages' library expects."""
     if not isinstance(frame, str):
         return False
     if not frame.startswith("42"):

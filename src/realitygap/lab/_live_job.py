@@ -36,7 +36,7 @@ class LiveJob(Job):
 
     @property
     def is_live(self) -> bool:
-        """Whether it drives."""
+        """True if it drives."""
         return self.scene is not None and not self.is_over
 
     def since(self, n: int) -> list[dict[str, Any]]:

@@ -54,7 +54,7 @@ class Proposal:
 
     @property
     def is_usable(self) -> bool:
-        """Whether a count may begin with it by itself."""
+        """True if a count may start from it automatically."""
         return bool(self.cells) and not self.is_spoiled
 
     @property

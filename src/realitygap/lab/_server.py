@@ -195,7 +195,7 @@ def _prepare(root: Path, token: str, port: int, *, is_local: bool, allow_code: b
 
 
 def _is_news(record: logging.LogRecord) -> bool:
-    """Whether a remark of the server is one: that a page was closed while it was served is not."""
+    """Return True if a message of the server is of interest; a page that was closed while it was served is not."""
     return "ASGI callable returned without" not in record.getMessage()
 
 

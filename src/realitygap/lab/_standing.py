@@ -53,7 +53,7 @@ class Standing:
 
     @property
     def has_robot(self) -> bool:
-        """Whether a robot drives some of its conditions."""
+        """True if a robot drives some of its conditions."""
         return self.n_driven_runs > 0
 
     @property
@@ -63,7 +63,7 @@ class Standing:
 
     @property
     def can_resume(self) -> bool:
-        """Whether its simulated runs can be started or resumed."""
+        """True if its simulated runs can be started or resumed."""
         return self.word in ("Not started", "Paused", "Failed") and self.n_done < self.n_runs
 
     @property

@@ -67,12 +67,12 @@ class StudyState:
 
     @property
     def is_complete(self) -> bool:
-        """Whether nothing is missing."""
+        """True if all runs are there."""
         return not self.problem and (self.n_done, self.n_driven_done) == (self.n_runs, self.n_driven_runs)
 
     @property
     def has_robot(self) -> bool:
-        """Whether a robot drives some of its conditions."""
+        """True if a robot drives some of its conditions."""
         return self.n_driven_runs > 0
 
 

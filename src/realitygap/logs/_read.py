@@ -62,7 +62,7 @@ class Log:
 
     @property
     def has_heading(self) -> bool:
-        """Whether headings were measured."""
+        """True if headings were measured."""
         return bool(len(self.poses)) and bool(np.isfinite(self.poses[:, 2]).any())
 
 

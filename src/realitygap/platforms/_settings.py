@@ -111,7 +111,7 @@ class PlatformSettings(Settings):
 
     @property
     def is_single(self) -> bool:
-        """Whether trials are computed and recorded in 32 bits."""
+        """True if trials are computed and recorded in 32 bits."""
         return getattr(self, "precision", "double") == "single"
 
     @property
@@ -143,7 +143,7 @@ class PlatformSettings(Settings):
 
     @property
     def needs_person(self) -> bool:
-        """Whether a person has to place its robot."""
+        """True if a person has to place its robot."""
         return self.is_physical
 
     @property
@@ -158,7 +158,7 @@ class PlatformSettings(Settings):
 
     @property
     def is_randomized(self) -> bool:
-        """Whether its robots are drawn from a calibration."""
+        """True if its robots are drawn from a calibration."""
         return False
 
     def randomized(self, how: str) -> Self:

@@ -250,7 +250,7 @@ function render({ model, el }) {
   function drawWords(moments) {
     const step = Math.max(0, ...moments.map((moment) => moment.step)), nCells = tiles.length;
     const time = live ? live.time : Math.min(at, duration);
-    const parts = [live ? `step ${step}` : `step ${step} of ${nSteps}`, `${time.toFixed(1)} s`];
+    const parts = [live ? `step ${step}` : `step ${step} of ${nSteps}`, `${time.toFixed(1)}\u00a0s`];
     if (moments.length === 1 && nCells && trials[0].placed) parts.push(`coverage ${share(moments[0].nCells / nCells)}`);
     if (moments.length === 1 && moments[0].stalled) parts.unshift("× blocked");
     clock.textContent = parts.join(" · ");

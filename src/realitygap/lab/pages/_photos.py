@@ -116,7 +116,7 @@ class SheetPhotos:
 
     @property
     def has_photos(self) -> bool:
-        """Whether a sheet with trials to score has a photo."""
+        """True if a sheet with trials to score has a photo."""
         waiting = {each.trial.sheet for each in self._counts.trials() if each.trial.state == "driven"}
         return any(photo.sheet in waiting for photo in self._photos.photos())
 

@@ -115,7 +115,7 @@ class _Page:
             self._part.refresh()
 
     def _is_same_robot(self, before: Any, now: Any) -> bool:
-        """Whether only facts about the robot have changed: a drive pad that is held must stay on the page."""
+        """Return True if only facts about the robot have changed: a drive pad that is held must stay on the page."""
         old, new = before[0], now[0]
         return old is not None and new is not None and old[:3] == new[:3] and before[1:] == now[1:]
 
@@ -281,7 +281,7 @@ class _Page:
             ).classes("lab-picture")
 
     def _is_off(self, hand: Hand) -> bool:
-        """Whether the pad is off: the robot is lost, does not answer, or is another visitor's."""
+        """Return True if the pad is off: the robot is lost, does not answer, or is another visitor's."""
         return hand.is_over or hand.is_silent or not self._lab.may_operate(self._visitor)
 
     def _live(self) -> None:

@@ -41,7 +41,7 @@ class Videos:
 
     @property
     def has_job(self) -> bool:
-        """Whether a video is tracked, or was."""
+        """True if a video is tracked, or was."""
         return self._job() is not None
 
     def show(self) -> None:

@@ -62,7 +62,7 @@ export default {
     label(cell) {
       const place = `column ${(cell % this.columns) + 1}, row ${Math.floor(cell / this.columns) + 1}`;
       const state = this.marked.has(cell) ? "crossed" : "not crossed";
-      return `${place}, ${state}${this.doubtful(cell) ? `, ${Math.round(100 * this.sure[cell])} % sure` : ""}`;
+      return `${place}, ${state}${this.doubtful(cell) ? `, ${Math.round(100 * this.sure[cell])}\u00a0% sure` : ""}`;
     },
     doubtful(cell) { return this.sure && this.sure[cell] !== undefined && this.sure[cell] < 0.9; },
     at(event) {

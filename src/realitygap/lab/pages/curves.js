@@ -66,7 +66,7 @@ export default {
     digits() { return Math.max(0, -Math.floor(Math.log10(this.step) + 1e-9)); },
     at() { return this.curves[this.mark.k].points[this.mark.g]; },
     words() {
-      if (!this.mark) return this.chosen ? `${this.chosen}: the band is the 95 % interval of the median.` : "Point at a line to read its values.";
+      if (!this.mark) return this.chosen ? `${this.chosen}: the band is the 95\u00a0% interval of the median.` : "Point at a line to read its values.";
       const { n, median, low, high } = this.at, interval = low === null ? "" : ` [${low.toFixed(3)}, ${high.toFixed(3)}]`;
       return `${this.curves[this.mark.k].condition}, generation ${this.mark.g}: ${median.toFixed(3)}${interval}, n = ${n}`;
     },

@@ -448,13 +448,13 @@
         if (k === texts.length - 3) cells[k].className = text === "yes" ? "yes" : "";
       });
     }
-    byId("clock").textContent = `${seconds(step)} s of ${seconds(n)} s, step ${step} of ${n}`;
+    byId("clock").textContent = `${seconds(step)}\u00a0s of ${seconds(n)}\u00a0s, step ${step} of ${n}`;
     const scrub = byId("scrub");
     scrub.max = n;
     scrub.value = step;
     scrub.setAttribute("aria-valuetext", `${seconds(step)} seconds, step ${step} of ${n}`);
     byId("caption").textContent = used.length
-      ? `After ${seconds(step)} s: condition/run/generation/individual, pose, distance each sensor measures, what the network sees and answers, and coverage so far along the line and at the ends of steps.`
+      ? `After ${seconds(step)}\u00a0s: condition/run/generation/individual, pose, distance each sensor measures, what the network sees and answers, and coverage so far along the line and at the ends of steps.`
       : "No trial is chosen. Choose one or more from the table of trials.";
     stage.cells(step);
   }
@@ -465,7 +465,7 @@
     const trials = used.map(({ trial, pen }) => {
       const k = Math.min(step, trial.n);
       const steps = data.measure === "ends" ? trial.endSteps : trial.steps;
-      return `${LETTERS[pen]}, ${nameOf(trial)}: x ${(trial.x[k] * LENGTH).toFixed(2)} m, y ${(trial.y[k] * LENGTH).toFixed(2)} m, coverage ${(reached(steps, k) / cellsOf(trial.condition)).toFixed(3)}${trial.stalled[k] ? ", blocked" : ""}`;
+      return `${LETTERS[pen]}, ${nameOf(trial)}: x ${(trial.x[k] * LENGTH).toFixed(2)}\u00a0m, y ${(trial.y[k] * LENGTH).toFixed(2)}\u00a0m, coverage ${(reached(steps, k) / cellsOf(trial.condition)).toFixed(3)}${trial.stalled[k] ? ", blocked" : ""}`;
     });
     return used.length ? `After ${seconds(step)} seconds. ${trials.join(". ")}.` : "The arena, with no trial chosen.";
   }
@@ -732,7 +732,7 @@
     const draw = () => {
       leadStage.draw(lead.at);
       leadStage.cells(lead.step());
-      byLead("clock").textContent = `${(lead.step() * trial.stepS).toFixed(trial.stepS < 0.1 ? 2 : 1)} s, step ${lead.step()} of ${trial.n}`;
+      byLead("clock").textContent = `${(lead.step() * trial.stepS).toFixed(trial.stepS < 0.1 ? 2 : 1)}\u00a0s, step ${lead.step()} of ${trial.n}`;
     };
     const lead = makeClock(() => trial.n, () => Math.max(1 / trial.stepS, trial.n / 8), draw, () => {
       byLead("icon").setAttribute("d", lead.playing ? PAUSE : PLAY);

@@ -82,17 +82,17 @@ class Gripper(Device):
 
     @property
     def is_open(self) -> bool:
-        """Whether the paddles rest at their maximum opening."""
+        """True if the paddles rest at their maximum opening."""
         return self._speed == 0.0 and self.opening == OPEN
 
     @property
     def is_closed(self) -> bool:
-        """Whether the paddles rest and touch each other."""
+        """True if the paddles rest and touch each other."""
         return self._speed == 0.0 and self.opening == 0.0
 
     @property
     def is_moving(self) -> bool:
-        """Whether the paddles move or are blocked on the way."""
+        """True if the paddles move or are blocked on the way."""
         return self._speed != 0.0
 
     @property

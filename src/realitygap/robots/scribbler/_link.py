@@ -256,7 +256,7 @@ class Link:
 
     @property
     def is_open(self) -> bool:
-        """Whether the link can be used."""
+        """True if the link can be used."""
         return self._is_open
 
     # one command

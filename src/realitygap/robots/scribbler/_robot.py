@@ -108,12 +108,12 @@ class Scribbler(Driving, Channels, SoundAndLight, Camera, Board, PortDriver):
 
     @property
     def has_encoders(self) -> bool:
-        """Whether the robot is an S2 or S3, which have wheel encoders."""
+        """True if the robot is an S2 or S3, which have wheel encoders."""
         return self.info.model == "s2"
 
     @property
     def is_turned(self) -> bool:
-        """Whether the end with the Fluke is ahead, so that wheel distances are reversed."""
+        """True if the end with the Fluke is ahead, so that wheel distances are reversed."""
         return self.info.fluke != "none" and self.forwardness == "fluke"
 
     def wheels(self) -> tuple[float, float]:

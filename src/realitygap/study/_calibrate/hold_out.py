@@ -64,7 +64,7 @@ class Compared:
 
     @property
     def is_better(self) -> bool:
-        """Whether the fit predicts better than the nominal numbers."""
+        """True if the fit predicts better than the nominal numbers."""
         return self.errors[FITTED] < self.errors[NOMINAL]
 
     @property

@@ -90,6 +90,10 @@ class RunningLab:
         """The most that its event loop was late since this was asked last [s]."""
         return float(self._get("lag"))
 
+    def list_port(self, name: str) -> None:
+        """Have its pages list this port only."""
+        self._get(f"list-port{name}")
+
     def slow_counts(self) -> None:
         """Have its pages change before whoever enters a count hears of it."""
         self._get("slow-counts")

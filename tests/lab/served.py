@@ -20,6 +20,8 @@ from nicegui import app, ui
 import realitygap.lab.pages  # noqa: F401
 from realitygap.lab import _child, open_lab
 from realitygap.lab._counts import Counts
+from realitygap.lab.pages import _robot
+from realitygap.robots.scribbler import PortGuess
 from tests.forks import fork_context
 
 from .forked_children import FOR_CHILDREN, Forking
@@ -52,6 +54,12 @@ async def lag() -> float:
 def broken() -> None:
     """A page with a mistake."""
     raise RuntimeError("a mistake for a test")
+
+
+@app.get("/list-port/{name:path}")
+async def list_port(name: str) -> None:
+    """From now on, this is the only port of the computer."""
+    _robot.list_ports = lambda: [PortGuess(f"/{name}", "a serial port", "")]
 
 
 @app.get("/slow-counts")

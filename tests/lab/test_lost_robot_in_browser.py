@@ -1,4 +1,4 @@
-"""A robot whose link is lost while a gap or a calibration runs: the emulator is killed, and started again."""
+"""A robot whose link is lost while a study, a gap, or a calibration runs: the emulator is killed, and started again."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ import pytest
 from realitygap.records import read_observations
 from realitygap.trials import those_that_count
 
-from .conftest import open_advanced
+from .conftest import open_advanced, open_fold
+from .robot_study import CONNECT, ledger_of, make_study
 from .test_calibrate_in_browser import begin as calibrate
 
 pytestmark = pytest.mark.slow
@@ -54,6 +55,45 @@ def readings_of(trials) -> list[list[list[float]]]:
 def is_lost(page, robot) -> None:
     chip = f"Robot on {robot.port}: link lost. If it moves, switch it off."
     page.locator(".lab-robot-lost .lab-chip", has_text=chip).wait_for()
+
+
+def test_robot_lost_in_a_trial_of_a_study_is_shown_and_the_study_resumes(lab, visit, robot):
+    make_study(lab.root, steps=40)
+    robot.start(speed=2)
+    page = visit("study/by-robot/trials")
+    page.get_by_label("Your name").fill("anna")
+    page.get_by_label("Port", exact=True).fill(robot.port)
+    open_advanced(page, page.get_by_label("Witness"))
+    page.get_by_label("Witness").fill(robot.witness)
+    page.get_by_role("button", name=CONNECT).click()
+    page.get_by_role("button", name="Start trial").click()
+    page.get_by_text(re.compile("^Step 3 of 40")).wait_for()
+    robot.kill()
+    page.get_by_text(re.compile(r"No answer for \d+\ss\. The link is being opened again")).wait_for()
+    page.locator(".lab-robot-silent .lab-chip", has_text="no readings").wait_for()
+    message = re.compile(r"Link lost in trial 1 at step \d+ of 40: .* The trial is saved as interrupted\.")
+    page.locator(".lab-problem", has_text=message).wait_for()
+    is_lost(page, robot)
+    with ledger_of(lab.root) as ledger:
+        assert [trial.state for trial in ledger.trials()] == ["interrupted", "planned"]
+    robot.start(speed=60)
+    page.get_by_role("button", name="Reconnect").click()
+    problem = page.locator(".lab-problem", has_text="The trial was interrupted")
+    problem.wait_for()
+    assert not problem.inner_text().endswith("?.")
+    page.get_by_role("button", name="Void and repeat").click()
+    page.get_by_text("placed at its start automatically").wait_for()  # the witness is known
+    page.get_by_role("button", name="Start trial").click()
+    for _ in range(600):
+        with ledger_of(lab.root) as ledger:
+            states = sorted(trial.state for trial in ledger.trials())
+        if "driven" in states:
+            break
+        page.wait_for_timeout(100)
+    assert states == ["driven", "planned", "void"]
+    open_fold(page, "Robot")
+    page.get_by_role("button", name="Disconnect").click()
+    page.get_by_role("button", name=CONNECT).wait_for()
 
 
 def test_robot_lost_in_a_gap_keeps_its_trials_and_the_gap_resumes(lab, visit, robot):

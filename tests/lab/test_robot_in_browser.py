@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import re
 
 import pytest
 
-from realitygap.emulator import Emulator, serve_tcp, why_not
+from realitygap.emulator import Emulator, serve_pty, serve_tcp, why_not
 
 from .conftest import NEW_PYTHONS, PHONE
 
@@ -163,6 +164,38 @@ def test_lost_link_disables_the_pad_and_keeps_the_last_readings_with_their_age(v
     page.get_by_text(re.compile(r"Last reading \d+\ss ago")).wait_for()
     page.locator('.lab-pad[aria-disabled="true"]').wait_for()
     page.locator(".lab-stale").wait_for()
+
+
+def test_robot_on_a_listed_port_is_identified_on_request_only(lab, visit, monkeypatch):
+    emulator, received = Emulator("s2", "2"), []
+    receive = emulator.receive
+    monkeypatch.setattr(emulator, "receive", lambda data: (received.append(data), receive(data)))
+    with serve_pty(emulator, speed=20) as server:
+        lab.list_port(server.name)
+        page = visit("robot")
+        identify = page.get_by_role("button", name=f"Identify the robot on {server.name}")
+        identify.wait_for()
+        page.wait_for_timeout(1000)
+        assert received == []
+        identify.click()
+        page.get_by_text(re.compile(r"answered \(EMULATED\): model s2, .*fluke 2")).wait_for()
+        page.get_by_role("button", name=f"Connect {server.name}").click()  # the port is free again
+        page.get_by_text(f"Connected to {server.name}").wait_for()
+
+
+def test_port_that_does_not_answer_is_identified_as_no_robot(lab, visit):
+    mine, other = os.openpty()  # a device that is silent
+    try:
+        lab.list_port(os.ttyname(other))
+        page = visit("robot", size=PHONE)
+        page.get_by_role("button", name="Identify the robot on").click()
+        page.get_by_text("Looking for a robot…").wait_for()
+        found = re.compile("No robot found. No Scribbler answers on .* Is the robot on, paired")
+        page.get_by_text(found).wait_for()
+        page.get_by_text("No robot connected.").wait_for()
+    finally:
+        os.close(mine)
+        os.close(other)
 
 
 def test_a_port_without_a_robot_is_told_in_words(visit):

@@ -92,6 +92,33 @@ def test_mistakes_in_the_form_are_shown_at_their_fields(lab, visit):
     assert list(lab.root.iterdir()) == []
 
 
+def test_texts_that_are_no_values_stay_in_their_fields(lab, visit):
+    page = visit("new")
+    runs, noise = page.get_by_label("Runs per condition"), page.get_by_label("Noise", exact=True)
+    runs.fill("many")
+    noise.nth(1).fill("loud")
+    page.get_by_role("button", name="Add condition").click()
+    noise.nth(2).wait_for()
+    assert (runs.input_value(), noise.nth(1).input_value()) == ("many", "loud")
+    page.get_by_role("button", name="Remove condition 1").click()
+    noise.nth(2).wait_for(state="detached")
+    assert [noise.nth(k).input_value() for k in range(2)] == ["loud", ""]
+    page.get_by_role("tab", name="File").click()
+    page.get_by_label("Study file").wait_for()
+    page.get_by_role("tab", name="Form").click()
+    runs.wait_for()
+    assert (runs.input_value(), noise.nth(0).input_value()) == ("many", "loud")
+    page.get_by_label("Name", exact=True).first.fill("")
+    page.get_by_role("button", name="Start study").click()
+    for text in ("Runs per condition: Enter a whole number.", "Noise: Enter a number. You entered 'loud'."):
+        page.get_by_role("alert").filter(has_text=text).wait_for()
+    runs.fill("4")
+    noise.nth(0).fill("0.1")
+    noise.nth(0).blur()
+    page.get_by_role("button", name="Start study").click()
+    page.get_by_role("alert").filter(has_text="Name: This field is empty. Enter a value.").wait_for()
+
+
 def test_addresses_without_a_page_lead_to_the_studies(lab, visit):
     folder = lab.root / "paper"
     folder.mkdir()

@@ -23,6 +23,7 @@ from ._drawer import Drawer
 from ._files import plain_files, refuse_camera, refuse_outside, refuse_platform, refuse_port
 from ._gap_job import GapJob
 from ._hand import Hand
+from ._identify_job import IdentifyJob
 from ._job import Job
 from ._live_job import LiveJob
 from ._photos import Photos
@@ -115,7 +116,7 @@ class Lab:
         self.operator: Visitor | None = None
         self.request: RobotRequest | None = None
         self.hand: Hand | None = None
-        self._hands: dict[str, Hand] = {}
+        self._asked: dict[str, Hand | IdentifyJob] = {}
         self.gap: GapJob | None = None
         self.calibration: CalibrationJob | None = None
         self.drawer = Drawer(root)
@@ -393,15 +394,36 @@ class Lab:
             refuse_port(self.root, port)
         with self._lock:
             self.refuse_second_robot()
-            self.hand = self._hands[port] = Hand({"port": port, "witness": witness}, self.root, self.changed)
+            if self._is_identifying(port):
+                raise StudyError(f"A robot is being looked for on {port}. Wait until the answer is shown.")
+            self.hand = self._asked[port] = Hand({"port": port, "witness": witness}, self.root, self.changed)
             self._note_user(self.hand)
             self.operator, self.request = visitor, None
         self.changed()
 
     def reply_on(self, port: str) -> str:
-        """Return what answered on a port when it was last connected; empty if it was not."""
-        hand = self._hands.get(port)
-        return "" if hand is None else hand.reply
+        """Return what answered on a port when it was last asked; empty if it was not."""
+        asked = self._asked.get(port)
+        return "" if asked is None else asked.reply
+
+    def identify(self, port: str) -> None:
+        """Ask the robot on a port for its name. This sends bytes to the device, whatever it is.
+
+        Raises:
+            StudyError: The port cannot be used, or something uses it.
+        """
+        refuse_port(self.root, port)
+        with self._lock:
+            if self._is_identifying(port):
+                return
+            if self.has_robot and self.robot_port == port:
+                raise StudyError(f"The robot on {port} is in use. Disconnect it first.")
+            self._asked[port] = IdentifyJob(port, self.root, self.changed)
+        self.changed()
+
+    def _is_identifying(self, port: str) -> bool:
+        asked = self._asked.get(port)
+        return isinstance(asked, IdentifyJob) and not asked.is_over
 
     def take_robot(self, visitor: Visitor) -> None:
         """Make the visitor who began to use a robot its operator."""
@@ -570,7 +592,14 @@ class Lab:
         """End all processes, robots first."""
         with self._lock:
             single = [each for each in (self.hand, self.gap, self.calibration) if each is not None]
-            working: list[Job] = [*self.jobs.values(), *self.videos.values(), *self.lives.values(), *single]
+            asked = [each for each in self._asked.values() if isinstance(each, IdentifyJob)]
+            working: list[Job] = [
+                *self.jobs.values(),
+                *self.videos.values(),
+                *self.lives.values(),
+                *single,
+                *asked,
+            ]
         going = [each for each in working if not each.is_over]
         for job in going:
             job.ask_to_end()

@@ -18,6 +18,7 @@ _WORK = {
     "check": "_check_work",
     "study": "_study_work",
     "robot": "_robot_work",
+    "identify": "_identify_work",
     "watch": "_watch_work",
     "gap": "_gap_work",
     "calibrate": "_calibrate_work",

@@ -108,6 +108,10 @@ class _Page:
         self._check: Check | None = None
         self._boxes: list[tuple[str, ui.element]] = []
         self._is_open = False
+        self._unread: dict[
+            str, str
+        ] = {}  # entered texts that are no values, by field: the draft cannot hold them
+        self._turned = ""
 
     def show(self) -> None:
         with ui.row().classes("lab-row"):
@@ -179,6 +183,8 @@ class _Page:
 
     async def _take(self, text: str) -> None:
         """Show the text of a file in the form; a text with mistakes is shown as it is."""
+        if text != self._turned.strip():
+            self._unread.clear()
         self._text.value = text
         found = await self._ask("read", text)
         if "data" not in found:
@@ -192,7 +198,7 @@ class _Page:
         """Turn between form and file, which show the same study."""
         self._is_text = event.value == "File"
         if self._is_text:
-            self._text.value = written_form(self._draft.data)
+            self._text.value = self._turned = written_form(self._draft.data)
         else:
             await self._take(text_of(self._text))
 
@@ -286,9 +292,9 @@ class _Page:
                 key, label, [*choices], shown if isinstance(shown, str) else None, explanation
             )
             chosen.props("clearable")
-            chosen.on_value_change(lambda event: _enter(field, event.value, put))
+            chosen.on_value_change(lambda event: self._enter(field, key, event.value, put))
             return
-        text = "" if value is None else _as_entered(field, value)
+        text = self._unread.get(key, "" if value is None else _as_entered(field, value))
         placeholder = field.default.strip('"') if field.kind == "text" else field.default
         written = self._form.text(
             key,
@@ -299,7 +305,18 @@ class _Page:
             parse=lambda text: _parsed(field, text),
         )
         written.props("debounce=300")
-        written.on_value_change(lambda event: _enter(field, event.value, put))
+        written.on_value_change(lambda event: self._enter(field, key, event.value, put))
+
+    def _enter(self, field: Field, key: str, text: Any, put: Any) -> None:
+        """Put what was entered into the draft; a text that is no value stays in the field, which is marked."""
+        self._unread.pop(key, None)
+        if not isinstance(text, str) or text == "":
+            put(None)
+            return
+        try:
+            put(entered(field, text))
+        except ValueError:
+            self._unread[key] = text
 
     def _add_condition(self) -> None:
         listed = self._draft.data["condition"]
@@ -308,6 +325,8 @@ class _Page:
 
     def _remove(self, number: int) -> None:
         del self._draft.data["condition"][number]
+        rest = {key: text for key, text in self._unread.items() if _of(key) != number + 1}
+        self._unread = {_moved_up(key, number + 1): text for key, text in rest.items()}
         self._form_part.refresh()
 
     # check and start
@@ -372,7 +391,7 @@ class _Page:
         try:
             await run.io_bound(self._lab.start_new, found["name"], found["text"])
         except WRONG as error:
-            self._form.show_problems({"study.name": str(error)})
+            self._form.show_problems({"" if self._is_text else "study.name": str(error)})
         else:
             ui.navigate.to(f"/study/{found['name']}")
 
@@ -383,6 +402,8 @@ def _problem_of(mistake: str) -> tuple[str, str]:
     if match is None:
         return mistake, mistake
     key, text = f"{match[1] or ''}{match[2]}", match[3]
+    if text.startswith("missing,"):
+        return key, "This field is empty. Enter a value."
     asked = re.fullmatch(r"expected (.*), (?:came|got) (.*)\.", text, re.DOTALL)
     return key, text if asked is None else f"Enter {asked[1]}. You entered {asked[2]}."
 
@@ -398,12 +419,13 @@ def _as_entered(field: Field, value: Any) -> str:
     return value if field.kind == "text" and isinstance(value, str) else toml_value(value)
 
 
-def _enter(field: Field, text: Any, put: Any) -> None:
-    """Put what was entered into the draft; a text that is no value stays in the field, which is marked."""
-    if not isinstance(text, str) or text == "":
-        put(None)
-        return
-    try:
-        put(entered(field, text))
-    except ValueError:
-        return
+def _of(key: str) -> int:
+    """Return the number of the condition that a field belongs to; 0 if it belongs to none."""
+    match = re.match(r"condition\[(\d+)\]", key)
+    return int(match[1]) if match is not None else 0
+
+
+def _moved_up(key: str, removed: int) -> str:
+    """Return the key of a field once a condition before it was removed."""
+    number = _of(key)
+    return key.replace(f"[{number}]", f"[{number - 1}]", 1) if number > removed else key

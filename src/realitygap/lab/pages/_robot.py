@@ -86,6 +86,7 @@ class _Page:
         self._n_points = 0
         self._pad: DrivePad | None = None
         self._gauges: dict[str, list[_Gauge]] = {}
+        self._replies: dict[str, ui.label] = {}
 
     def show(self) -> None:
         self._seen = self._state()
@@ -105,6 +106,8 @@ class _Page:
 
     async def _look(self) -> None:
         now = self._state()
+        for port, reply in self._replies.items():  # the button that was pressed keeps the focus
+            reply.text = self._lab.reply_on(port)
         if now == self._seen:
             return
         before, self._seen = self._seen, now
@@ -120,7 +123,7 @@ class _Page:
         return old is not None and new is not None and old[:3] == new[:3] and before[1:] == now[1:]
 
     def _show(self) -> None:
-        self._pad, self._gauges, self._n_shown = None, {}, -1
+        self._pad, self._gauges, self._n_shown, self._replies = None, {}, -1, {}
         hand, job = self._lab.hand, self._lab.robot_job
         if job is not None:
             ui.label(f"The study {job.name!r} uses the robot.").props('role="status"')
@@ -162,13 +165,13 @@ class _Page:
         section("Ports of this computer")
         if not self._ports:
             hint("No serial ports found. Plug in or pair the robot, then reload the page.")
+        else:
+            hint(
+                "Identify sends a few bytes to the device and shows which robot answers. Other devices may react to "
+                "them, so use it only for a port that may be your robot's."
+            )
         for guess in self._ports:
-            with ui.row().classes("lab-row"):
-                ui.button(
-                    f"Connect {guess.port}",
-                    on_click=lambda port=guess.port: attempt(lambda: self._connect(port)),
-                ).props("outline no-caps")
-                ui.label(" · ".join(filter(None, (guess.seems, self._lab.reply_on(guess.port)))))
+            self._show_port(guess)
         with ui.expansion("Another port").classes("lab-expansion"), ui.element("div").classes("lab-form"):
             form = Form()
             form.summary()
@@ -189,6 +192,18 @@ class _Page:
                 self._connect(values["port"], values["witness"])
 
             ui.button("Connect", on_click=lambda: form.submit(connect)).props("unelevated no-caps")
+
+    def _show_port(self, guess: PortGuess) -> None:
+        port = guess.port
+        with ui.row().classes("lab-row"):
+            ui.button(f"Connect {port}", on_click=lambda: attempt(lambda: self._connect(port))).props(
+                "outline no-caps"
+            )
+            ui.button("Identify", on_click=lambda: attempt(lambda: self._lab.identify(port))).props(
+                f'flat no-caps aria-label="Identify the robot on {port}"'
+            )
+            ui.label(guess.seems)
+            self._replies[port] = ui.label(self._lab.reply_on(port)).props('role="status"')
 
     def _connect(self, port: str, witness: str = "") -> None:
         self._lab.connect(port, witness, self._visitor)

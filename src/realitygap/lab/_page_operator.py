@@ -59,9 +59,8 @@ class _Live:
         self._ended.set()
 
     def _look(self, witness: Witness, ended: threading.Event) -> None:
-        with contextlib.suppress(
-            RobotError
-        ):  # the trial ends with the emulator, and the loop that drives reports it
+        # the trial ends with the emulator, and the loop that drives reports it
+        with contextlib.suppress(RobotError):
             while not ended.wait(LIVE_S):
                 self._channel.say("pose", pose=list(witness.pose()))
 

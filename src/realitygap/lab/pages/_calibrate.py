@@ -77,9 +77,8 @@ class _Page:
         )
         self._steps = Part(self._step, lambda step: show_steps(_STEPS, step))
         self._steps.show()
-        self._unfinished = Part(
-            self._unfinished_state, self._show_unfinished
-        )  # above the form, which fills a screen
+        # above the form, which fills a screen
+        self._unfinished = Part(self._unfinished_state, self._show_unfinished)
         with ui.column().classes("lab-cards"):
             self._unfinished.show()
         self._form_box = ui.element("div").classes("lab-form")

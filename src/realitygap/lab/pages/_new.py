@@ -108,9 +108,8 @@ class _Page:
         self._check: Check | None = None
         self._boxes: list[tuple[str, ui.element]] = []
         self._is_open = False
-        self._unread: dict[
-            str, str
-        ] = {}  # entered texts that are no values, by field: the draft cannot hold them
+        # entered texts that are no values, by field: the draft cannot hold them
+        self._unread: dict[str, str] = {}
         self._turned = ""
 
     def show(self) -> None:

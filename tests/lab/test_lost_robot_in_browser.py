@@ -77,7 +77,7 @@ def test_robot_lost_in_a_trial_of_a_study_is_shown_and_the_study_resumes(lab, vi
     with ledger_of(lab.root) as ledger:
         assert [trial.state for trial in ledger.trials()] == ["running", "planned"], "nobody has decided yet"
         assert len(ledger.record(1).commands) >= 3
-    robot.start(speed=60)
+    robot.start(speed=8)
     page.get_by_role("button", name="Reconnect").click()
     problem = page.locator(".lab-problem", has_text="The trial was interrupted")
     problem.wait_for()

@@ -273,11 +273,13 @@ def test_parameters_that_the_page_of_inference_calls_missed_are_those_held_too_s
     seldom = {name for name, part in held["track"].items() if make_calibration.chance(part) <= 0.05}
     assert seldom == {"drive.delay", "drive.delay_jitter", "drive.dead_band"}
     assert {held["track"][name].count for name in seldom} == {18}
+    seldom = {name for name, part in held["cells"].items() if make_calibration.chance(part) <= 0.05}
+    assert seldom == {"drive.asymmetry", "drive.lag", "range.burst"}
+    assert {held["cells"][name].count for name in seldom} == {18}
     n_parameters = sum(len(parts) for parts in held.values())
-    corrected = {
-        name for name, part in held["cells"].items() if n_parameters * make_calibration.chance(part) <= 0.05
-    }
-    assert (n_parameters, corrected) == (59, {"drive.drift_per_m"})
+    least = min(make_calibration.chance(part) for parts in held.values() for part in parts.values())
+    assert n_parameters == 59
+    assert n_parameters * least > 0.05, "the page says that no parameter misses the goal after the correction"
 
 
 @pytest.mark.slow

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -40,7 +41,12 @@ def work(root: Path, **order: Any) -> None:
 def orders(monkeypatch) -> list[dict[str, Any]]:
     """Orders to processes, none of which is started."""
     told: list[dict[str, Any]] = []
-    monkeypatch.setattr(_lab, "StudyJob", lambda name, order, root, changed: told.append(order))
+
+    def note(_name: str, order: dict[str, Any], _root: Path, _changed: Any) -> SimpleNamespace:
+        told.append(order)
+        return SimpleNamespace(port="", is_over=True, is_lost=False, has_met=False)
+
+    monkeypatch.setattr(_lab, "StudyJob", note)
     return told
 
 

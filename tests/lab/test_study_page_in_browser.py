@@ -109,9 +109,14 @@ def test_texts_that_are_no_values_stay_in_their_fields(lab, visit):
     page.get_by_role("tab", name="Form").click()
     runs.wait_for()
     assert (runs.input_value(), noise.nth(0).input_value()) == ("many", "loud")
+    page.get_by_label("Name", exact=True).first.fill("")
     page.get_by_role("button", name="Start study").click()
     for text in ("Runs per condition: Enter a whole number.", "Noise: Enter a number. You entered 'loud'."):
         page.get_by_role("alert").filter(has_text=text).wait_for()
+    runs.fill("4")
+    noise.nth(0).fill("0.1")
+    page.get_by_role("button", name="Start study").click()
+    page.get_by_role("alert").filter(has_text="Name: This field is empty. Enter a value.").wait_for()
 
 
 def test_an_empty_name_is_asked_for(lab, visit):

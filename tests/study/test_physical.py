@@ -51,7 +51,8 @@ def test_a_lost_link_leaves_the_trial_to_the_operator(tmp_path):
 
     study = small_study()
     with pytest.raises(
-        RobotError, match=r"Trial 2, step 3 of 4: The plug was pulled\..* the same command again"
+        RobotError,
+        match=r"Link lost in trial 2 at step 3 of 4: The plug was pulled\..* connect it again to resume",
     ):
         drive(study, tmp_path / "r", fault=pull_the_plug)
     with Ledger.open(tmp_path / "r" / LEDGER_NAME) as ledger:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import socket
 from collections.abc import Sequence
-from threading import RLock
+from threading import Lock, RLock
 from typing import Any, Protocol
 
 import numpy as np
@@ -230,11 +230,14 @@ class RemoteWitness(ClosedOnExit):
                 f"No witness at {address} ({error}). Start the emulator with --witness PORT and give 127.0.0.1:PORT."
             ) from error
         self._file = self._socket.makefile("rb")
+        # of a question and its answer: a page that shows a trial looks from a thread of its own
+        self._lock = Lock()
 
     def _ask(self, what: str, **values: Any) -> Any:
         try:
-            self._socket.sendall(json.dumps({"do": what, **values}).encode() + b"\n")
-            line = self._file.readline()
+            with self._lock:
+                self._socket.sendall(json.dumps({"do": what, **values}).encode() + b"\n")
+                line = self._file.readline()
         except OSError as error:
             raise RobotError(f"The witness at {self._address} does not answer ({error}).") from error
         if not line:

@@ -80,9 +80,9 @@ _RobotUser = Hand | StudyJob | GapJob | CalibrationJob
 
 def _port_of(job: _RobotUser) -> str:
     """Return the port of the robot that something uses or used; empty if it needs none."""
-    if isinstance(job, Hand | StudyJob):
-        return job.port
-    return job.platform.removeprefix("scribbler:") if names_a_port(job.platform) else ""
+    if isinstance(job, GapJob | CalibrationJob):
+        return job.platform.removeprefix("scribbler:") if names_a_port(job.platform) else ""
+    return job.port
 
 
 class Lab:

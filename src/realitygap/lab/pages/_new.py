@@ -182,8 +182,7 @@ class _Page:
 
     async def _take(self, text: str) -> None:
         """Show the text of a file in the form; a text with mistakes is shown as it is."""
-        if text != self._turned.strip():
-            self._unread.clear()
+        self._unread.clear()
         self._text.value = text
         found = await self._ask("read", text)
         if "data" not in found:
@@ -198,8 +197,9 @@ class _Page:
         self._is_text = event.value == "File"
         if self._is_text:
             self._text.value = self._turned = written_form(self._draft.data)
-        else:
-            await self._take(text_of(self._text))
+        elif (text := text_of(self._text)) != self._turned.strip():
+            # reading takes a moment, and then replaces what was entered since
+            await self._take(text)
 
     # the form
 

@@ -354,7 +354,8 @@ class _Page:
         found = self._can_begin.ports
         last = self._lab.jobs.get(self._name)
         is_lost = last is not None and last.is_failed and bool(last.port)
-        before = {} if last is None or not last.port else last.options
+        # a camera that did not open is not proposed again
+        before = last.options if last is not None and last.is_lost else {}
         likely = [guess.port for guess in found if guess.seems != "a serial port"]
         self._form = form = Form()
         form.summary()
@@ -373,7 +374,7 @@ class _Page:
             port = form.text(
                 "port",
                 "Port",
-                before.get("port") or (likely[0] if likely else self._emulated),
+                last.port if last is not None and is_lost else likely[0] if likely else self._emulated,
                 options=[*(guess.port for guess in found), self._emulated],
                 is_needed=True,
                 explanation="For example /dev/rfcomm0 or COM3. Place the robot on free floor first.",

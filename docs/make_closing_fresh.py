@@ -70,9 +70,10 @@ def fall_table(summary: Summary) -> Iterable[Sequence[str]]:
     """
     for observe in summary["plan"]["observations"]:
         twins = [(twin, after) for twin in summary["twins"] if (after := _after(summary, twin, observe))]
-        rows = [("all", DRAWS, [(twin["rms"], after["rms"]) for twin, after in twins])]
-        rows.append(("all", ESTIMATE, [(twin["rms"], after["rms_point"]) for twin, after in twins]))
-        rows.append(("all", RECOMMENDED, [(twin["rms"], _recommended(twin, after)) for twin, after in twins]))
+        rows = [
+            ("all", numbers, [(twin["rms"], _gap_with(numbers, twin, after)) for twin, after in twins])
+            for numbers in (DRAWS, ESTIMATE, RECOMMENDED)
+        ]
         for kind in KINDS:
             pairs = [(twin["parts"][kind], after["parts"][kind]) for twin, after in twins]
             rows.append((kind, DRAWS, pairs))
@@ -185,6 +186,8 @@ def main() -> None:
     )
     options = parser.parse_args()
     if options.again:
+        if options.folder is None:
+            parser.error("--again needs a folder of results")
         rows = again_table(stored_summary(), summarize_closing(options.folder))
         (TABLES / "again.csv").write_text(table(AGAIN_HEAD, rows), "utf-8")
         print(f"Written: {TABLES / 'again.csv'}")

@@ -1,6 +1,7 @@
 """Emulators served to other programs, on pseudo-terminals and TCP ports."""
 
 import json
+import os
 import socket
 import time
 from pathlib import Path
@@ -104,6 +105,15 @@ def test_an_old_link_is_replaced_and_a_newer_one_is_left(tmp_path):
     first.close()
     assert str(link.readlink()) == second.name
     second.close()
+
+
+def test_a_second_close_leaves_what_was_opened_in_between():
+    server = serve_pty(robot())
+    server.close()
+    opened = [os.open(os.devnull, os.O_RDONLY) for _ in range(8)]  # they have the numbers of the closed ones
+    server.close()
+    for each in opened:
+        os.close(each)
 
 
 def test_a_port_that_is_taken_is_said_so():

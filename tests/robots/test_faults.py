@@ -294,6 +294,21 @@ def test_a_hang_up_for_good_is_one_error():
         robot.close()
 
 
+def test_a_pseudo_terminal_that_ended_is_not_opened_again():
+    """The next one with its name belongs to another program, which would get the bytes for the robot."""
+    port = FakePort(FakeScribbler("s2+fluke1"))
+    port.name = "/dev/pts/7"
+    robot = Scribbler(port)
+    robot.motors(*LEFT_RIGHT)
+    port.gone, opened = True, []
+    port.open = lambda: opened.append(1)  # type: ignore[method-assign]
+    with pytest.raises(RobotError, match="may be running: switch the robot off"):
+        robot.observe()
+    with pytest.raises(RobotError, match="'stop'"):
+        robot.close()
+    assert not opened
+
+
 @pytest.mark.parametrize("setup", SETUPS)
 def test_a_reset_of_the_robot_is_survived(setup):
     """Three seconds deaf, then its name once a second until it is spoken to."""

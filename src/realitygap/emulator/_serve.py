@@ -44,7 +44,7 @@ class PtyChannel:
             import tty
         except ImportError as error:
             raise RobotError("There are no pseudo-terminals on this system; use --tcp PORT.") from error
-        self._master, self._slave = os.openpty()
+        self._master, self._slave = self._sides = os.openpty()
         tty.setraw(self._slave)
         os.set_blocking(self._master, False)
         self.name = os.ttyname(self._slave)
@@ -109,7 +109,8 @@ class PtyChannel:
                 if str(self._link.readlink()) == self.name:
                     self._link.unlink()
             self._link = None
-        for side in (self._master, self._slave):
+        sides, self._sides = self._sides, ()  # a closed descriptor's number soon belongs to something else
+        for side in sides:
             with contextlib.suppress(OSError):
                 os.close(side)
 

@@ -61,6 +61,8 @@ SILENT_GREETINGS = 3
 """Attempts to identify the robot if nothing arrives. A robot that was reset as its port was opened answers by then."""
 STRANGER_PROBES = 8
 """Number of probes: enough to release a Fluke, and less than a packet for a robot without a Fluke."""
+PSEUDO_TERMINALS = ("/dev/pts/", "/dev/ttys")
+"""First letters of the names of pseudo-terminals, on Linux and macOS."""
 LOCKED_S = 0.05
 """Time between two attempts to open a port that the guardian of an ended program still holds [s]."""
 UNKNOWN_HOLDER_S = 2.0
@@ -562,6 +564,9 @@ class Link:
             _LostStep: in vain.
         """
         self.faults.hang_ups += 1
+        if self.name.startswith(PSEUDO_TERMINALS):
+            # It does not come back. One with the same name is the terminal of another program.
+            raise _LostStep(fault)
         for _ in range(REOPENINGS if self._recoveries > 1 else 1):
             self._end_guardian()  # the port cannot be reopened while the guardian has it open
             with contextlib.suppress(*_HANG_UPS):

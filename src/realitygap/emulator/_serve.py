@@ -44,7 +44,8 @@ class PtyChannel:
             import tty
         except ImportError as error:
             raise RobotError("There are no pseudo-terminals on this system; use --tcp PORT.") from error
-        self._master, self._slave = self._sides = os.openpty()
+        self._master, self._slave = os.openpty()
+        self._sides: tuple[int, ...] = (self._master, self._slave)
         tty.setraw(self._slave)
         os.set_blocking(self._master, False)
         self.name = os.ttyname(self._slave)

@@ -180,6 +180,14 @@ class Playground(ClosedOnExit):
         """The number of the playground's process."""
         return int((self.folder / "process").read_text())
 
+    def ended_by(self) -> str:
+        """Return the name of the signal that ended the playground, such as SIGSEGV; empty if none did."""
+        try:
+            fields = Path(f"/proc/{self.process_id}/stat").read_text().rpartition(") ")[2].split()
+            return signal.Signals(int(fields[-1]) & 127).name if fields[0] == "Z" else ""
+        except (OSError, ValueError):
+            return ""
+
     def _find_robot(self) -> str:
         until = time.monotonic() + START_S
         while time.monotonic() < until and self._process.poll() is None:
@@ -195,7 +203,15 @@ class Playground(ClosedOnExit):
     def _call(self, path: str, interface: str, member: str, signature: str, *values: object) -> list[object]:
         if self._bus is None:
             raise RobotError("The playground has ended.")
-        return self._bus.call(path, interface, member, signature, *values)
+        try:
+            return self._bus.call(path, interface, member, signature, *values)
+        except RobotError as error:
+            if name := self.ended_by():
+                raise RobotError(
+                    f"The playground was ended by the signal {name}. Start it again; if that happens often, report it "
+                    "to the makers of Aseba."
+                ) from error
+            raise
 
     # the witness
 

@@ -9,8 +9,10 @@ from typing import Any
 
 import pytest
 
-from realitygap.lab import _job
+from realitygap.lab import _job, _measuring_job
+from realitygap.lab._gap_job import GapJob
 from realitygap.lab._job import Job
+from realitygap.lab._measuring_job import SILENT_S
 
 
 class SilentChild:
@@ -85,3 +87,23 @@ def test_process_interrupted_while_it_reports_a_failure_prints_no_traceback(tmp_
         assert process.stderr.read() == ""
         assert process.stdout is not None
         assert json.loads(process.stdout.read().splitlines()[-1]) == {"kind": "interrupted"}
+
+
+def test_robot_of_a_gap_is_silent_only_in_a_trial_without_an_answer(tmp_path, monkeypatch):
+    monkeypatch.setattr(_job, "Child", SilentChild)
+    now = [100.0]
+    monkeypatch.setattr(_measuring_job.time, "monotonic", lambda: now[0])
+    values = {"target": "scribbler:/dev/x", "n_controllers": 2, "trials": 2}
+    job = GapJob("gap", {"measure": values}, tmp_path, lambda: None)
+    assert job.silent_s == 0
+    job._hear({"kind": "pulse", "is_driving": True})
+    now[0] += SILENT_S
+    assert job.silent_s == 0
+    now[0] += 1
+    assert job.silent_s == SILENT_S + 1
+    job._hear({"kind": "pulse", "is_driving": False})
+    assert job.silent_s == 0
+    job._hear({"kind": "pulse", "is_driving": True})
+    job._hear({"kind": "error", "text": "lost", "is_of_robot": True})
+    now[0] += 9
+    assert job.silent_s == 0

@@ -57,6 +57,15 @@ def is_lost(page, robot) -> None:
     page.locator(".lab-robot-lost .lab-chip", has_text=chip).wait_for()
 
 
+def is_silent(page) -> None:
+    """The page states that the robot is silent, long before its link is given up."""
+    silence = page.get_by_text(re.compile(r"No answer for \d+\ss\. The link is being opened again"))
+    silence.wait_for()
+    seconds = int(re.search(r"for (\d+)", silence.inner_text())[1])
+    assert seconds <= 4, "1.5 s on an idle machine"
+    page.locator(".lab-robot-silent .lab-chip", has_text="no readings").wait_for()
+
+
 def test_robot_lost_in_a_trial_of_a_study_is_shown_and_the_study_resumes(lab, visit, robot):
     make_study(lab.root, steps=40)
     robot.start(speed=2)
@@ -108,6 +117,7 @@ def test_robot_lost_in_a_gap_keeps_its_trials_and_the_gap_resumes(lab, visit, ro
     page.get_by_role("button", name="Measure the gap").click()
     page.get_by_text(re.compile(r"[1-3] of 4 trials")).first.wait_for()
     robot.kill()
+    is_silent(page)
     problem = page.locator(".lab-problem", has_text="trials on the target. They are saved. Resume once")
     problem.wait_for()
     n_done = int(re.match(r"Link lost after (\d) of 4", problem.inner_text())[1])
@@ -139,6 +149,7 @@ def test_robot_lost_in_a_calibration_keeps_its_trials_and_the_calibration_resume
     calibrate(page, "sensors", Robot=f"scribbler:{robot.port}")
     page.get_by_text(re.compile(r"^Trial [2-9] of 18")).wait_for()
     robot.kill()
+    is_silent(page)
     problem = page.locator(
         ".lab-problem", has_text=re.compile(r"Link lost after \d+ of 18 trials\. They are")
     )

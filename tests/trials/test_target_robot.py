@@ -22,7 +22,7 @@ from realitygap.records import TrialRecord, read_observations, trial_to_dict
 from realitygap.robots import Command
 from realitygap.robots.twin import sample_twin
 from realitygap.study import connect_robot, open_target, try_on
-from realitygap.trials import OnLost, RobotTarget, TrialPlan, WitnessObserver
+from realitygap.trials import OnLost, Pulse, RobotTarget, TrialPlan, WitnessObserver
 from realitygap.trials._target_robot import PacedRobot
 from realitygap.world import Pose, load_arena, paper_arena
 
@@ -189,14 +189,16 @@ class Failing:
         self._robot.drive(command)
 
 
-def failing(lost_at: list[int], on_lost: OnLost) -> tuple[RobotTarget, list[Any]]:
+def failing(lost_at: list[int], on_lost: OnLost, pulse: Pulse | None = None) -> tuple[RobotTarget, list[Any]]:
     opened: list[Any] = []
 
     def open_robot() -> Any:
         opened.append(Failing(connect_robot(PORT)(ScribblerPlatform(reading_max=6400)), lost_at))
         return opened[-1]
 
-    target = RobotTarget(open_robot, ARENA, WitnessObserver(), name="scribbler:test", on_lost=on_lost)
+    target = RobotTarget(
+        open_robot, ARENA, WitnessObserver(), name="scribbler:test", on_lost=on_lost, pulse=pulse
+    )
     return target, opened
 
 
@@ -213,6 +215,18 @@ def test_a_lost_trial_is_told_and_driven_again_once() -> None:
     assert trial_to_dict(trial) == trial_to_dict(told[3][1])
     assert len(opened) == 2
     assert all(robot.link.motors_off for robot in opened)
+
+
+def test_pulse_has_each_answer_of_the_robot_and_no_end_of_a_lost_trial() -> None:
+    pulses: list[bool] = []
+    target, _ = failing([3, 99], "retry", pulses.append)
+    with target:
+        target.carry_out([FORWARD], "cells")
+        n_lost = 1 + 5  # the beginning, and answers to three readings and two commands
+        n_whole = 1 + 12
+        assert pulses == [True] * (n_lost + n_whole) + [False]
+        target.carry_out([FORWARD], "cells")
+        assert pulses.count(False) == 2
 
 
 def test_a_trial_lost_twice_stops_with_the_trials_before_it_kept() -> None:

@@ -24,6 +24,7 @@ from realitygap.trials import Led, OnLost, Operator, SheetObserver, TrialPlan, V
 from realitygap.world import INCH, Arena, Calibration, RobotModel, load_arena, load_robot
 
 from ._channel import Channel, Message
+from ._pulse import Pulse
 
 _QUESTIONS = {
     "ahead": "Distance ahead of the start [in]",
@@ -51,7 +52,13 @@ def work(channel: Channel, order: Message) -> None:
     on_lost: OnLost = "stop" if is_led else "retry"  # again only from where somebody has put it
     try:
         with open_target(
-            platform, arena, key=seed, witness=witness, observer=observer, on_lost=on_lost
+            platform,
+            arena,
+            key=seed,
+            witness=witness,
+            observer=observer,
+            on_lost=on_lost,
+            pulse=Pulse(channel).tell,
         ) as target:
             made = calibrate(
                 order["kind"],

@@ -8,11 +8,11 @@ from typing import Any
 
 from realitygap.platforms import names_a_port
 
-from ._job import Job
+from ._measuring_job import MeasuringJob
 from ._pace import Pace
 
 
-class CalibrationJob(Job):
+class CalibrationJob(MeasuringJob):
     """A calibration.
 
     Attributes:
@@ -37,11 +37,6 @@ class CalibrationJob(Job):
         self.readings: list[dict[str, Any]] = []
         self.made: dict[str, Any] | None = None
         super().__init__({"work": "calibrate", **order}, root, changed)
-
-    @property
-    def has_robot(self) -> bool:
-        """True if a robot is in use."""
-        return names_a_port(self.platform) and not self.is_over
 
     @property
     def has_met(self) -> bool:

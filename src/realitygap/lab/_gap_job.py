@@ -8,11 +8,11 @@ from typing import Any
 
 from realitygap.platforms import names_a_port
 
-from ._job import Job
+from ._measuring_job import MeasuringJob
 from ._pace import Pace
 
 
-class GapJob(Job):
+class GapJob(MeasuringJob):
     """A gap at work.
 
     Attributes:
@@ -43,11 +43,6 @@ class GapJob(Job):
         self.pairs: dict[str, Any] = {}
         self.n_reports = 0
         super().__init__({"work": "gap", **order}, root, changed)
-
-    @property
-    def has_robot(self) -> bool:
-        """True if a robot is in use."""
-        return names_a_port(self.platform) and not self.is_over
 
     @property
     def has_met(self) -> bool:

@@ -14,6 +14,7 @@ from realitygap.report import write_gap_report
 from realitygap.study import GapStudy, gap_between
 
 from ._channel import Channel, Message
+from ._pulse import Pulse
 
 _TOLD_S = 0.2
 """Time between two messages on the progress [s]."""
@@ -40,9 +41,9 @@ def work(channel: Channel, order: Message) -> None:
 
 def _measure(channel: Channel, values: dict[str, Any], page: Path, kept: Path) -> None:
     """Measure repeatedly with more trials of each controller. Trials of the target are kept, and never driven again."""
-    told = _Telling(channel)
+    told, pulse = _Telling(channel), Pulse(channel)
     for trials in rounds(int(values.pop("trials"))):
-        found = gap_between(**values, trials=trials, results=kept, tell=told.show)
+        found = gap_between(**values, trials=trials, results=kept, pulse=pulse.tell, tell=told.show)
         write_gap_report(found, page)
         result = found.study.result
         measures = [(title, _words(getattr(result, name))) for name, title in MEASURES.items()]

@@ -548,7 +548,10 @@ class Lab:
         """True if the robot in use has not answered for a while."""
         if self.robot_job is not None:
             return self.robot_job.silent_s > 0
-        return self.hand is not None and self.hand.is_silent
+        if self.hand is not None and not self.hand.is_over:
+            return self.hand.is_silent
+        measured = (each for each in (self.gap, self.calibration) if each is not None and each.has_robot)
+        return any(each.silent_s > 0 for each in measured)
 
     @property
     def robot_action(self) -> str:

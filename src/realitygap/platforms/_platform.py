@@ -12,6 +12,7 @@ from realitygap.trials import (
     OnLost,
     PlatformTrials,
     PortObserver,
+    Pulse,
     RobotTarget,
     Target,
     WitnessObserver,
@@ -48,6 +49,7 @@ class Opening:
         observer: Observer, who places a robot and reports the cells that it crossed. Default: its witness.
         step_s: Duration of a robot's command [s]; None: that of its platform.
         on_lost: Reaction to a trial in which the link to a robot was lost.
+        pulse: Called when a trial on a robot begins or ends, and when the robot has answered in it.
     """
 
     name: str
@@ -58,6 +60,7 @@ class Opening:
     observer: PortObserver | None = None
     step_s: float | None = None
     on_lost: OnLost = "retry"
+    pulse: Pulse | None = None
 
 
 class Platform(PlatformSettings):
@@ -124,6 +127,7 @@ class Platform(PlatformSettings):
             name=how.name,
             step_s=self.command_s if how.step_s is None else how.step_s,
             on_lost=how.on_lost,
+            pulse=how.pulse,
         )
 
     def _witness(self, how: Opening) -> PortObserver:

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any, Literal
 
 from realitygap.errors import StudyError, did_you_mean
-from realitygap.trials import OnLost, PortObserver, Target
+from realitygap.trials import OnLost, PortObserver, Pulse, Target
 from realitygap.world import Arena
 
 from ._platform import Opening, Platform
@@ -98,6 +98,7 @@ def open_target(
     observer: PortObserver | None = None,
     step_s: float | None = None,
     on_lost: OnLost = "retry",
+    pulse: Pulse | None = None,
     noise: float = 0.0,
     key: int = 0,
     randomize: Literal["no", "posterior"] = "no",
@@ -113,6 +114,7 @@ def open_target(
         observer: Observer, who places a robot and reports what it drew, if there is no witness.
         step_s: Duration of a robot's command [s]; that of its platform when not given.
         on_lost: Reaction to a trial in which the link to a robot was lost.
+        pulse: Called when a trial on a robot begins or ends, and when the robot has answered in it.
         noise: Level a of the paper, on top of a simulated robot's own noise.
         key: Key of a simulator's random numbers.
         randomize: posterior draws the robot of each trial from the calibration in FILE.
@@ -124,7 +126,7 @@ def open_target(
         RobotError: The robot, its witness or the twin's process cannot be reached.
     """
     platform = platform_of(spec)
-    how = Opening(spec, noise, key, processes, witness, observer, step_s, on_lost)
+    how = Opening(spec, noise, key, processes, witness, observer, step_s, on_lost, pulse)
     if randomize != "no":
         drawn = platform.randomized(randomize)
         if not drawn.is_randomized:

@@ -36,7 +36,7 @@ from ._processors import usable_processors
 from ._scene import SceneTrack, simulate_case, simulate_file
 from ._sheet_observer import SheetObserver
 from ._target import RepeatableTarget, Target, TellTrial, TrialPlan, check_plans
-from ._target_robot import OnLost, PacedRobot, RobotTarget
+from ._target_robot import OnLost, PacedRobot, Pulse, RobotTarget
 from ._witness_observer import WitnessObserver, own_witness
 
 __all__ = [
@@ -55,6 +55,7 @@ __all__ = [
     "PlatformTrials",
     "PortObserver",
     "Preflight",
+    "Pulse",
     "RepeatableTarget",
     "ResultsRoom",
     "RobotObserver",

@@ -26,6 +26,10 @@ from ._target import TellTrial, TrialPlan, check_plans
 OnLost = Literal["retry", "skip", "stop"]
 """Reaction to a trial in which the link was lost: repeat it once, continue with the next one, or stop."""
 
+Pulse = Callable[[bool], None]
+"""Called with True when a trial begins and whenever the robot has answered in it, and with False after the trial. There
+is no False after a trial in which the link was lost: the robot is silent until it answers again."""
+
 LATE = 0.02
 """Share by which the median duration of commands may exceed the nominal one before it replaces that in the record."""
 
@@ -40,10 +44,11 @@ class PacedRobot(ClosedOnExit):
         robot: Robot to pace.
         step_s: Duration of a command [s].
         clock: Clock of the robot.
+        pulse: Called when the robot has answered.
     """
 
-    def __init__(self, robot: Any, step_s: float, clock: Clock) -> None:
-        self._robot, self._clock = robot, clock
+    def __init__(self, robot: Any, step_s: float, clock: Clock, pulse: Pulse | None = None) -> None:
+        self._robot, self._clock, self._pulse = robot, clock, pulse
         self._robot.step_s = 0.0  # it is waited here
         if hasattr(robot, "lasts_s"):  # its motors stop by themselves after a command
             robot.lasts_s = step_s
@@ -68,11 +73,13 @@ class PacedRobot(ClosedOnExit):
         if not self._lasted:
             self._due = self._clock.now()
         seen: Observation = self._robot.observe()
+        self._has_answered()
         return seen
 
     def drive(self, command: Command) -> None:
         """Drive like `Robot.drive`, and return at the end of the command's time, which includes its readings."""
         self._robot.drive(command)
+        self._has_answered()
         self._due += self.step_s
         late = self._clock.now() - self._due
         if late < 0:
@@ -80,6 +87,10 @@ class PacedRobot(ClosedOnExit):
         else:
             self._due += late
         self._lasted.append(self.step_s + max(late, 0.0))
+
+    def _has_answered(self) -> None:
+        if self._pulse is not None:
+            self._pulse(True)
 
     @property
     def lasted_s(self) -> float:
@@ -109,6 +120,7 @@ class RobotTarget(ClosedOnExit):
         name: Name of the target, as the user gave it.
         step_s: Duration of a command [s].
         on_lost: Reaction to a trial in which the link was lost.
+        pulse: Called when a trial begins or ends, and when the robot has answered in it.
 
     Raises:
         RobotError: The robot cannot be reached, or not observed.
@@ -125,9 +137,11 @@ class RobotTarget(ClosedOnExit):
         name: str,
         step_s: float = 0.5,
         on_lost: OnLost = "retry",
+        pulse: Pulse | None = None,
     ) -> None:
         self.name, self.arena, self.step_s = name, arena, step_s
         self._open_robot, self._observer, self._on_lost = open_robot, observer, on_lost
+        self._pulse = pulse
         self._robot: PacedRobot | None = None
         robot = self._ready()
         self.label: Label = robot.label
@@ -146,7 +160,7 @@ class RobotTarget(ClosedOnExit):
             except BaseException:
                 robot.close()
                 raise
-            self._robot = PacedRobot(robot, self.step_s, clock)
+            self._robot = PacedRobot(robot, self.step_s, clock, self._pulse)
         return self._robot
 
     @property
@@ -196,6 +210,7 @@ class RobotTarget(ClosedOnExit):
         self._observer.place(plan, self.arena, observe)
         if tell is not None:
             tell(self._begun(plan, start))
+        self._tell_pulse(is_driving=True)
         keep = tell if self._observer.asks else None
         try:
             trial = carry_out_on_robot(robot, plan, observe, self._observer, start, keep)
@@ -203,7 +218,13 @@ class RobotTarget(ClosedOnExit):
             if tell is not None:
                 tell(stopped.trial)
             raise
+        if trial.end != EndReason.LOST:
+            self._tell_pulse(is_driving=False)
         return replace(trial, step_s=robot.lasted_s)
+
+    def _tell_pulse(self, *, is_driving: bool) -> None:
+        if self._pulse is not None:
+            self._pulse(is_driving)
 
     def _begun(self, plan: TrialPlan, start: Pose) -> TrialRecord:
         """Return the record of a trial before its robot moves."""

@@ -20,7 +20,8 @@ from ._frame import framed, hint, section, text_of, visitor_of
 from ._grid import CellGrid
 from ._handover import show_holder
 from ._notices import attempt, notify
-from ._part import Part, watching
+from ._part import LOOK_S, Part, watching
+from ._silence import Silence
 from ._steps import show_steps
 
 _KINDS = {
@@ -90,12 +91,18 @@ class _Page:
         self._seen = self._stand()
         with ui.column().classes("lab-cards"):
             self._work.show()
+            silence = Silence()
             self._asked.show()
             self._made()
             self._plot()
         self._again = ui.button("New calibration", on_click=self._begin_again).props("outline no-caps")
         self._fold_form()
         watching(self._lab, self._look)
+        ui.timer(LOOK_S, lambda: silence.look(self._silent_s()))
+
+    def _silent_s(self) -> float:
+        job = self._lab.calibration
+        return 0.0 if job is None else job.silent_s
 
     def _stand(self) -> Any:
         job = self._lab.calibration

@@ -7,11 +7,11 @@ from typing import Any
 from nicegui import ui
 
 from realitygap.lab._counts import Counts
-from realitygap.lab._pace import duration
 from realitygap.lab._study_job import StudyJob
 
 from ._frame import hint
 from ._grid import CellGrid
+from ._silence import Silence
 
 LIVE_S = 0.05
 """Time between two updates [s]. Another process drives the robot, even if no page is open."""
@@ -40,8 +40,7 @@ class Driving:
             hint(f"{card['title']}. Pen: {card['pen']}.")
             self._bar = ui.linear_progress(0, show_value=False).props('aria-label="Steps driven"')
             self._said = ui.label("")
-            self._silent = ui.label("").classes("lab-problem")  # the bar of Stop announces it, once
-            self._silent.set_visibility(False)
+            self._silence = Silence()
             self._grid = CellGrid(arena, ink=card["pen"], name="Position of the robot").classes("lab-sketch")
             ui.button("Abort trial", on_click=self._job.stop_robot, color="negative").props(
                 "unelevated no-caps"
@@ -50,13 +49,7 @@ class Driving:
 
     def _look(self) -> None:
         job = self._job
-        silent_s = job.silent_s
-        self._silent.set_visibility(bool(silent_s))
-        if silent_s:
-            self._silent.text = (
-                f"No answer for {duration(silent_s)}. The link is being opened again. If the robot moves, "
-                "switch it off."
-            )
+        self._silence.look(job.silent_s)
         if job.n_live == self._n_shown or job.card is not self._card:
             return
         self._n_shown = job.n_live

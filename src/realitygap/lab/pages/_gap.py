@@ -21,8 +21,9 @@ from ._fields import Form
 from ._frame import framed, hint, section, text_of, visitor_of
 from ._new import CALIBRATED
 from ._notices import attempt
-from ._part import Part, watching
+from ._part import LOOK_S, Part, watching
 from ._scatter import Scatter
+from ._silence import Silence
 
 
 def add_gap(lab: Lab) -> None:
@@ -77,11 +78,14 @@ class _Page:
         parts: list[Part[Any]] = [
             Part(self._order, self._show_order),
             Part(self._work, self._show_work),
-            Part(self._result, self._show_result),
         ]
         for part in parts:
             with ui.column().classes("lab-cards"):
                 part.show()
+        silence = Silence()
+        parts.append(Part(self._result, self._show_result))
+        with ui.column().classes("lab-cards"):
+            parts[-1].show()
         parts.append(unfinished)
         if self._reports:
             section("Saved reports")
@@ -93,6 +97,7 @@ class _Page:
                 part.look()
 
         watching(self._lab, look)
+        ui.timer(LOOK_S, lambda: silence.look(0.0 if self._lab.gap is None else self._lab.gap.silent_s))
 
     # form
 

@@ -12,6 +12,8 @@ from realitygap.lab._lab import Lab, Visitor
 from ._notices import notify
 from ._part import Part, watching
 
+UNTOLD_S = 0.5
+"""Time between two looks for what nothing reports [s]: a robot that is silent, and the end of the time after a stop."""
 _LOST = "Connection lost. Use the robot's power switch."
 
 
@@ -60,7 +62,7 @@ class Stop:
         part = Part(self._state, self._update)
         part.show()
         watching(self._lab, part.look)
-        ui.timer(1.0, part.look)  # nothing reports that the seconds after a stop are over
+        ui.timer(UNTOLD_S, part.look)
 
     def _state(self) -> _State:
         lab = self._lab

@@ -13,7 +13,7 @@ from realitygap.gap import Why
 from realitygap.platforms import RecordedTarget, class_of, open_target, split_spec
 from realitygap.records import Observe
 from realitygap.tasks import Task
-from realitygap.trials import PortObserver, Target
+from realitygap.trials import PortObserver, Pulse, Target
 from realitygap.world import Arena, Calibration, load_arena
 
 from .._code import task_named
@@ -58,6 +58,7 @@ def gap_between(
     processes: int | None = None,
     witness: str | None = None,
     observer: PortObserver | None = None,
+    pulse: Pulse | None = None,
     seed: int = 1,
     results: str | Path | None = None,
     allow_code: bool = False,
@@ -85,6 +86,7 @@ def gap_between(
         processes: Number of processes of a twin.
         witness: Witness of an emulated robot in another program: HOST:PORT.
         observer: Observer of a robot without a witness: it places the robot and reports what it drew.
+        pulse: Called when a trial on a robot begins or ends, and when the robot has answered in it.
         seed: Seed of all random numbers.
         results: File for the target's trials.
         allow_code: True to run the Python file of a task that the user has not allowed before.
@@ -143,7 +145,7 @@ def gap_between(
         _refuse_elsewhere(chosen, f"--controllers {controllers}", sim)
     with (
         _open(sim, place, noise, 2 * seed, randomize=randomize) as source,
-        _open(target, place, noise, 2 * seed + 1, processes, witness, observer) as costly,
+        _open(target, place, noise, 2 * seed + 1, processes, witness, observer, pulse) as costly,
     ):
         if costly.label == "REAL" and results is None and not isinstance(costly, RecordedTarget):
             raise StudyError(
@@ -226,10 +228,11 @@ def _open(
     processes: int | None = None,
     witness: str | None = None,
     observer: PortObserver | None = None,
+    pulse: Pulse | None = None,
     randomize: Literal["no", "posterior"] = "no",
 ) -> Target:
     level = class_of(spec).default_noise if noise is None else noise
     return open_target(
-        spec, arena, processes=processes, witness=witness, observer=observer, noise=level, key=key,
-        randomize=randomize,
+        spec, arena, processes=processes, witness=witness, observer=observer, pulse=pulse, noise=level,
+        key=key, randomize=randomize,
     )  # fmt: skip

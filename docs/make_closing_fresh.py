@@ -188,9 +188,14 @@ def main() -> None:
     if options.again:
         if options.folder is None:
             parser.error("--again needs a folder of results")
-        rows = again_table(stored_summary(), summarize_closing(options.folder))
-        (TABLES / "again.csv").write_text(table(AGAIN_HEAD, rows), "utf-8")
-        print(f"Written: {TABLES / 'again.csv'}")
+        again = summarize_closing(options.folder)
+        tables = {
+            "again.csv": table(AGAIN_HEAD, again_table(stored_summary(), again)),
+            "again-goals.csv": table(GOAL_HEAD, goal_table(again)),
+        }
+        for name, text in tables.items():
+            (TABLES / name).write_text(text, "utf-8")
+            print(f"Written: {TABLES / name}")
         return
     folder = options.folder
     for place in (TABLES, FIGURES):

@@ -70,7 +70,7 @@ def test_gap_of_the_readme_is_that_of_the_study():
         floor = next(row for row in rows if row["goal"].endswith(f"floor, {observe}"))
         assert (floor["verdict"] == "missed") == (observe == "cells")
     again, *_, floor = goals_of_fresh_twins("again-goals.csv")
-    assert f"by {again['figure']} ({again['95 % interval']}) after a repair of the fit" in text
+    assert f"After a repair of the fit, it fell by {again['figure']} ({again['95 % interval']})" in text
     assert floor["verdict"] == "missed"
 
 

@@ -230,7 +230,7 @@ def main() -> None:
     parser.add_argument("--families", nargs="+", metavar="FAMILY", help="of twins")
     parser.add_argument("--n", type=int, default=12, help="robots or twins of each family")
     parser.add_argument("--first-seed", type=int, default=1)
-    parser.add_argument("--observe", nargs="+", default=["track"], choices=["track", "cells"])
+    parser.add_argument("--observe", nargs="+", default=["track"], choices=["track", "encoders", "cells"])
     parser.add_argument("--processes", type=int, default=1)
     parser.add_argument("--out", type=Path, help="a file that lines are added to")
     options = parser.parse_args()

@@ -5,6 +5,8 @@ import sys
 from importlib import resources
 from pathlib import Path
 
+from docutils import nodes
+
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE))
 
@@ -94,6 +96,9 @@ napoleon_use_ivar = True
 napoleon_use_rtype = False
 napoleon_custom_sections = [("Source", "notes_style"), ("Differs", "notes_style")]
 
+UNIT = re.compile(r"(?<=\d) (?=(?:%|m|mm|cm|s|ms|min|h|V|Hz|kB|MB|GB|GFlop|GFlop/s|rad)(?![\w/]))")
+"""The space between a number and its unit."""
+
 SECTION = re.compile(r"(Args|Returns|Raises|Attributes|Yields|Example|Examples|Note):$")
 
 
@@ -133,6 +138,13 @@ def in_section(lines):
     return False
 
 
+def keep_units(app, doctree):
+    """Have no line end between a number and its unit."""
+    for text in list(doctree.findall(nodes.Text)):
+        if not isinstance(text.parent, nodes.literal | nodes.literal_block | nodes.raw) and UNIT.search(text):
+            text.parent.replace(text, nodes.Text(UNIT.sub("\N{NO-BREAK SPACE}", text)))
+
+
 def make_accessible(app, page, template, context, doctree):
     """Let the keyboard scroll blocks of code and tables, and give the headings of the navigation their level."""
     if "body" in context:
@@ -157,4 +169,5 @@ def setup(app):
     reference_pages.write_all(HERE / "generated", more)
     app.connect("autodoc-skip-member", skip_pydantic)
     app.connect("autodoc-process-docstring", as_restructured, priority=1)
+    app.connect("doctree-read", keep_units)
     app.connect("html-page-context", make_accessible, priority=900)  # after the theme has made its navigation

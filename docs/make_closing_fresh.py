@@ -27,7 +27,7 @@ TABLES = HERE / "data" / "closing-fresh"
 FIGURES = HERE / "images" / "closing-fresh"
 FALL_HEAD = (
     "observed",
-    "controllers",
+    "kind",
     "numbers",
     "RMS gap before",
     "after",

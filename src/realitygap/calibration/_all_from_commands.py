@@ -15,10 +15,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
-from cmaes import CMA
 from numpy.typing import NDArray
 
 from realitygap.platforms import Play, Rehearsal, SimEnsemble
@@ -32,6 +31,9 @@ from ._prior import Floats, Parameter, numbers_of, standard_of
 from ._shots import shots_of
 from ._single_commands import MOST_OFF, NOISE, PARTS, SLIP, places_of, values_at
 from ._tempering import sample_posterior
+
+if TYPE_CHECKING:
+    from cmaes import CMA
 
 F = TypeVar("F", bound=np.floating)
 
@@ -283,6 +285,8 @@ class _Fit:
 
     def _strategy(self, center: Floats, spread: float, shape: Floats) -> CMA:
         """Return a strategy that begins at places (p,), with a spread and a shape (p, p) of its steps."""
+        from cmaes import CMA  # imports SciPy's statistics, which most commands can do without
+
         return CMA(
             mean=np.clip(center, 1e-3, 1 - 1e-3), sigma=spread, cov=shape, population_size=SIZE,
             bounds=np.tile([0.0, 1.0], (len(center), 1)), seed=int(self.rng.integers(2**31)),

@@ -22,6 +22,9 @@ from ._commands import COMMANDS, root_help
 _COMPLETION = "_REALITYGAP_COMPLETE"
 """Variable that the scripts of `--show-completion` set."""
 
+_N_YOUNG = 50_000
+"""New objects between two searches for garbage. Imports make half a million, which live to the end."""
+
 if TYPE_CHECKING:
     import typer
 
@@ -58,6 +61,8 @@ def main() -> None:
     A terminal without some letter shows a question mark in its place.
     """
     warnings.showwarning = _show_warning
+    if 0 < gc.get_threshold()[0] < _N_YOUNG:
+        gc.set_threshold(_N_YOUNG)
     # Python ends with a search for garbage among all objects, which takes a second after a report
     atexit.register(gc.freeze)
     for stream in (sys.stdout, sys.stderr):

@@ -129,6 +129,13 @@ def _install_new(context: Any) -> None:
         context.install_registry(registry)
 
 
+def _postpone_search() -> None:
+    """Leave what was made while compiling to a later search for garbage, which takes half a second."""
+    if not gc.get_freeze_count():
+        gc.freeze()
+        gc.unfreeze()  # into the oldest generation
+
+
 class _Entry(CompilerBase):
     """For calls from Python."""
 
@@ -156,6 +163,7 @@ class _Entry(CompilerBase):
             return super().compile_extra(function)
         finally:
             if collecting:
+                _postpone_search()
                 gc.enable()
 
 

@@ -72,6 +72,7 @@ class Kernel:
         *,
         stage: bool = False,
         shared: bool = False,
+        unroll: bool = False,
     ) -> None:
         functools.update_wrapper(self, function)
         self.py_func = function
@@ -80,7 +81,8 @@ class Kernel:
             # Python must never call it: without a wrapper that ends the process. Numba's type holds it weakly.
             self._inner = numba.njit(**options, no_cpython_wrapper=True)(function)
             if shared and CACHE_FOLDER is not None:
-                pipeline.share(self._inner, SealedCache(function, CACHE_FOLDER, "shared"), stage=stage)
+                cache = SealedCache(function, CACHE_FOLDER, "shared")
+                pipeline.share(self._inner, cache, stage=stage, unroll=unroll)
                 self._entry = numba.njit(**options)(_forward(function, self))
             else:
                 pipeline.shorten(self._inner, inner=True, stage=stage)
@@ -166,11 +168,18 @@ def shared(function: F) -> F:
     return Kernel(function, KERNEL, shared=True)  # type: ignore[return-value]
 
 
+def shared_lanes(function: F) -> F:
+    """A `shared` kernel most of whose work is in loops over lanes, which are worth unrolling."""
+    if numba.config.DISABLE_JIT:
+        return function
+    return Kernel(function, KERNEL, shared=True, unroll=True)  # type: ignore[return-value]
+
+
 def shared_stage(function: F) -> F:
     """A `shared` kernel whose arrays must not overlap, as those of a `stage`."""
     if numba.config.DISABLE_JIT:
         return function
-    return Kernel(function, KERNEL, stage=True, shared=True)  # type: ignore[return-value]
+    return Kernel(function, KERNEL, stage=True, shared=True, unroll=True)  # type: ignore[return-value]
 
 
 def inlined(function: F) -> F:

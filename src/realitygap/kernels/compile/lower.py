@@ -7,6 +7,7 @@ import operator
 from collections import Counter
 from typing import Any
 
+import llvmlite.binding
 from llvmlite import ir as llvm
 from numba import _dynfunc
 from numba.core import analysis, ir, lowering, types, typing
@@ -230,6 +231,15 @@ def _tidy(library: Any, module: Any) -> None:
         passes.run(function, builder)
 
 
+def _optimize(library: Any, unroll: bool) -> None:
+    """Optimize a whole library, once; Numba's first round is for what counts who holds arrays."""
+    options = llvmlite.binding.create_pipeline_tuning_options(speed_level=3)
+    options.loop_vectorization = True
+    options.loop_unrolling = unroll
+    builder = llvmlite.binding.create_pass_builder(library._codegen._tm, options)
+    builder.getModulePassManager().run(library._final_module, builder)
+
+
 @register_pass(mutates_CFG=True, analysis_only=False)
 class LowerForCallers(LowerKernel):
     """Lowers a function to what its callers link, and leaves optimizing and machine code to them.
@@ -281,6 +291,7 @@ class LowerShared(LowerForCallers):
     def _library(self, state: Any) -> Any:
         library = _make_library(state)
         library._symbol = state.symbol
+        library._optimize_final_module = functools.partial(_optimize, library, state.unroll)
         return library
 
     def _linked(self, library: Any) -> list[Any]:

@@ -107,7 +107,8 @@ def array_parts(context: Any, array: Any, data: Any, shape: list[Any], strides: 
     """
     model = context.data_model_manager[array]
     kinds = model.get_value_type().elements
-    item_size = context.get_abi_sizeof(context.get_data_type(array.dtype))
+    # Numba asks LLVM, which parses a module for it.
+    item_size = 1 if array.dtype == types.boolean else array.dtype.bitwidth // 8
 
     def product(first: int, start: int) -> Callable[[Any], Any]:
         def make(builder: Any) -> Any:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import functools
 import gc
 import hashlib
+import operator
 from typing import Any
 
 from numba import _dynfunc
@@ -15,6 +16,8 @@ from numba.core import itanium_mangler, lowering, types, typing
 from numba.core.compiler import CompilerBase, Flags, compile_result
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.compiler_machinery import PassManager, register_pass
+from numba.core.ir_utils import build_definitions
+from numba.core.ssa import reconstruct_ssa
 from numba.core.typed_passes import (
     AnnotateTypes,
     IRLegalization,
@@ -43,6 +46,21 @@ class _Flags(Flags):
         return hash(frozenset(self._values))
 
 
+# The type of what they return for two numbers does not depend on values in the source.
+_OPERATORS = {
+    getattr(operator, name)
+    for name in (
+        "add sub mul truediv floordiv mod and_ or_ xor lshift rshift "
+        "iadd isub imul itruediv ifloordiv imod iand ior ixor ilshift irshift "
+        "lt le gt ge eq ne"
+    ).split()
+}
+
+
+def _is_number(kind: Any) -> bool:
+    return isinstance(types.unliteral(kind), (types.Number, types.Boolean))
+
+
 class _RememberedTyping:
     """The typing context, with what operations on numbers and arrays give remembered.
 
@@ -66,6 +84,8 @@ class _RememberedTyping:
         if self._is_lowered_here and is_min_or_max(function, arguments):
             kind = self._context.unify_types(*map(types.unliteral, arguments))
             return typing.signature(kind, *arguments)
+        if function.typing_key in _OPERATORS and all(map(_is_number, arguments)):
+            arguments = tuple(map(types.unliteral, arguments))
         key = (function.typing_key, arguments)
         try:
             owner, signature = self._known[key]
@@ -100,17 +120,41 @@ class InferTypes(NopythonTypeInference):
             state.typingctx = context
 
 
+@register_pass(mutates_CFG=True, analysis_only=False)
+class SplitVariables(ReconstructSSA):
+    """Numba's step, without the lifetimes of variables, which nothing reads."""
+
+    _name = "split_variables"
+
+    def run_pass(self, state: Any) -> bool:
+        """Give each assignment its own variable; return that the function changed."""
+        state.func_ir = reconstruct_ssa(state.func_ir)
+        state.func_ir._definitions = build_definitions(state.func_ir.blocks)
+        return True
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class StripPhis(PreLowerStripPhis):
+    """Numba's step, without the lifetimes of variables, which nothing reads."""
+
+    _name = "strip_phis_of_kernel"
+
+    def run_pass(self, state: Any) -> bool:
+        """Replace what chooses between the variables of several blocks; return that the function changed."""
+        state.func_ir = self._strip_phi_nodes(state.func_ir)
+        state.func_ir._definitions = build_definitions(state.func_ir.blocks)
+        return True
+
+
 # Of Numba's thirty steps those that kernels need: no closures, contexts, literals or formulas over whole arrays.
 BEFORE_LOWERING = (
     TranslateByteCode,
     FixupArgs,
     IRProcessing,
     GenericRewrites,
-    ReconstructSSA,
+    SplitVariables,
     InferTypes,
-    PreLowerStripPhis,
-    IRLegalization,
-    AnnotateTypes,
+    StripPhis,
 )
 
 
@@ -150,7 +194,9 @@ class _Entry(CompilerBase):
         # What can be new since the start of this compilation is what templates of ours brought with them.
         context.refresh = functools.partial(_install_new, context)
         manager = PassManager("kernel")
-        for step in (*BEFORE_LOWERING, self.lowering, NoPythonBackend):
+        # Where a variable ends matters only to what counts who holds arrays.
+        ends = (IRLegalization,) if self.state.flags.nrt else ()
+        for step in (*BEFORE_LOWERING, *ends, AnnotateTypes, self.lowering, NoPythonBackend):
             manager.add_pass(step, step.__name__)
         manager.finalize()
         return [manager]
@@ -178,23 +224,25 @@ class _Shared(_Entry):
 
     lowering = LowerShared
     cache: Any
+    unroll: bool
 
     def define_pipelines(self) -> Any:
+        self.state.unroll = self.unroll
         self.state.symbol = self.cache.symbol(tuple(self.state.args), self.state.targetctx)
         return super().define_pipelines()
 
 
-def share(dispatcher: Any, cache: Any, *, stage: bool) -> None:
+def share(dispatcher: Any, cache: Any, *, stage: bool, unroll: bool) -> None:
     """Have a dispatcher of Numba compile for calls from other kernels, once for all of them.
 
     Args:
         dispatcher: Of Numba.
         cache: Its `SealedCache`.
         stage: As in `shorten`.
+        unroll: Whether loops are worth unrolling, which takes LLVM a third of its time.
     """
-    shorten(dispatcher, inner=True, stage=stage)
-    attributes = {"may_alias": not stage, "cache": cache}
-    dispatcher._compiler.pipeline_class = type("_Pipeline", (_Shared,), attributes)
+    attributes = {"may_alias": not stage, "cache": cache, "unroll": unroll}
+    _set_pipeline(dispatcher, type("_Pipeline", (_Shared,), attributes))
     dispatcher.compile = functools.partial(_compile_shared, dispatcher, cache)
 
 
@@ -205,7 +253,7 @@ def _compile_shared(dispatcher: Any, cache: Any, signature: Any) -> Any:
             context = dispatcher.targetctx
             stored = cache.load_shared(arguments, context)
             if stored is None:
-                type(dispatcher).compile(dispatcher, signature)
+                _compile_inner(dispatcher, signature)
                 result = dispatcher.overloads[arguments]
                 fndesc, library = result.fndesc, result.library
                 fndesc.typemap = fndesc.calltypes = None
@@ -240,6 +288,21 @@ def shorten(dispatcher: Any, *, inner: bool, stage: bool) -> None:
         inner: Called by kernels alone.
         stage: The arrays among its arguments never overlap: so loops over them can be taken side by side.
     """
-    compiler = dispatcher._compiler
-    compiler.pipeline_class = type("_Pipeline", (_Inner if inner else _Entry,), {"may_alias": not stage})
-    compiler._customize_flags = _Flags
+    _set_pipeline(dispatcher, type("_Pipeline", (_Inner if inner else _Entry,), {"may_alias": not stage}))
+    if inner:
+        dispatcher.compile = functools.partial(_compile_inner, dispatcher)
+
+
+def _set_pipeline(dispatcher: Any, pipeline: Any) -> None:
+    dispatcher._compiler.pipeline_class = pipeline
+    dispatcher._compiler._customize_flags = _Flags
+
+
+def _compile_inner(dispatcher: Any, signature: Any) -> Any:
+    """Compile for calls from other kernels, without the clocks that Numba reads at each call of LLVM."""
+    arguments = tuple(signature)
+    with global_compiler_lock:
+        if arguments not in dispatcher.overloads:
+            with dispatcher._compiling_counter:
+                dispatcher.add_overload(dispatcher._compiler.compile(arguments, None))
+    return dispatcher.overloads[arguments].entry_point

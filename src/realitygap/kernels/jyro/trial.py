@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from realitygap.kernels.compile.decorators import inlined, kernel, shared, shared_stage, stage
+from realitygap.kernels.compile.decorators import inlined, kernel, shared_lanes, shared_stage, stage
 from realitygap.kernels.math.bits import unmasked
 from realitygap.kernels.math.elementary import sin_cos_of_turns
 from realitygap.kernels.math.lanes import LANES, copy_row, fill, keep_where_low, make_lanes
@@ -399,7 +399,7 @@ def make_block(scene, neat, hidden_room):
     return lanes, make_wiring(scene.heading, neat, hidden_room)
 
 
-@shared
+@shared_lanes
 def run_block(scene, rules, neat, wiring, key, counters, first, n_lanes, lanes, cells, counts, trace):
     """Drive the networks of a block, from the start for all steps.
 

@@ -119,6 +119,61 @@ def test_texts_that_are_no_values_stay_in_their_fields(lab, visit):
     page.get_by_role("alert").filter(has_text="Name: This field is empty. Enter a value.").wait_for()
 
 
+WATCH_NAMES = """() => {
+  window.names = new Set();
+  const look = () => {
+    const name = [...document.querySelectorAll("label")].find((it) => it.textContent === "Name");
+    const field = name && document.getElementById(name.getAttribute("for"));
+    if (field && field.checkVisibility()) window.names.add(field.value);
+    requestAnimationFrame(look);
+  };
+  look();
+}"""
+
+
+def test_form_cannot_be_edited_before_a_changed_file_is_read(lab, visit):
+    page = visit("new")
+    name = page.get_by_label("Name", exact=True).first
+    name.wait_for()
+    page.get_by_role("tab", name="File").click()
+    file = page.get_by_label("Study file")
+    file.fill(file.input_value().replace("my-study", "from-file"))
+    name.wait_for(state="detached")
+    page.evaluate(WATCH_NAMES)
+    page.get_by_role("tab", name="Form").click()
+    name.wait_for()
+    assert page.evaluate("() => [...window.names]") == ["from-file"]
+    name.fill("from-form")
+    page.wait_for_timeout(600)  # a field waits a moment for more letters
+    page.get_by_role("tab", name="File").click()
+    file.wait_for()
+    assert 'name = "from-form"' in file.input_value()
+    page.get_by_role("tab", name="Form").click()
+    name.wait_for()
+    assert name.input_value() == "from-form"
+
+
+def test_file_with_a_mistake_keeps_its_text_until_it_is_corrected_or_discarded(lab, visit):
+    page = visit("new")
+    name = page.get_by_label("Name", exact=True).first
+    page.get_by_role("tab", name="File").click()
+    file = page.get_by_label("Study file")
+    before = file.input_value()
+    file.fill(f"{before}\n[neat")
+    page.get_by_role("tab", name="Form").click()
+    page.get_by_role("alert").filter(has_text="Expected a study file").wait_for()
+    page.locator("[role=tab][aria-selected=true]", has_text="File").wait_for()
+    assert file.input_value().endswith("[neat")
+    assert not name.is_visible()
+    page.get_by_role("button", name="Discard the changes of the file").click()
+    page.get_by_role("alert").filter(has_text="Expected a study file").wait_for(state="hidden")
+    assert file.input_value() == before
+    page.get_by_role("tab", name="Form").click()
+    name.wait_for()
+    page.get_by_role("button", name="Start study").click()
+    page.wait_for_url("**/study/my-study")
+
+
 def test_an_empty_name_is_asked_for(lab, visit):
     page = visit("new")
     page.get_by_label("Name", exact=True).first.fill("")

@@ -110,7 +110,9 @@ class _Page:
         self._is_open = False
         # entered texts that are no values, by field: the draft cannot hold them
         self._unread: dict[str, str] = {}
-        self._turned = ""
+        self._read_text = ""
+        self._is_read = True  # False while the draft lacks what the file has
+        self._n_takes = 0
 
     def show(self) -> None:
         with ui.row().classes("lab-row"):
@@ -128,8 +130,9 @@ class _Page:
             form_tab, file_tab = ui.tab("Form"), ui.tab("File")
         self._show_summary()
         self._form_part = ui.refreshable(self._show_form)
-        with ui.tab_panels(tabs, value=form_tab, on_change=self._turn).classes("lab-panels"):
-            with ui.tab_panel(form_tab):
+        self._panels = ui.tab_panels(tabs, value=form_tab, on_change=self._turn).classes("lab-panels")
+        with self._panels:
+            with ui.tab_panel(form_tab), ui.element("div") as self._form_box:
                 self._form_part()
             with ui.tab_panel(file_tab):
                 self._text = (
@@ -140,17 +143,20 @@ class _Page:
                         "input-style='font-family: monospace; min-height: 24rem'"
                     )
                 )
+                self._discard = ui.button("Discard the changes of the file", on_click=self._discard_text)
+                self._discard.props("outline no-caps").set_visibility(False)
         self._is_text = False
         with ui.element("div").classes("lab-actions"):
             with ui.row().classes("lab-row") as self._waiting:
                 ui.spinner()
-                ui.label("Checking the study file…").props('role="status"')
+                self._waiting_for = ui.label("").props('role="status"')
                 ui.button("Cancel", on_click=self._cancel).props("flat no-caps")
             self._waiting.set_visibility(False)
             self._size = ui.label("").props('role="status"')
             with ui.row().classes("lab-row"):
-                ui.button("Check", on_click=self._check_only).props("outline no-caps")
-                ui.button("Start study", on_click=self._start).props("unelevated no-caps")
+                check = ui.button("Check", on_click=self._check_only).props("outline no-caps")
+                start = ui.button("Start study", on_click=self._start).props("unelevated no-caps")
+        self._buttons = (check, start)
 
     def _show_summary(self) -> None:
         """Show the place for mistakes, above form and file."""
@@ -181,25 +187,58 @@ class _Page:
         await self._take(text)
 
     async def _take(self, text: str) -> None:
-        """Show the text of a file in the form; a text with mistakes is shown as it is."""
-        self._unread.clear()
+        """Show the text of a file in the form; a text with mistakes stays in the tab File.
+
+        The form is hidden until the text is read: what is entered in the meantime would be lost.
+        """
+        self._n_takes += 1
+        take = self._n_takes
         self._text.value = text
+        self._is_read = False
+        self._show_reading(is_reading=True)
         found = await self._ask("read", text)
+        if take != self._n_takes:  # another text was chosen
+            return
+        self._show_reading(is_reading=False)
         if "data" not in found:
+            self._discard.set_visibility(True)
+            self._is_text = True
+            self._panels.value = "File"
             self._show_mistakes(found)
             return
+        self._unread.clear()
         self._form.show_problems({})
         self._draft.data = found["data"]
-        self._form_part.refresh()
+        self._is_read, self._read_text = True, text.strip()
+        await self._form_part.refresh()
+        self._discard.set_visibility(False)
+        self._form_box.set_visibility(not self._is_text)
+
+    def _show_reading(self, *, is_reading: bool) -> None:
+        self._form_box.set_visibility(False)
+        for button in self._buttons:
+            button.set_enabled(not is_reading)
+
+    def _discard_text(self) -> None:
+        """Show what the form has in place of a text with mistakes."""
+        self._is_read = True
+        self._discard.set_visibility(False)
+        self._form.show_problems({})
+        self._text.value = written_form(self._draft.data)
+        self._read_text = text_of(self._text)
 
     async def _turn(self, event: events.ValueChangeEventArguments[Any]) -> None:
         """Turn between form and file, which show the same study."""
         self._is_text = event.value == "File"
         if self._is_text:
-            self._text.value = self._turned = written_form(self._draft.data)
-        elif (text := text_of(self._text)) != self._turned.strip():
-            # reading takes a moment, and then replaces what was entered since
+            self._form_box.set_visibility(False)  # until it is known whether the file has changed
+            if self._is_read:
+                self._text.value = written_form(self._draft.data)
+                self._read_text = text_of(self._text)
+        elif (text := text_of(self._text)) != self._read_text or not self._is_read:
             await self._take(text)
+        else:
+            self._form_box.set_visibility(True)
 
     # the form
 
@@ -343,6 +382,7 @@ class _Page:
             return {"mistakes": str(error)}
         if check is None:
             return {"mistakes": "The lab is closing."}
+        self._waiting_for.text = f"{'Reading' if do == 'read' else 'Checking'} the study file…"
         self._waiting.set_visibility(True)
         try:
             return await asyncio.wrap_future(check.found)

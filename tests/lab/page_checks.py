@@ -41,6 +41,8 @@ _SMALL = """() => [...document.querySelectorAll(
   .filter((it) => it.checkVisibility()).map((it) => [it, it.getBoundingClientRect()])
   .filter(([it, { width, height }]) => width > 1 && (Math.round(width) < 44 || Math.round(height) < 44))
   .map(([it, { width, height }]) => `${Math.round(width)} x ${Math.round(height)} px: ${it.outerHTML.slice(0, 120)}`)"""
+_BROAD = """() => [...document.querySelectorAll(".lab-main .q-btn")].filter((it) => it.checkVisibility()
+  && it.clientWidth > 400).map((it) => `${it.clientWidth} px broad: ${it.textContent}`)"""
 _WATCH = """() => {
   window.tooManyStates = [];
   const look = () => {
@@ -109,6 +111,12 @@ def wide(page: Any) -> list[str]:
 def small(page: Any) -> list[str]:
     """Return the buttons, fields, and tabs that are too small for fingers: below 44 px."""
     found: list[str] = page.evaluate(_SMALL)
+    return found
+
+
+def broad(page: Any) -> list[str]:
+    """Return the buttons that are as broad as a form, which is for phones only."""
+    found: list[str] = page.evaluate(_BROAD)
     return found
 
 
@@ -181,6 +189,8 @@ def faults(page: Any, root: Path) -> list[str]:
         problems = [*wide(page), *cut(page), *(axe(page, size) if size in AXE_SIZES else [])]
         if (width, height) == PHONE:
             problems += small(page)
+        if (width, height) == DESKTOP:
+            problems += broad(page)
         found += [f"{size}: {problem}" for problem in problems]
     return found
 

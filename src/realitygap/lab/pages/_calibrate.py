@@ -245,6 +245,8 @@ class _Page:
         card.on("click", lambda: self._choose(kind))
         card.on("keydown.space.prevent", lambda: self._choose(kind))
         card.on("keydown.enter.prevent", lambda: self._choose(kind))
+        for key, turn in {"down": 1, "right": 1, "up": -1, "left": -1}.items():
+            card.on(f"keydown.{key}.prevent", lambda turn=turn: self._turn(kind, turn))
         self._mark(card, is_chosen=kind == self._chosen)
         return card
 
@@ -253,9 +255,17 @@ class _Page:
         for name, card in self._cards.items():
             self._mark(card, is_chosen=name == kind)
 
+    def _turn(self, kind: str, turn: int) -> None:
+        """Choose the next card or the one before, and move the focus there."""
+        kinds = list(_KINDS)
+        chosen = kinds[(kinds.index(kind) + turn) % len(kinds)]
+        self._choose(chosen)
+        ui.run_javascript(f"getHtmlElement({self._cards[chosen].id}).focus()")
+
     @staticmethod
     def _mark(card: ui.element, *, is_chosen: bool) -> None:
-        card.props(f'aria-checked="{"true" if is_chosen else "false"}" tabindex="0"')
+        """Mark a card; Tab reaches the one that is chosen."""
+        card.props(f'aria-checked="{"true" if is_chosen else "false"}" tabindex="{0 if is_chosen else -1}"')
 
     def _work_state(self) -> tuple[Any, ...] | None:
         job = self._lab.calibration

@@ -458,7 +458,11 @@ class _Page:
                     "95 % interval of the median."
                 )
         is_growing = self._standing.share < 1
-        self._table.props[":visible-columns"] = _ALL_COLUMNS if is_growing else _COLUMNS_AT_END
+        columns = _ALL_COLUMNS if is_growing else _COLUMNS_AT_END
+        if (
+            self._table.props.get(":visible-columns") != columns
+        ):  # each change draws the buttons in the rows again
+            self._table.props[":visible-columns"] = columns
         if self._table.rows != rows:
             self._table.rows = rows
 

@@ -45,6 +45,49 @@
     joining.observe(document.body, { subtree: true, childList: true, characterData: true });
   });
 
+  // A part of a page that is drawn again or hidden takes the control away that has the focus. The same control then gets
+  // it back, or else the nearest element around it that is left: from there, Tab goes on, and no key presses another
+  // button. The drive pad never gets it back, because a gamepad would drive on.
+  const WAIT_MS = 150; // until the part is complete
+  const nameOf = (it) => it.getAttribute("aria-label") || it.labels?.[0]?.textContent || it.textContent.trim();
+  const likes = (tag, name) => [...document.querySelectorAll(tag)].filter((it) => nameOf(it) === name);
+  let held = null, isReturning = false;
+  addEventListener("focusin", ({ target }) => {
+    const around = [];
+    for (let at = target.parentElement; at; at = at.parentElement) around.push(at);
+    const isNotice = target.closest(".q-notifications") !== null; // closed, it leads back to the control before it
+    const before = isNotice && held ? (held.isNotice ? held.before : held) : null;
+    const [tag, name] = [target.tagName, nameOf(target)];
+    held = { target, tag, name, around, isNotice, before, index: likes(tag, name).indexOf(target) };
+  });
+  const isThere = (it) => it.isConnected && it.checkVisibility();
+  const isLost = () => held !== null && document.activeElement === document.body && !isThere(held.target);
+  const giveBack = () => {
+    isReturning = false;
+    if (!isLost()) return;
+    if (held.before) {
+      held = held.before;
+      if (isThere(held.target)) return held.target.focus({ preventScroll: true });
+    }
+    const isUsable = (it) => it.checkVisibility() && !it.disabled && !it.closest("[aria-disabled=true], [role=application]");
+    const same = likes(held.tag, held.name).filter(isUsable);
+    const control = held.name && same[Math.min(held.index, same.length - 1)];
+    const left = control || held.around.find(isThere);
+    if (!left || left === document.body) return;
+    if (!control && left.tabIndex < 0) {
+      left.tabIndex = -1;
+      left.classList.add("lab-place");
+    }
+    left.focus({ preventScroll: true });
+  };
+  const losing = new MutationObserver(() => {
+    if (isReturning || !isLost()) return;
+    isReturning = true;
+    setTimeout(giveBack, WAIT_MS);
+  });
+  const changes = { subtree: true, childList: true, attributeFilter: ["class", "style"] };
+  addEventListener("DOMContentLoaded", () => losing.observe(document.body, changes));
+
   // A lab that was started again has another token. Its answer then states where the new one is.
   const reloadIfRefused = async () => {
     const answer = await fetch(location.href, { method: "HEAD" }).catch(() => null);

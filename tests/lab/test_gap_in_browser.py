@@ -29,6 +29,7 @@ def test_gap_is_measured_with_its_progress_and_mistakes_are_shown_at_their_field
         ({"Name": "../first"}, "You entered '../first'."),
         ({"Name": "first", "Simulator": "sim:/etc/passwd"}, "would be a file outside"),
         ({"Simulator": "sim", "Target": "nowhere"}, "'nowhere' is no platform"),
+        ({"Target": "scribbler:/dev/rfcomm0"}, "a gap needs a target without an operator"),
         ({"Target": "jyro", "Trials_per_controller": "0"}, "Enter a whole number from 1 to 4096."),
     ):
         measure(page, **fields)

@@ -102,6 +102,15 @@ def test_commands_that_are_no_numbers_move_nothing(hand):
     assert hand.outcome is None
 
 
+def test_what_a_visitor_asked_for_is_known_until_it_is_done(hand):
+    for what in ("place", "preflight", "picture"):
+        hand.want(what)
+        assert hand.doing == what
+        wait_for(lambda: not hand.doing)
+    assert hand.preflight is not None
+    assert hand.picture
+
+
 def test_a_robot_that_is_not_there_is_told_in_words(tmp_path):
     hand = Hand({"port": "/dev/no-such-port"}, tmp_path, lambda: None)
     wait_for(lambda: hand.is_over)

@@ -122,7 +122,10 @@ def test_its_preflight_and_its_picture_are_shown(visit):
     page.get_by_role("button", name="Run pre-flight").click()
     page.get_by_text("Pre-flight check passed.").wait_for()
     page.get_by_role("button", name="Take picture").click()
-    page.get_by_alt_text("Picture of the robot's camera").wait_for()
+    page.locator(".lab-senses").get_by_alt_text("Picture of the robot's camera").wait_for()
+    assert (
+        page.get_by_text("Scribby", exact=True).count() == 1
+    )  # the pre-flight does not repeat the facts above
     page.get_by_text(re.compile(r"^\d\.\d\d\sV$")).first.wait_for()
 
 

@@ -32,6 +32,7 @@ class Hand(Job):
         picture: PNG in base64; empty before.
         arena: Where an emulated robot drives; None where nobody sees it.
         line: (x, y) [m] where it has been.
+        doing: What it is doing since a visitor asked for it: preflight, picture, or place; empty otherwise.
         said: What it refused last; empty where nothing.
         n_stops: How often somebody pressed stop.
 
@@ -59,7 +60,7 @@ class Hand(Job):
         self.picture = ""
         self.arena: Arena | None = None
         self.line: list[list[float]] = []
-        self.said = ""
+        self.doing = self.said = ""
         self.n_live = 0
         self.n_stops = 0
         super().__init__({"work": "robot", **order}, root, changed)
@@ -113,8 +114,9 @@ class Hand(Job):
 
     def want(self, what: str) -> None:
         """Ask for preflight, picture, or place."""
-        self.said = ""
+        self.doing, self.said = what, ""
         self._child.tell({"do": "want", "what": what})
+        self._changed()
 
     def _on_met(self, message: dict[str, Any]) -> None:
         self.n_sensors, self.more = message["n_sensors"], message["more"]
@@ -139,13 +141,13 @@ class Hand(Job):
         self.battery_v = message["volts"]
 
     def _on_preflight(self, message: dict[str, Any]) -> None:
-        self.preflight = message
+        self.preflight, self.doing = message, ""
 
     def _on_picture(self, message: dict[str, Any]) -> None:
-        self.picture = message["png"]
+        self.picture, self.doing = message["png"], ""
 
     def _on_placed(self, message: dict[str, Any]) -> None:
-        self.line = []
+        self.line, self.doing = [], ""
 
     def _on_refused(self, message: dict[str, Any]) -> None:
-        self.said = message["text"]
+        self.said, self.doing = message["text"], ""

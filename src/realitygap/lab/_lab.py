@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from realitygap.errors import StudyError
-from realitygap.platforms import names_a_port
+from realitygap.platforms import names_a_port, platform_of
 from realitygap.records import refuse_links
 from realitygap.runs import NAME_PATTERN
 from realitygap.settings import shown
@@ -307,6 +307,12 @@ class Lab:
                 refuse_platform(self.root, spec)
         with in_field("controllers"):
             refuse_outside(self.root, values["controllers"])
+        if not values.get("witness") and platform_of(values["target"]).needs_person:
+            raise FieldError(
+                "target",
+                "In the lab, a gap needs a target without an operator. For an emulator in another program, enter its "
+                "witness. For a robot, use the command: realitygap gap",
+            )
         with self._lock:
             if self.gap is not None and not self.gap.is_over:
                 raise StudyError("A gap is being measured. Wait until it is complete, or stop it.")

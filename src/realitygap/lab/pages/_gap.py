@@ -113,8 +113,8 @@ class _Page:
             "Target",
             "jyro",
             is_needed=True,
-            explanation="jyro, twin:FILE, scribbler:PORT, or thymio:PORT. Emulated robots: "
-            f"{', '.join(emulated_robots())}.",
+            explanation=f"jyro, twin:FILE, or an emulated robot: {', '.join(emulated_robots())}. An emulator in "
+            "another program, such as scribbler:socket://HOST:PORT, also needs its witness.",
         )
         with ui.element("div").classes("lab-fields"):
             self._numbers = {

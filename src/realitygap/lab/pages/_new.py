@@ -135,6 +135,8 @@ class _Page:
             with ui.tab_panel(form_tab), ui.element("div") as self._form_box:
                 self._form_part()
             with ui.tab_panel(file_tab):
+                self._discard = ui.button("Discard the changes of the file", on_click=self._discard_text)
+                self._discard.props("outline no-caps").set_visibility(False)
                 self._text = (
                     ui.textarea(value=written_form(self._draft.data))
                     .classes("lab-file")
@@ -143,8 +145,6 @@ class _Page:
                         "input-style='font-family: monospace; min-height: 24rem'"
                     )
                 )
-                self._discard = ui.button("Discard the changes of the file", on_click=self._discard_text)
-                self._discard.props("outline no-caps").set_visibility(False)
         self._is_text = False
         with ui.element("div").classes("lab-actions"):
             with ui.row().classes("lab-row") as self._waiting:

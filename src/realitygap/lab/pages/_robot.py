@@ -20,7 +20,7 @@ from ._frame import framed, hint, section, visitor_of
 from ._grid import CellGrid
 from ._handover import show_holder
 from ._notices import attempt
-from ._part import watching
+from ._part import Part, watching
 
 LIVE_S = 0.05
 """Time between two updates of the readings [s]."""
@@ -37,6 +37,11 @@ _RANGE: dict[int, tuple[_Sensor, ...]] = {
     ),
 }
 """Range sensors of a robot by their number: a Scribbler with a Fluke, one without, and a Thymio."""
+_DOING = {  # shown meanwhile: over Bluetooth, a picture takes seconds
+    "preflight": "Running the pre-flight…",
+    "picture": "Taking a picture…",
+    "place": "Putting the robot at its start…",
+}
 _LIGHT = tuple(
     (f"{place} light", "0 bright to 65,535 dark", 65_535.0) for place in ("Left", "Center", "Right")
 )
@@ -100,7 +105,7 @@ class _Page:
         hand = self._lab.hand
         shown = None
         if hand is not None:
-            facts = (hand.preflight, hand.said, len(hand.picture), hand.battery_v)
+            facts = (hand.preflight, hand.said, hand.doing, hand.picture, hand.battery_v)
             shown = (id(hand), hand.label, hand.outcome, *facts)
         return shown, self._lab.operator, self._lab.robot_job
 
@@ -112,7 +117,9 @@ class _Page:
             return
         before, self._seen = self._seen, now
         if self._is_same_robot(before, now):
-            self._facts.refresh()
+            self._doing.text = _DOING.get(self._lab.hand.doing, "") if self._lab.hand is not None else ""
+            for part in (self._facts, self._picture):
+                part.look()
         else:
             self._ports = await run.io_bound(list_ports) or []
             self._part.refresh()
@@ -218,8 +225,12 @@ class _Page:
         if not may:
             show_holder(self._lab, self._visitor)
         self._show_panels(hand)
-        self._facts = ui.refreshable(lambda: self._show_facts(hand))
-        self._facts()
+        facts = ui.column().classes("lab-cards")
+        self._facts = Part(
+            lambda: (hand.preflight, hand.said, hand.battery_v), lambda _: self._show_facts(hand)
+        )
+        with facts:
+            self._facts.show()
 
     def _show_panels(self, hand: Hand) -> None:
         """Show the pad and the actions on the left, the position and the readings on the right."""
@@ -246,6 +257,8 @@ class _Page:
                     if kind == "raw" or kind in hand.more:
                         with ui.element("div").classes("lab-gauges"):
                             self._gauges[kind] = [_Gauge(*sensor) for sensor in sensors]
+                self._picture = Part(lambda: hand.picture, _show_picture)
+                self._picture.show()
 
     def _show_pad(self, hand: Hand) -> None:
         self._pad = DrivePad(
@@ -273,6 +286,7 @@ class _Page:
                     "outline no-caps"
                 ).set_enabled(may)
             ui.button("Disconnect", on_click=hand.ask_to_end).props("flat no-caps").set_enabled(may)
+        self._doing = ui.label(_DOING.get(hand.doing, "")).props('role="status"')
         hint("During the pre-flight, the robot turns on the spot.")
 
     def _show_facts(self, hand: Hand) -> None:
@@ -289,11 +303,8 @@ class _Page:
                 ui.label(problem).classes("lab-problem")
             if not hand.preflight["problems"]:
                 ui.label("Pre-flight check passed.").classes("lab-ok")
-            _show_list(hand.preflight["facts"])
-        if hand.picture:
-            ui.element("img").props(
-                f'src="data:image/png;base64,{hand.picture}" alt="Picture of the robot\'s camera"'
-            ).classes("lab-picture")
+            known = hand.about
+            _show_list({key: value for key, value in hand.preflight["facts"].items() if key not in known})
 
     def _is_off(self, hand: Hand) -> bool:
         """Return True if the pad is off: the robot is lost, does not answer, or is another visitor's."""
@@ -354,6 +365,14 @@ class _Gauge:
         """Show a raw reading."""
         self._bar.value = round(min(max(reading / self._most, 0.0), 1.0), 3)
         self._text.text = f"{reading:,.0f}"
+
+
+def _show_picture(picture: str) -> None:
+    if picture:
+        section("Camera")
+        ui.element("img").props(
+            f'src="data:image/png;base64,{picture}" alt="Picture of the robot\'s camera"'
+        ).classes("lab-picture")
 
 
 def _show_list(facts: dict[str, Any]) -> None:

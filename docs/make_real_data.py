@@ -40,8 +40,18 @@ def verdicts(found: Mapping[str, Any]) -> list[tuple[bool, str, str, str]]:
     over = wall["errors"][FITTED] / wall["errors"][TABLE]
     rows = [
         ("Khepera at a wall: error of readings", wall["errors"][FITTED], limits["wall"], "{:.3f}"),
-        ("the same, where 0.03 < reading < 1", between[FITTED], limits["wall between"], "{:.3f}"),
-        ("the same, over the error of the lookup table", over, limits["wall over neighbors"], "{:.2f}"),
+        (
+            "Khepera at a wall: error of readings between 0.03 and 1",
+            between[FITTED],
+            limits["wall between"],
+            "{:.3f}",
+        ),
+        (
+            "Khepera at a wall: error over that of the lookup table",
+            over,
+            limits["wall over neighbors"],
+            "{:.2f}",
+        ),
         ("motors: error in percent of full speed, median", median, limits["motors"], "{:.2f}"),
         ("motors: the worst of 28", worst, limits["motors"], "{:.2f}"),
         (
@@ -91,10 +101,16 @@ def by_condition(by: Mapping[str, Mapping[str, Mapping[str, float]]]) -> str:
 def fitted(rows: Sequence[Sequence[Any]]) -> str:
     """Parameters with their intervals."""
     cells = [
-        (f"`{name}`", f"{estimate:.3g} {unit}".strip(), f"{low:.3g} to {high:.3g}")
+        (f"`{name}`", f"{digits(estimate)} {unit}".strip(), f"{digits(low)} to {digits(high)}")
         for name, estimate, low, high, unit in rows
     ]
     return _table(("parameter", "estimate", "90 % interval"), cells)
+
+
+def digits(value: float) -> str:
+    """A number with three digits that count."""
+    rounded = float(f"{value:.3g}")
+    return f"{rounded:,.0f}" if abs(rounded) >= 1000 else f"{rounded:.3g}"
 
 
 def labyrinth(found: Mapping[str, Any]) -> str:

@@ -178,7 +178,10 @@ def variants_table(variants: Mapping[str, float]) -> str:
 
 def digits(value: float) -> str:
     """A number with three digits that count."""
-    return f"{value:,.0f}" if value >= 100 else f"{value:.3g}"
+    rounded = float(f"{value:.3g}")
+    if rounded >= 1e6:
+        return f"{rounded / 1e6:.3g} million"
+    return f"{rounded:,.0f}" if rounded >= 100 else f"{rounded:.3g}"
 
 
 def _table(head: list[str], rows: list[tuple[str, ...]]) -> str:

@@ -476,8 +476,11 @@ def test_tables_on_the_page_of_speed_follow_from_its_figures():
         }
         for name in make_speed.FIGURES
     }
+    assert [make_speed.digits(value) for value in (52_614_339, 810_209, 5.834)] == [
+        "52.6 million", "810,000", "5.83",
+    ]  # fmt: skip
     table = make_speed.peers_table({"figures": figures})
-    assert "| **1,234** | robot-steps a second, one core | Jyro | 5,000/s (1 to 3) | 2/s (1 to 3) |" in table
+    assert "| **1,230** | robot-steps a second, one core | Jyro | 5,000/s (1 to 3) | 2/s (1 to 3) |" in table
     assert "| – | robot-steps a second, one core | MultiNEAT | not measured: not done after 120 s |" in table
     assert make_speed.ahead_text(figures).startswith("No peer is faster")
     figures["realism_boxes"]["jyro"]["ratio"] = 0.5
@@ -601,6 +604,7 @@ def test_the_figure_of_sensors_is_drawn_from_readings_of_the_kernels():
 
 def test_page_on_robots_of_other_people_shows_missed_goals_first():
     make_real_data = _load("make_real_data")
+    assert [make_real_data.digits(value) for value in (4381.2, 0.00317, 22.0)] == ["4,380", "0.00317", "22"]
     found = json.loads((DOCS / "data/real-data.json").read_text("utf-8"))
     results = [row[0] for row in make_real_data.verdicts(found)]
     assert results == sorted(results)

@@ -12,6 +12,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from realitygap._numbers import significant
+
 DATA = Path(__file__).parent / "data" / "real-data.json"
 LABEL = "REAL (others' robots)"
 FITTED, NOMINAL, TABLE = "fitted", "nominal numbers", "lookup table"
@@ -101,16 +103,14 @@ def by_condition(by: Mapping[str, Mapping[str, Mapping[str, float]]]) -> str:
 def fitted(rows: Sequence[Sequence[Any]]) -> str:
     """Parameters with their intervals."""
     cells = [
-        (f"`{name}`", f"{digits(estimate)} {unit}".strip(), f"{digits(low)} to {digits(high)}")
+        (
+            f"`{name}`",
+            f"{significant(estimate, 3)} {unit}".strip(),
+            f"{significant(low, 3)} to {significant(high, 3)}",
+        )
         for name, estimate, low, high, unit in rows
     ]
     return _table(("parameter", "estimate", "90 % interval"), cells)
-
-
-def digits(value: float) -> str:
-    """A number with three digits that count."""
-    rounded = float(f"{value:.3g}")
-    return f"{rounded:,.0f}" if abs(rounded) >= 1000 else f"{rounded:.3g}"
 
 
 def labyrinth(found: Mapping[str, Any]) -> str:

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 from rich.table import Table
 from rich.text import Text
 
+from realitygap._numbers import significant
+
 from ._tables import table_of
 
 if TYPE_CHECKING:
@@ -23,11 +25,17 @@ def conditions_table(audit: Audit, title: str) -> Table:
         median = (
             "too few runs"
             if each.median_low is None or each.median_high is None
-            else f"{each.median_low:.3g} to {each.median_high:.3g}"
+            else f"{significant(each.median_low, 3)} to {significant(each.median_high, 3)}"
         )
-        deviation = "-" if each.deviation is None else f"{each.deviation:.3g}"
+        deviation = "-" if each.deviation is None else significant(each.deviation, 3)
         _row(
-            table, each.condition, f"{each.n:,}", f"{each.mean:.3g}", deviation, f"{each.median:.3g}", median
+            table,
+            each.condition,
+            f"{each.n:,}",
+            significant(each.mean, 3),
+            deviation,
+            significant(each.median, 3),
+            median,
         )
     return table
 

@@ -14,6 +14,7 @@ from typing import Any
 import polars as pl
 
 from realitygap._medians import CONFIDENCE, SMALLEST_N, interval_ranks
+from realitygap._numbers import significant
 from realitygap._version import __version__
 from realitygap.errors import RealityGapError, RecordError, RecordVersionError
 from realitygap.platforms import described_platform, is_physical
@@ -453,7 +454,7 @@ def _share(value: float | None) -> str:
 
 
 def _score(value: float | None) -> str:
-    return "–" if value is None else f"{value:#.4g}"
+    return "–" if value is None else significant(value, 4, keep_zeros=True)
 
 
 def _count(value: int) -> str:

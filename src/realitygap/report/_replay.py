@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 import polars as pl
 
+from realitygap._numbers import significant
 from realitygap.errors import RealityGapError
 from realitygap.playback import first_visits
 from realitygap.report._path_figure import arena_extent, typical_replicate
@@ -138,7 +139,11 @@ def _lead_of(tally: Tally, runs: Sequence[_Run], lead: str) -> tuple[int, int, L
     condition = Condition.from_settings(name, dict(settings_of(tally.condition(name))))
     label, task = label_of(tally.condition(name)), task_of(tally.condition(name))
     value = float(row[tally.score_column(name)])
-    worth = f"coverage {value:.3f}" if task == "coverage" else f"score of {task} {value:#.4g}"
+    worth = (
+        f"coverage {value:.3f}"
+        if task == "coverage"
+        else f"score of {task} {significant(value, 4, keep_zeros=True)}"
+    )
     caption = (
         f"{label}. Best path of the typical run of {name} (run {run}): generation {generation}, individual "
         f"{individual}, {worth}."

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from realitygap._numbers import significant
 from realitygap.calibration import (
     LEAST_PLACEMENTS,
     MOTION,
@@ -72,7 +73,8 @@ def _told_of_ends(parts: Parts, *, is_cut: bool) -> Parts:
     if not at_end:
         return parts
     said = ", ".join(
-        f"{each.name} is {each.estimate:.3g} ({each.prior_low:.3g} to {each.prior_high:.3g})"
+        f"{each.name} is {significant(each.estimate, 3)} "
+        f"({significant(each.prior_low, 3)} to {significant(each.prior_high, 3)})"
         for each in at_end
     )
     note = f"At or beyond the end of what was thought possible: {said}."

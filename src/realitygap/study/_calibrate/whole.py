@@ -8,6 +8,7 @@ from functools import partial
 
 import numpy as np
 
+from realitygap._numbers import significant
 from realitygap.calibration import (
     CONTACT,
     LEAST_STEPS,
@@ -326,7 +327,8 @@ def _bound_by_prior(fitted: Sequence[Fitted]) -> tuple[str, ...]:
     if not bound:
         return ()
     names = ", ".join(
-        f"{each.name} ({each.prior_low:.3g} to {each.prior_high:.3g} {each.unit}".rstrip() + ")"
+        f"{each.name} ({significant(each.prior_low, 3)} to {significant(each.prior_high, 3)} {each.unit}".rstrip()
+        + ")"
         for each in bound
     )
     return (

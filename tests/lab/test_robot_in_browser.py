@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
 import re
 
@@ -196,6 +197,27 @@ def test_port_that_does_not_answer_is_identified_as_no_robot(lab, visit):
         found = re.compile("No robot found. No Scribbler answers on .* Is the robot on, paired")
         page.get_by_text(found).wait_for()
         page.get_by_text("No robot connected.").wait_for()
+    finally:
+        os.close(mine)
+        os.close(other)
+
+
+def test_busy_port_is_identified_with_one_message_however_often_it_is_asked(lab, visit):
+    mine, other = os.openpty()
+    fcntl.flock(other, fcntl.LOCK_EX)
+    try:
+        lab.list_port(os.ttyname(other))
+        page = visit("robot")
+        identify = page.get_by_role("button", name="Identify the robot on")
+        identify.focus()
+        for _ in range(2):
+            page.keyboard.press("Enter")
+        reply = page.get_by_role("status").filter(has_text="cannot be opened: it is in use")
+        reply.wait_for()
+        assert reply.count() == 1
+        assert identify.evaluate("button => button === document.activeElement")
+        assert page.locator(".q-notification").count() == 0
+        connect(page)
     finally:
         os.close(mine)
         os.close(other)

@@ -123,9 +123,13 @@ def test_port_that_is_open_in_this_program_is_refused_with_what_to_do(server):
     [
         (
             "/dev/no-such-port",
-            r"cannot be opened: .*No such file.*`realitygap robot list` lists the existing ports",
+            r"^/dev/no-such-port cannot be opened: No such file or directory\. .*`realitygap robot list` lists",
         ),
-        ("socket://127.0.0.1:1", r"cannot be opened: .*refused.*Is the address right"),
+        ("/dev/null", r"^/dev/null cannot be opened: Inappropriate ioctl for device\. Is the robot on"),
+        (
+            "socket://127.0.0.1:1",
+            r"^socket://127.0.0.1:1 cannot be opened: Connection refused\. Is the address right",
+        ),
         ("nonsense://x", r"nonsense://x cannot be opened: .*nonsense"),
         ("", r" cannot be opened"),
     ],

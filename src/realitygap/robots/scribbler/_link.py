@@ -21,6 +21,7 @@ from typing import Any, NamedTuple, TypeVar
 
 from realitygap.errors import ProtocolError, RobotError
 from realitygap.robots._clock import Clock, SystemClock
+from realitygap.robots._open_error import reason_of
 
 from . import _codec as codec
 from ._codec import Request
@@ -174,7 +175,7 @@ def _open_once(name: str) -> Any:
     except (OSError, ValueError, AttributeError) as error:
         if getattr(error, "errno", None) == errno.EAGAIN:
             raise _Locked from error
-        raise RobotError(f"{name} cannot be opened: {error}. {_advice(name, error)}") from error
+        raise RobotError(f"{name} cannot be opened: {reason_of(error)}. {_advice(name, error)}") from error
     return port
 
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from realitygap.errors import ProtocolError, RobotError, RobotTimeout
+from realitygap.robots._open_error import reason_of
 from realitygap.robots.scribbler._guardian import Guardian, descriptor_of
 from realitygap.robots.scribbler._guardian_process import SILENT_S as FROZEN_S
 
@@ -74,7 +75,7 @@ def open_port(name: str) -> Any:
         ):  # otherwise a short message waits for the one before to be confirmed
             connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     except (OSError, ValueError, AttributeError) as error:
-        raise RobotError(f"{name} cannot be opened: {error}. {_advice(name, error)}") from error
+        raise RobotError(f"{name} cannot be opened: {reason_of(error)}. {_advice(name, error)}") from error
     return port
 
 

@@ -87,7 +87,9 @@ def _words(estimate: Estimate) -> str:
     if estimate.estimate is None:
         return estimate.refused or "not measured"
     text = f"{estimate.estimate:.3f}"
-    return text if estimate.low is None else f"{text} [{estimate.low:.3f}, {estimate.high:.3f}]"
+    if estimate.low is not None:
+        text += f" [{estimate.low:.3f}, {estimate.high:.3f}]"
+    return text.replace("-", "−")
 
 
 def rounds(trials: int) -> list[int]:

@@ -233,7 +233,7 @@ def _tidy(library: Any, module: Any) -> None:
 
 def _optimize(library: Any, unroll: bool) -> None:
     """Optimize a whole library, once; Numba's first round is for what counts who holds arrays."""
-    options = llvmlite.binding.create_pipeline_tuning_options(speed_level=3)
+    options = llvmlite.binding.create_pipeline_tuning_options(speed_level=3 if unroll else 2)
     options.loop_vectorization = True
     options.loop_unrolling = unroll
     builder = llvmlite.binding.create_pass_builder(library._codegen._tm, options)

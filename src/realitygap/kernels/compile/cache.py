@@ -21,6 +21,7 @@ import llvmlite.binding
 import numba
 from numba.core import caching, serialize
 from numba.core.compiler import CompileResult
+from numba.core.runtime import rtsys
 
 from .progress import begin_compiling, end_compiling
 
@@ -235,6 +236,24 @@ def forget_unused(folder: Path) -> None:
                     path.unlink()
 
 
+def _import_without_blas() -> None:
+    """Import Numba's functions of arrays without SciPy's linear algebra, which takes a third of a second.
+
+    Numba imports that at once to learn whether it is there. A function that needs it imports it when it is compiled.
+    """
+    if "numba.np.arraymath" in sys.modules:
+        return
+    from numba.np import linalg
+
+    ensure = linalg.ensure_blas
+    linalg.ensure_blas = lambda: None
+    try:
+        from numba.np import arraymath
+    finally:
+        linalg.ensure_blas = ensure
+    arraymath.ensure_blas = ensure
+
+
 def _symbols_only(names: Iterable[str]) -> bytes:
     symbols = "".join(f'define void @"{name}"() {{ ret void }}\n' for name in names)
     return llvmlite.binding.parse_assembly(symbols).as_bitcode()  # type: ignore[no-any-return]
@@ -270,7 +289,7 @@ class SealedCache(caching._Cache):  # type: ignore[misc]
 
     def load_overload(self, signature: Any, target_context: Any) -> Any:
         """Return the compiled function, or None if it has to be compiled."""
-        target_context.refresh()
+        rtsys.initialize(target_context)
         key = self._key(signature, target_context.codegen())
         try:
             stored, reduced, needed = read_sealed(self._path(key))
@@ -278,6 +297,7 @@ class SealedCache(caching._Cache):  # type: ignore[misc]
                 load_shared(symbol, self._folder, target_context)
         except (OSError, ValueError):
             begin_compiling(self._name)
+            _import_without_blas()
             return None
         # Shortened hashes could agree by chance.
         return CompileResult._rebuild(target_context, *reduced) if stored == key else None
@@ -298,11 +318,12 @@ class SealedCache(caching._Cache):  # type: ignore[misc]
 
     def load_shared(self, signature: Any, target_context: Any) -> dict[str, Any] | None:
         """Return what is stored of a shared kernel, or None if it has to be compiled."""
-        target_context.refresh()
+        rtsys.initialize(target_context)
         try:
             key, stored = load_shared(self.symbol(signature, target_context), self._folder, target_context)
         except (OSError, ValueError):
             begin_compiling(self._name)
+            _import_without_blas()
             return None
         return stored if key == self._key(signature, target_context.codegen()) else None
 

@@ -169,7 +169,7 @@ def test_parameters_at_an_end_of_their_prior_are_named():
         return Fitted(name=name, identified=True, unit="1/m2", **ends)
 
     (note,) = _bound_by_prior([fitted("contact.ang", 50.1, 80.0), fitted("drive.track", 100.0, 200.0)])
-    assert note.startswith("Intervals that reach an end of their prior: contact.ang (50 to 3e+03 1/m2). ")
+    assert note.startswith("Intervals that reach an end of their prior: contact.ang (50 to 3,000 1/m2). ")
     assert not _bound_by_prior([fitted("drive.heading_noise_per_m", 50.1, 80.0)])
     wide = {"name": "contact.ang", "low": 50.0, "high": 400.0, "prior_low": 50.0, "prior_high": 3000.0}
     at_end, inside = (Fitted(estimate=at, identified=False, advice="Record.", **wide) for at in (50.1, 200.0))

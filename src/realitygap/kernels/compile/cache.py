@@ -245,7 +245,9 @@ def _import_without_blas() -> None:
         return
     from numba.np import linalg
 
-    ensure = linalg.ensure_blas
+    ensure = getattr(linalg, "ensure_blas", None)
+    if ensure is None:  # another Numba, which may import what it wants
+        return
     linalg.ensure_blas = lambda: None
     try:
         from numba.np import arraymath
@@ -289,7 +291,7 @@ class SealedCache(caching._Cache):  # type: ignore[misc]
 
     def load_overload(self, signature: Any, target_context: Any) -> Any:
         """Return the compiled function, or None if it has to be compiled."""
-        rtsys.initialize(target_context)
+        rtsys.initialize(target_context)  # all that machine code needs: the rest of Numba is for compiling
         key = self._key(signature, target_context.codegen())
         try:
             stored, reduced, needed = read_sealed(self._path(key))

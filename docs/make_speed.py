@@ -15,6 +15,8 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from realitygap._numbers import significant
+
 HERE = Path(__file__).parent
 DATA = HERE / "data" / "speed.json"
 BENCHMARK = HERE.parent / "benchmarks" / "peers.py"
@@ -179,9 +181,7 @@ def variants_table(variants: Mapping[str, float]) -> str:
 def digits(value: float) -> str:
     """A number with three digits that count."""
     rounded = float(f"{value:.3g}")
-    if rounded >= 1e6:
-        return f"{rounded / 1e6:.3g} million"
-    return f"{rounded:,.0f}" if rounded >= 100 else f"{rounded:.3g}"
+    return f"{rounded / 1e6:.3g} million" if rounded >= 1e6 else significant(value, 3)
 
 
 def _table(head: list[str], rows: list[tuple[str, ...]]) -> str:

@@ -7,11 +7,10 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from realitygap._medians import Interval, median_interval, quartiles
-from realitygap._numbers import significant
 from realitygap.report._champions import Champions
 from realitygap.report._comparisons import Comparison, p_in_words, same_but_for, signed
 from realitygap.report._effects import bca_interval, difference_of_means
-from realitygap.report._tally import Tally, label_of, settings_of, task_of
+from realitygap.report._tally import Tally, label_of, score_text, settings_of, task_of
 
 MOST_FINDINGS = 3
 
@@ -127,14 +126,12 @@ def _best_scores(tasks: Sequence[Mapping[str, Any]]) -> list[Finding]:
         rows = [row for row in tasks if row["task"] == task and row["median"] is not None]
         if rows:
             best = max(rows, key=lambda row: float(row["median"]))
-            interval = "" if best["low"] is None else f" [{_score(best['low'])}, {_score(best['high'])}]"
-            claim = f"{best['condition']} has the highest median score of {task}: {_score(best['median'])}{interval}."
+            interval = (
+                "" if best["low"] is None else f" [{score_text(best['low'])}, {score_text(best['high'])}]"
+            )
+            claim = f"{best['condition']} has the highest median score of {task}: {score_text(best['median'])}{interval}."
             findings.append(Finding(claim, "", ("scores",)))
     return findings
-
-
-def _score(value: float) -> str:
-    return significant(value, 4, keep_zeros=True)
 
 
 def _nothing(comparisons: Sequence[Comparison]) -> Finding:

@@ -14,7 +14,6 @@ from typing import Any
 import polars as pl
 
 from realitygap._medians import CONFIDENCE, SMALLEST_N, interval_ranks
-from realitygap._numbers import significant
 from realitygap._version import __version__
 from realitygap.errors import RealityGapError, RecordError, RecordVersionError
 from realitygap.platforms import described_platform, is_physical
@@ -47,7 +46,7 @@ from realitygap.report._score_figure import draw_scores
 from realitygap.report._statistics_section import statistics_content
 from realitygap.report._structures import selection_of
 from realitygap.report._summary import summarize
-from realitygap.report._tally import Tally, label_of, read_tally, settings_of
+from realitygap.report._tally import Tally, label_of, read_tally, score_text, settings_of
 from realitygap.report._task_summary import summarize_tasks
 from realitygap.report._template import render_page
 from realitygap.study import load_study, named_studies
@@ -127,7 +126,7 @@ def _check_out(path: Path) -> None:
 
 
 def _render(content: Mapping[str, Any]) -> str:
-    return render_page("report.html.jinja", content, share=_share, count=_count, score=_score)
+    return render_page("report.html.jinja", content, share=_share, count=_count, score=score_text)
 
 
 def _content(tally: Tally) -> dict[str, Any]:
@@ -451,10 +450,6 @@ def _is_built_in(description: Mapping[str, Any]) -> bool:
 
 def _share(value: float | None) -> str:
     return "–" if value is None else f"{value:.3f}"
-
-
-def _score(value: float | None) -> str:
-    return "–" if value is None else significant(value, 4, keep_zeros=True)
 
 
 def _count(value: int) -> str:

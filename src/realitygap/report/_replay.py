@@ -17,12 +17,11 @@ import numpy as np
 import numpy.typing as npt
 import polars as pl
 
-from realitygap._numbers import significant
 from realitygap.errors import RealityGapError
 from realitygap.playback import first_visits
 from realitygap.report._path_figure import arena_extent, typical_replicate
 from realitygap.report._placed import as_json, hash_of
-from realitygap.report._tally import Tally, label_of, settings_of, task_of
+from realitygap.report._tally import Tally, label_of, score_text, settings_of, task_of
 from realitygap.report._template import template_text
 from realitygap.runs import Condition, replay
 from realitygap.trials import Trajectory
@@ -139,11 +138,7 @@ def _lead_of(tally: Tally, runs: Sequence[_Run], lead: str) -> tuple[int, int, L
     condition = Condition.from_settings(name, dict(settings_of(tally.condition(name))))
     label, task = label_of(tally.condition(name)), task_of(tally.condition(name))
     value = float(row[tally.score_column(name)])
-    worth = (
-        f"coverage {value:.3f}"
-        if task == "coverage"
-        else f"score of {task} {significant(value, 4, keep_zeros=True)}"
-    )
+    worth = f"coverage {value:.3f}" if task == "coverage" else f"score of {task} {score_text(value)}"
     caption = (
         f"{label}. Best path of the typical run of {name} (run {run}): generation {generation}, individual "
         f"{individual}, {worth}."

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 import polars as pl
 
+from realitygap._numbers import significant
 from realitygap.errors import RecordError, did_you_mean
 from realitygap.records import ResultsFolder
 from realitygap.report._driven import Driven, read_driven
@@ -248,6 +249,11 @@ def replicates_of(folder: ResultsFolder, condition: str) -> tuple[int, ...]:
 def task_of(condition: Mapping[str, Any]) -> str:
     """The kind of a condition's task."""
     return str(settings_of(condition).get("task", {}).get("kind", "coverage"))
+
+
+def score_text(score: float | None) -> str:
+    """Return a score of a task with four digits that count; a dash if there is none."""
+    return "–" if score is None else significant(score, 4, keep_zeros=True)
 
 
 def label_of(condition: Mapping[str, Any]) -> str:

@@ -82,6 +82,6 @@ def open_on(port: str, record: Path | None = None, watchdog_s: float | None = No
     """
     family, name = split_port(port)
     if not name:
-        raise RobotError(f"{port} names no port, expected {family}:PORT.")
+        raise RobotError(f"{port!r} names no port, expected {family}:PORT.")
     terminal = terminal_of(family)
     return terminal, terminal.open_robot(name, record, watchdog_s)

@@ -129,7 +129,8 @@ def _best_scores(tasks: Sequence[Mapping[str, Any]]) -> list[Finding]:
             interval = (
                 "" if best["low"] is None else f" [{score_text(best['low'])}, {score_text(best['high'])}]"
             )
-            claim = f"{best['condition']} has the highest median score of {task}: {score_text(best['median'])}{interval}."
+            median = score_text(best["median"])
+            claim = f"{best['condition']} has the highest median score of {task}: {median}{interval}."
             findings.append(Finding(claim, "", ("scores",)))
     return findings
 

@@ -82,6 +82,18 @@ def drop():
     Library._finalize_specific = finalize_interrupted
     work(1.0)
 """
+IN_POLARS = """
+import polars as pl
+make = pl.List.__init__
+def make_interrupted(self, inner):
+    pl.List.__init__ = make
+    signal.raise_signal(signal.SIGINT)
+    make(self, inner)
+frame = pl.LazyFrame({"a": [[1]]})
+def drop():
+    pl.List.__init__ = make_interrupted
+    print(*frame.collect_schema())
+"""
 IN_A_CLASS_BODY = """
 class Attribute:
     def __set_name__(self, owner, name):
@@ -139,6 +151,12 @@ def test_kept_interrupts_let_a_callback_of_llvm_end() -> None:
 def test_interrupt_while_llvm_compiles_is_kept() -> None:
     done = run(WHILE_LLVM_COMPILES + IN_A_BLOCK)
     assert done.stdout.split()[-1] == "interrupted"
+    assert done.stderr == ""
+
+
+def test_interrupt_in_a_callback_of_polars_waits_for_its_end() -> None:
+    done = run(IN_POLARS + IN_A_BLOCK)
+    assert done.stdout.split() == ["a", "dropped", "interrupted"]
     assert done.stderr == ""
 
 

@@ -14,6 +14,8 @@ AGAIN_S = 0.05
 """Time after which an interrupt is repeated [s]; by then Python runs other code."""
 CALLBACKS = ("_raw_object_cache_notify", "_raw_object_cache_getbuffer")
 """Functions of llvmlite that LLVM calls. A signal during a compilation is handled in the first of them."""
+RUST_LIBRARY = "polars"
+"""Its compiled code calls its Python code, and panics with a backtrace if an exception comes out of that."""
 
 _repeats: list[threading.Timer] = []
 
@@ -24,7 +26,8 @@ def kept_interrupts() -> Iterator[None]:
 
     Python cannot raise KeyboardInterrupt in a callback from C, in the callback of a weak reference, or in a
     finalizer: it prints "Exception ignored" there and continues. Numba compiles and loads kernels through callbacks
-    from C, and fails later if one of them was cut off. So interrupts wait for the end of such a callback.
+    from C, and fails later if one of them was cut off. So interrupts wait for the end of such a callback, and for the
+    end of a call of polars.
 
     Raises:
         KeyboardInterrupt: An interrupt was still to be repeated when the block ended or failed.
@@ -57,9 +60,10 @@ def kept_interrupts() -> Iterator[None]:
 
 
 def on_interrupt(number: int, frame: FrameType | None) -> None:
-    """Raise KeyboardInterrupt, or repeat the signal later if a callback that must not be cut off is running."""
+    """Raise KeyboardInterrupt, or repeat the signal later if code that must not be cut off is running."""
     while frame is not None:
-        if frame.f_code.co_name in CALLBACKS:
+        library = frame.f_globals.get("__name__", "").partition(".")[0]
+        if frame.f_code.co_name in CALLBACKS or library == RUST_LIBRARY:
             _repeat_later()
             return
         frame = frame.f_back

@@ -14,6 +14,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 from realitygap._interrupts import kept_interrupts
+from realitygap._stack import on_wide_stack
 from realitygap._version import __version__
 from realitygap.errors import RealityGapError
 
@@ -55,6 +56,7 @@ def _show_warning(message: Warning | str, *_: object, **__: object) -> None:
     _print_error(f"note: {message}")
 
 
+@on_wide_stack
 def main() -> None:
     """Run a command; our own errors print as one message and end with status 1, as a closed pipe does, Ctrl-C with 130.
 

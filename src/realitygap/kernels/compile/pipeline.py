@@ -33,6 +33,8 @@ from numba.core.untyped_passes import (
     TranslateByteCode,
 )
 
+from realitygap._stack import on_wide_stack
+
 from .lower import LowerForCallers, LowerKernel, LowerShared, is_min_or_max, register_call
 
 
@@ -201,6 +203,7 @@ class _Entry(CompilerBase):
         manager.finalize()
         return [manager]
 
+    @on_wide_stack
     def compile_extra(self, function: Any) -> Any:
         # Of the million objects that a compilation makes, nearly all live until it is done.
         collecting = gc.isenabled()

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import bisect
 import functools
+import itertools
+import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -17,6 +20,10 @@ CONFIDENCE = 0.95
 
 SMALLEST_N = 6
 """Fewer values give no interval of 95 %: the range of five covers the median with 1 - 2 / 2^5 = 93.75 %."""
+
+
+_LARGEST_COUNTED_N = 300
+"""Largest n for which whole numbers are added up, within 2 ms. Loading SciPy's function takes 0.1 s."""
 
 
 @dataclass(frozen=True)
@@ -86,14 +93,19 @@ def interval_ranks(n: int, confidence: float = CONFIDENCE) -> IntervalRanks | No
     if n == 0:
         return None
     may_miss = (1.0 - confidence) / 2.0
-
-    def misses(k: int) -> float:  # P(X <= k)
-        return float(special.betainc(n - k, k + 1, 0.5))
-
+    misses = _cumulative(n)
     lower = bisect.bisect_right(range((n + 1) // 2), may_miss, key=misses)
     if lower < 1:
         return None
     return IntervalRanks(lower, n + 1 - lower, 1.0 - 2.0 * misses(lower - 1))
+
+
+def _cumulative(n: int) -> Callable[[int], float]:
+    """Return the function P(X <= k) of k, from 0 to (n - 1) // 2, where X is Binomial(n, 1/2)."""
+    if n > _LARGEST_COUNTED_N:
+        return lambda k: float(special.betainc(n - k, k + 1, 0.5))
+    counts = list(itertools.accumulate(math.comb(n, k) for k in range((n + 1) // 2)))
+    return lambda k: counts[k] / 2**n
 
 
 def median_interval(values: npt.NDArray[np.float64], confidence: float = CONFIDENCE) -> Interval | None:

@@ -3,6 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from realitygap import _medians
 from realitygap.report import interval_ranks, median_interval, quartiles
 
 
@@ -49,6 +50,22 @@ def _choose(n: int, k: int) -> int:
     for i in range(k):
         value = value * (n - i) // (i + 1)
     return value
+
+
+def test_ranks_counted_in_whole_numbers_are_those_of_scipy(monkeypatch):
+    n_values = [*range(1, 300), 301, 500, 999]
+    ranks = {}
+    for largest_counted in (0, 1000):
+        monkeypatch.setattr(_medians, "_LARGEST_COUNTED_N", largest_counted)
+        interval_ranks.cache_clear()
+        ranks[largest_counted] = [interval_ranks(n) for n in n_values]
+    interval_ranks.cache_clear()
+    for n, by_scipy, counted in zip(n_values, *ranks.values(), strict=True):
+        if by_scipy is None or counted is None:
+            assert by_scipy is counted, n
+            continue
+        assert (counted.lower, counted.upper) == (by_scipy.lower, by_scipy.upper), n
+        assert counted.coverage == pytest.approx(by_scipy.coverage, rel=1e-13), n
 
 
 def test_interval_takes_the_values_of_its_ranks_in_any_order():

@@ -26,6 +26,26 @@ PYTHON_WRAPPER = "_ZN7cpython"
 _MEMBERS = {"shape": parts.SHAPE, "size": parts.N_ITEMS}
 
 
+# The type of what they return for two numbers does not depend on values in the source.
+OPERATORS = {
+    getattr(operator, name)
+    for name in (
+        "add sub mul truediv floordiv mod and_ or_ xor lshift rshift "
+        "iadd isub imul itruediv ifloordiv imod iand ior ixor ilshift irshift "
+        "lt le gt ge eq ne"
+    ).split()
+}
+
+
+def is_number(kind: Any) -> bool:
+    """Whether a type is that of a number or a truth value."""
+    return isinstance(types.unliteral(kind), (types.Number, types.Boolean))
+
+
+# Numba's function and its signature, for each of these and the types of its operands.
+_RESOLVED: dict[Any, tuple[Any, Any]] = {}
+
+
 # `min(a, b)` is b if b < a.
 _COMPARED_BY = {min: operator.lt, max: operator.gt}
 
@@ -133,6 +153,24 @@ class _Lower(lowering.Lower):
         if expr.op == "iternext" and isinstance(loop := self.loadvar(expr.value.name), parts.Loop):
             return parts.next_of_loop(self.context, self.builder, resty, loop)
         return super().lower_expr(resty, expr)
+
+    def lower_binop(self, resty: Any, expr: Any, op: Any) -> Any:
+        inferred = self.fndesc.calltypes[expr]
+        if op not in OPERATORS or not all(map(is_number, inferred.args)):
+            return super().lower_binop(resty, expr, op)
+        if (op, inferred.args) not in _RESOLVED:
+            typing_context = self.context.typing_context
+            function = typing_context.resolve_value_type(op)
+            _RESOLVED[op, inferred.args] = (
+                function,
+                function.get_call_type(typing_context, inferred.args, {}),
+            )
+        operands = [
+            self._cast_var(operand, kind)
+            for operand, kind in zip((expr.lhs, expr.rhs), inferred.args, strict=True)
+        ]
+        result = self.context.get_function(*_RESOLVED[op, inferred.args])(self.builder, operands)
+        return self.context.cast(self.builder, result, inferred.return_type, resty)
 
     def _lower_min_or_max(self, kind: Any, expr: Any, compared_by: Any, kinds: Any) -> Any:
         first, second = (

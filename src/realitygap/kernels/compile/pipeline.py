@@ -8,7 +8,6 @@ from __future__ import annotations
 import functools
 import gc
 import hashlib
-import operator
 from typing import Any
 
 from numba import _dynfunc
@@ -35,7 +34,15 @@ from numba.core.untyped_passes import (
 
 from realitygap._stack import on_wide_stack
 
-from .lower import LowerForCallers, LowerKernel, LowerShared, is_min_or_max, register_call
+from .lower import (
+    OPERATORS,
+    LowerForCallers,
+    LowerKernel,
+    LowerShared,
+    is_min_or_max,
+    is_number,
+    register_call,
+)
 
 
 class _Flags(Flags):
@@ -46,21 +53,6 @@ class _Flags(Flags):
 
     def __hash__(self) -> int:
         return hash(frozenset(self._values))
-
-
-# The type of what they return for two numbers does not depend on values in the source.
-_OPERATORS = {
-    getattr(operator, name)
-    for name in (
-        "add sub mul truediv floordiv mod and_ or_ xor lshift rshift "
-        "iadd isub imul itruediv ifloordiv imod iand ior ixor ilshift irshift "
-        "lt le gt ge eq ne"
-    ).split()
-}
-
-
-def _is_number(kind: Any) -> bool:
-    return isinstance(types.unliteral(kind), (types.Number, types.Boolean))
 
 
 class _RememberedTyping:
@@ -86,7 +78,7 @@ class _RememberedTyping:
         if self._is_lowered_here and is_min_or_max(function, arguments):
             kind = self._context.unify_types(*map(types.unliteral, arguments))
             return typing.signature(kind, *arguments)
-        if function.typing_key in _OPERATORS and all(map(_is_number, arguments)):
+        if function.typing_key in OPERATORS and all(map(is_number, arguments)):
             arguments = tuple(map(types.unliteral, arguments))
         key = (function.typing_key, arguments)
         try:

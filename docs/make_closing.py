@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from realitygap.errors import RealityGapError
 from realitygap.gap import mean_maximum_rank_violation
 from realitygap.report import (
     FAMILY_HEAD,
@@ -305,6 +306,18 @@ def means_table(summary: dict[str, Any]) -> Iterable[Sequence[str]]:
             )
 
 
+def results_in(folder: Path) -> dict[str, Any]:
+    """Return the summary of a folder of results.
+
+    Raises:
+        SystemExit: The folder has no results that can be read. Python then prints the message alone.
+    """
+    try:
+        return summarize_closing(folder)
+    except RealityGapError as error:
+        raise SystemExit(str(error)) from None
+
+
 def stored_summary() -> dict[str, Any]:
     """The summary that the page was last made from, as far as tables and sentences need it."""
     summary: dict[str, Any] = json.loads((TABLES / "summary.json").read_text("utf-8"))
@@ -467,7 +480,7 @@ def main() -> None:
     if options.earlier:
         files = {TABLES / "earlier.csv": table(EARLIER_HEAD, earlier_table())}
     else:
-        summary = stored_summary() if options.folder is None else summarize_closing(options.folder)
+        summary = stored_summary() if options.folder is None else results_in(options.folder)
         files = {TABLES / name: text for name, text in texts(summary).items()}
         if options.folder is not None:
             drawn = draw_closing(summary)

@@ -16,10 +16,9 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from make_closing import done_parts, table, verdicts
+from make_closing import done_parts, results_in, table, verdicts
 
 from realitygap.report import GOAL_HEAD, draw_closing, goal_table, not_counted
-from realitygap.study import summarize_closing
 from realitygap.study._closing.summary import KINDS, median_interval, pooled_fall
 
 HERE = Path(__file__).parent
@@ -188,7 +187,7 @@ def main() -> None:
     if options.again:
         if options.folder is None:
             parser.error("--again needs a folder of results")
-        again = summarize_closing(options.folder)
+        again = results_in(options.folder)
         tables = {
             "again.csv": table(AGAIN_HEAD, again_table(stored_summary(), again)),
             "again-goals.csv": table(GOAL_HEAD, goal_table(again)),
@@ -200,7 +199,7 @@ def main() -> None:
     folder = options.folder
     for place in (TABLES, FIGURES):
         place.mkdir(parents=True, exist_ok=True)
-    summary = stored_summary() if folder is None else summarize_closing(folder)
+    summary = stored_summary() if folder is None else results_in(folder)
     files = {TABLES / "summary.json": json.dumps(summary, separators=(",", ":")) + "\n", **texts(summary)}
     for path, text in files.items():
         path.write_text(text, "utf-8")

@@ -19,11 +19,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from make_closing import done_parts, table, verdicts
+from make_closing import done_parts, results_in, table, verdicts
 from numpy.typing import NDArray
 
 from realitygap.report import FAMILY_HEAD, GOAL_HEAD, draw_closing, family_table, goal_table
-from realitygap.study import summarize_closing
 
 HERE = Path(__file__).parent
 TABLES = HERE / "data" / "closing-thymio"
@@ -147,7 +146,7 @@ def main() -> None:
     summary = (
         json.loads((place / "summary.json").read_text("utf-8"))
         if options.folder is None
-        else summarize_closing(options.folder)
+        else results_in(options.folder)
     )
     files = {
         place / "goals.csv": table(GOAL_HEAD, goal_table(summary)),

@@ -178,6 +178,14 @@ def test_tables_and_figure_of_the_fresh_twins_follow_from_their_data():
         assert path.read_text("utf-8") == text, path
 
 
+def test_scripts_of_closing_the_gap_end_with_one_message_without_results(monkeypatch, tmp_path):
+    for name in ("make_closing", "make_closing_fresh", "make_closing_thymio"):
+        script = _load(name)
+        monkeypatch.setattr("sys.argv", [f"{name}.py", str(tmp_path)])
+        with pytest.raises(SystemExit, match=f"There is no closing-the-gap in {re.escape(str(tmp_path))}"):
+            script.main()
+
+
 def test_means_of_controllers_are_the_points_of_the_figure():
     make_closing = _load("make_closing")
     summary = make_closing.stored_summary()

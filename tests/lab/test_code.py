@@ -51,7 +51,7 @@ def orders(monkeypatch) -> list[dict[str, Any]]:
 
 
 def check(root: Path, text: str = STUDY, *, allow_code: bool) -> dict[str, Any]:
-    return _check_work._check(root, text, allow_code=allow_code)
+    return _check_work._check(root, text, allow_code=allow_code)[0]
 
 
 def test_check_refuses_a_python_task_unless_the_lab_may_run_code(root):

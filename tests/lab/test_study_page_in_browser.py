@@ -64,6 +64,62 @@ def test_complete_study_never_seems_empty_while_its_figures_are_drawn(lab, visit
     assert all(words in ([], ["Complete"]) for words, _, _ in seen), seen
 
 
+RUNNING = """
+[study]
+name = "running"
+replicates = 1000000
+[platform.sim]
+steps = 2000
+[[condition]]
+name = "coverage"
+platform = "sim"
+"""
+MARK = "button => { button.marked = true; }"
+PROGRESS = """before => {
+  const found = /[\\d,]+\\/1,000,000 runs/.exec(document.body.innerText);
+  return found && found[0] !== before && !found[0].startsWith("0/") && found[0];
+}"""
+
+
+@pytest.mark.parametrize("path", ["", "study/running"])
+def test_progress_of_a_running_study_changes_in_place(lab, visit, path):
+    page = visit("new")
+    page.get_by_role("tab", name="File").click()
+    page.get_by_label("Study file").fill(RUNNING)
+    page.get_by_role("button", name="Start study").click()
+    page.wait_for_url("**/study/running")
+    page = visit(path)
+    first = page.wait_for_function(PROGRESS, arg="").json_value()
+    pause = page.get_by_role("button", name="Pause")
+    pause.evaluate(MARK)
+    second = page.wait_for_function(PROGRESS, arg=first).json_value()
+    page.wait_for_function(PROGRESS, arg=second)
+    assert pause.evaluate("button => button.marked")
+    pause.click()
+    page.locator(".lab-state", has_text="Paused").wait_for()
+
+
+def test_form_shows_the_size_of_the_study_and_estimates_its_time(lab, visit):
+    page = visit("new")
+    size = page.locator(".lab-actions")
+    runs = page.get_by_label("Runs per condition")
+    runs.fill("50")
+    size.get_by_text("2 conditions × 50 runs = 100 runs · less than 5 s on this machine").wait_for()
+    runs.fill("900000000")
+    size.get_by_text("= 1,800,000,000 runs · about").wait_for()
+    runs.fill("many")
+    page.wait_for_function("() => !document.body.innerText.includes('on this machine')")
+    page.get_by_label("Template").last.click()
+    page.get_by_role("option", name="paper-robot", exact=True).click()
+    size.get_by_text("2 conditions × 3 runs = 6 runs · 240 trials on the robot").wait_for()
+    page.get_by_role("tab", name="File").click()
+    page.get_by_label("Study file").fill("[study]")
+    page.wait_for_function("() => !document.body.innerText.includes('6 runs')")
+    page.get_by_label("Study file").fill(RUNNING.replace("sim", "jyro"))
+    size.get_by_text("1 condition × 1,000,000 runs = 1,000,000 runs").wait_for()
+    assert list(lab.root.iterdir()) == []
+
+
 def test_mistakes_in_the_form_are_shown_at_their_fields(lab, visit):
     page = visit("new")
     assert page.evaluate("document.documentElement.scrollHeight") <= 1600

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from realitygap.errors import RealityGapError
-from realitygap.study import StudyFileError, parse_study
+from realitygap.study import Study, StudyFileError, estimate_seconds, parse_study, physical_conditions
 
 from ._channel import LOOK_S, Channel, Message
 from ._files import refuse_code, refuse_files_outside
@@ -39,10 +39,11 @@ def work(channel: Channel, order: Message) -> None:
         text = str(wish["text"])
         if wish["do"] == "read":
             channel.say("found", **_read(text))
-        else:
-            channel.say(
-                "found", **_check(Path(order["root"]), text, allow_code=bool(order.get("allow_code")))
-            )
+            return
+        found, study = _check(Path(order["root"]), text, allow_code=bool(order.get("allow_code")))
+        channel.say("found", **found)
+        if study is not None:
+            channel.say("estimated", seconds=_estimate(study))
         return
 
 
@@ -54,17 +55,31 @@ def _read(text: str) -> Message:
         return {"mistakes": f"This is not TOML: {error}. Expected a study file."}
 
 
-def _check(root: Path, text: str, *, allow_code: bool) -> dict[str, Any]:
-    """Return the name and size of the study, or the mistakes in its file."""
+def _estimate(study: Study) -> float | None:
+    """Return the computing time of a study on this machine [s]; None if it cannot be told."""
+    try:
+        return estimate_seconds(study)
+    except (RealityGapError, OSError, ValueError):
+        return None  # whoever starts the study is told
+
+
+def _check(root: Path, text: str, *, allow_code: bool) -> tuple[dict[str, Any], Study | None]:
+    """Return the name and size of the study, and the study; or the mistakes in its file, and None."""
     try:
         refuse_files_outside(root, text)
         study = parse_study(text, str(root / "study.toml"))
         refuse_code(study, allow_code)
-        sizes = {"n_conditions": len(study.conditions), "replicates": study.about.replicates}
-        return {"name": study.about.name, **sizes}
+        replicates = study.about.replicates
+        trials = sum(each.neat.population * each.neat.generations for each in physical_conditions(study))
+        sizes = {
+            "n_conditions": len(study.conditions),
+            "replicates": replicates,
+            "n_trials": trials * replicates,
+        }
+        return {"name": study.about.name, **sizes}, study
     except StudyFileError as error:
-        return {"mistakes": "\n".join(error.mistakes), "places": list(error.mistakes)}
+        return {"mistakes": "\n".join(error.mistakes), "places": list(error.mistakes)}, None
     except RealityGapError as error:
-        return {"mistakes": str(error)}
+        return {"mistakes": str(error)}, None
     except tomllib.TOMLDecodeError as error:
-        return {"mistakes": f"This is not TOML: {error}."}
+        return {"mistakes": f"This is not TOML: {error}."}, None

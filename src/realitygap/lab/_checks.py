@@ -6,7 +6,7 @@ import contextlib
 import threading
 from concurrent.futures import Future, InvalidStateError
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
 from realitygap.errors import StudyError
 
@@ -24,31 +24,60 @@ _LATE = (
 )
 
 
+T = TypeVar("T")
+
+
 class Check:
-    """A study file that is being read or checked.
+    """A process that reads or checks a study file, or waits for one.
 
     Attributes:
         found: Its result, as `_check_work` gives it.
+        seconds: Computing time of the study on this machine [s], some time after `found`; None if it is unknown.
 
     Args:
-        child: The process, which waits for it.
-        found: Is given the result.
-        wish: What to do with which text.
+        root: The lab's folder.
+        allow_code: Whether Python files of tasks may run.
     """
 
-    def __init__(self, child: Child, found: Future[dict[str, Any]], wish: dict[str, str]) -> None:
-        self.found = found
-        self._child = child
-        self._timer = threading.Timer(LIMIT_S, self.end, [_LATE])
-        self._timer.daemon = True
-        self._timer.start()
-        found.add_done_callback(lambda _: self._timer.cancel())
-        child.tell(wish)
+    def __init__(self, root: Path, *, allow_code: bool) -> None:
+        self.found: Future[dict[str, Any]] = Future()
+        self.seconds: Future[float | None] = Future()
+        order = {"work": "check", "root": str(root), "allow_code": allow_code}
+        self._child = Child(order, root, self._hear)
+
+    @property
+    def is_alive(self) -> bool:
+        """True if its process is still running."""
+        return self._child.is_alive
+
+    def begin(self, wish: dict[str, str]) -> None:
+        """Do something with a text, within the time limit."""
+        timer = threading.Timer(LIMIT_S, self.end, [_LATE])
+        timer.daemon = True
+        timer.start()
+        self.seconds.add_done_callback(lambda _: timer.cancel())
+        self._child.tell(wish)
 
     def end(self, why: str = "The check was canceled.") -> None:
         """Stop it."""
-        _answer(self.found, {"mistakes": why})
+        self._answer({"mistakes": why})
         self._child.kill()
+
+    def _hear(self, message: dict[str, Any]) -> None:
+        kind = message.get("kind")
+        if kind == "found" and "name" in message:  # an estimate follows
+            _set(self.found, message)
+        elif kind == "found":
+            self._answer(message)
+        elif kind == "estimated":
+            _set(self.seconds, message.get("seconds"))
+        elif kind in ("error", "ended"):
+            self._answer({"mistakes": message.get("text") or "The process that checks the file ended."})
+
+    def _answer(self, result: dict[str, Any]) -> None:
+        """Set what is not known yet."""
+        _set(self.found, result)
+        _set(self.seconds, None)
 
 
 class Checks:
@@ -63,13 +92,19 @@ class Checks:
         self._root = root
         self._allow_code = allow_code
         self._lock = threading.Lock()
-        self._ready: tuple[Child, Future[dict[str, Any]]] | None = None
+        self._ready: Check | None = None
         self._going: list[Check] = []
+
+    @property
+    def is_idle(self) -> bool:
+        """True if nothing is read, checked, or estimated."""
+        with self._lock:
+            return all(check.seconds.done() for check in self._going)
 
     def prepare(self) -> None:
         """Have a process ready for the next check."""
         with self._lock:
-            if self._ready is None or not self._ready[0].is_alive:
+            if self._ready is None or not self._ready.is_alive:
                 self._ready = self._start()
 
     def begin(self, do: Literal["read", "check"], text: str) -> Check:
@@ -81,14 +116,17 @@ class Checks:
         if len(text) > LONGEST_TEXT:
             raise StudyError(f"The file has {len(text):,} letters, expected at most {LONGEST_TEXT:,}.")
         with self._lock:
-            self._going = [check for check in self._going if not check.found.done()]
+            self._going = [check for check in self._going if not check.seconds.done()]
             if len(self._going) >= MOST:
-                raise StudyError(f"{MOST} checks are running. Wait until one is done, or cancel it.")
+                estimating = [check for check in self._going if check.found.done()]
+                if not estimating:
+                    raise StudyError(f"{MOST} checks are running. Wait until one is done, or cancel it.")
+                estimating[0].end()
         self.prepare()
         with self._lock:
-            (child, found), self._ready = self._ready or self._start(), None
-            check = Check(child, found, {"do": do, "text": text})
+            check, self._ready = self._ready or self._start(), None
             self._going.append(check)
+        check.begin({"do": do, "text": text})
         self.prepare()
         return check
 
@@ -97,25 +135,13 @@ class Checks:
         with self._lock:
             ready, self._ready = self._ready, None
             going, self._going = self._going, []
-        if ready is not None:
-            ready[0].kill()
-        for check in going:
+        for check in [*going, *([] if ready is None else [ready])]:
             check.end()
 
-    def _start(self) -> tuple[Child, Future[dict[str, Any]]]:
-        found: Future[dict[str, Any]] = Future()
-
-        def hear(message: dict[str, Any]) -> None:
-            kind = message.get("kind")
-            if kind == "found":
-                _answer(found, message)
-            elif kind in ("error", "ended"):
-                _answer(found, {"mistakes": message.get("text") or "The process that checks the file ended."})
-
-        order = {"work": "check", "root": str(self._root), "allow_code": self._allow_code}
-        return Child(order, self._root, hear), found
+    def _start(self) -> Check:
+        return Check(self._root, allow_code=self._allow_code)
 
 
-def _answer(found: Future[dict[str, Any]], result: dict[str, Any]) -> None:
+def _set(future: Future[T], value: T) -> None:
     with contextlib.suppress(InvalidStateError):
-        found.set_result(result)
+        future.set_result(value)

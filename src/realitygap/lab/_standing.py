@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from ._counted import counted
@@ -60,6 +60,12 @@ class Standing:
     def share(self) -> float:
         """Share of its runs that are published, 0 to 1."""
         return (self.n_done + self.n_driven_done) / max(self.n_runs + self.n_driven_runs, 1)
+
+    @property
+    def steady(self) -> Standing:
+        """The same without what changes all the time while it runs: numbers of runs and trials, and the rate."""
+        n_done, n_driven_done = min(self.n_done, 1), min(self.n_driven_done, 1)
+        return replace(self, n_done=n_done, n_driven_done=n_driven_done, trials={}, rate=0.0)
 
     @property
     def can_resume(self) -> bool:

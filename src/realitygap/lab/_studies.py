@@ -40,6 +40,7 @@ class StudyState:
         title, note: What it says of itself.
         n_runs, n_done: Simulated runs in all, and those published.
         n_driven_runs, n_driven_done: Runs of conditions that a robot drives, and those complete.
+        replicates: Runs of each condition.
         trials: How many trials of the ledger are in each state.
         used_by: The program that writes to it now, as it calls itself; empty where none does.
         labels: Labels of its conditions, such as SIM.
@@ -57,6 +58,7 @@ class StudyState:
     n_done: int = 0
     n_driven_runs: int = 0
     n_driven_done: int = 0
+    replicates: int = 1
     trials: dict[str, int] = field(default_factory=dict)
     used_by: str = ""
     labels: tuple[str, ...] = ()
@@ -202,6 +204,7 @@ def _state(name: str, folder: ResultsFolder) -> StudyState:
         n_done=n_done,
         n_driven_runs=replicates * len(driven),
         n_driven_done=n_complete,
+        replicates=replicates,
         trials=trials,
         used_by=used_by(folder.path),
         labels=tuple(

@@ -19,6 +19,7 @@ from ._closing.study import ClosingProgress, closing_the_gap
 from ._closing.summary import summarize_closing
 from ._code import AllowCode, check_files, python_tasks, task_named
 from ._controllers import Controller, sample_controllers
+from ._duration import estimate_seconds
 from ._file import DEFAULT_NEAT, SECTIONS, load_study, named_studies, parse_study, platform_sections
 from ._gap.between import GapBetween, gap_between
 from ._gap.plan import GapPlan, pilot_spreads, plan_gap, recorded_spreads
@@ -99,6 +100,7 @@ __all__ = [
     "connect_robot",
     "drive_study",
     "estimate_mean",
+    "estimate_seconds",
     "export_trials",
     "gap_between",
     "hold_out_of",

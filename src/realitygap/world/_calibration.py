@@ -63,7 +63,7 @@ class Fitted(Settings):
         if not values.get("identified") and values.get("advice", "").startswith(at_end):  # read from a file
             return values
         advice = "" if values.get("identified") else values.get("advice", "")
-        advice = advice or "Build on another robot (--base ROBOT)."
+        advice = advice or "Start from another robot model (--base ROBOT)."
         return {**values, "identified": False, "advice": f"{at_end} {advice}"}
 
     @model_validator(mode="after")

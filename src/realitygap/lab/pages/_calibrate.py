@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from typing import Any
 
@@ -445,8 +446,8 @@ def _show_fit(made: dict[str, Any], name: str) -> None:
     rows = [
         {
             "name": each["name"],
-            "estimate": f"{Fitted(**each).shown[0]} {each['unit']}",
-            "interval": Fitted(**each).shown[1],
+            "estimate": _with_minus(f"{Fitted(**each).shown[0]} {each['unit']}"),
+            "interval": _with_minus(Fitted(**each).shown[1]),
             "bar": _bar(each),
             "state": "Identified" if each["identified"] else "Not identified",
             "advice": each.get("advice", ""),
@@ -459,6 +460,11 @@ def _show_fit(made: dict[str, Any], name: str) -> None:
     table.add_slot("body-cell-state", _STATE)
     for note in made["notes"]:
         hint(note)
+
+
+def _with_minus(text: str) -> str:
+    """Return numbers in a text with a minus sign, which a hyphen in front of them stands for."""
+    return re.sub(r"(?<![\w-])-(?=[\d.])", "−", text)
 
 
 def _bar(fitted: dict[str, Any]) -> list[float]:

@@ -15,6 +15,7 @@ from realitygap.lab._standing import Standing
 from ._frame import framed, hint, section
 from ._notices import attempt
 from ._part import Part, watching
+from ._progress import Progress
 
 DISK_S = 2.0
 """Time between two looks at the folders of the studies [s]: other programs may write to them."""
@@ -60,6 +61,7 @@ class _Page:
         self._is_looking = False
         self._filter = ""
         self._order = "changed"
+        self._progress: dict[str, Progress] = {}
 
     def show(self) -> None:
         with ui.row().classes("lab-row") as self._tools:
@@ -90,6 +92,12 @@ class _Page:
         if found is not None:
             self._standings = found
             self._list.look()
+            self._put_progress()
+
+    def _put_progress(self) -> None:
+        for standing in self._standings:
+            if standing.name in self._progress:
+                self._progress[standing.name].put(standing)
 
     def _search(self, event: events.ValueChangeEventArguments[str | None]) -> None:
         self._filter = event.value or ""
@@ -106,7 +114,7 @@ class _Page:
             found.sort(key=lambda each: each.name)
         elif self._order == "state":
             found.sort(key=lambda each: each.word)
-        return tuple(found)
+        return tuple(each.steady for each in found)
 
     def _show_list(self, standings: tuple[Standing, ...]) -> None:
         self._tools.set_visibility(bool(self._standings))
@@ -118,15 +126,19 @@ class _Page:
             return
         if not standings:
             ui.label("No study has this text in its name or title. Clear the filter.")
-        for standing in standings[: self._n_shown]:
-            _show_study(self._lab, standing)
-        self._want_thumbnails(standings[: self._n_shown])
+        now = {each.name: each for each in self._standings}
+        shown = [now[each.name] for each in standings[: self._n_shown]]
+        self._progress = {each.name: Progress() for each in shown}
+        for standing in shown:
+            _show_study(self._lab, standing, self._progress[standing.name])
+        self._put_progress()
+        self._want_thumbnails(shown)
         if len(standings) > self._n_shown:
             ui.button(f"Show {len(standings) - self._n_shown:,} more", on_click=self._show_more).props(
                 "outline no-caps"
             )
 
-    def _want_thumbnails(self, standings: tuple[Standing, ...]) -> None:
+    def _want_thumbnails(self, standings: list[Standing]) -> None:
         """Request the missing pictures of the first studies."""
         missing = [each for each in standings if each.n_done and not each.medians and each.word in _AT_REST]
         for each in missing[:MOST_DRAWN]:
@@ -160,7 +172,7 @@ class _Page:
                 ui.label(progress)
 
 
-def _show_study(lab: Lab, standing: Standing) -> None:
+def _show_study(lab: Lab, standing: Standing, progress: Progress) -> None:
     address = f"/study/{standing.name}"
     row = ui.element("div").classes("lab-study").props(f'data-study="{standing.name}"')
     with row:
@@ -176,10 +188,9 @@ def _show_study(lab: Lab, standing: Standing) -> None:
             if standing.title != standing.name:
                 hint(standing.name)
             if standing.word != "Complete" and (standing.n_runs or standing.n_driven_runs):
-                share = standing.share
-                ui.linear_progress(share, show_value=False).props(f'aria-label="{100 * share:.0f} % done"')
+                progress.show_bar()
             if standing.progress:
-                ui.label(standing.progress)
+                progress.show_words()
             if standing.message:
                 ui.label(standing.message).classes("lab-problem")
         with ui.element("div").classes("lab-study-medians"):

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import re
+import time
+from dataclasses import dataclass
 from importlib import resources
 from typing import Any, Literal
 
@@ -25,6 +28,7 @@ from realitygap.lab._form import (
     written_form,
 )
 from realitygap.lab._lab import Lab
+from realitygap.lab._pace import duration
 from realitygap.study import named_studies
 
 from ._fields import Form
@@ -51,6 +55,12 @@ CALIBRATED = r"sim:[A-Za-z0-9][A-Za-z0-9._-]{0,90}\.toml"
 
 MOST_SHOWN = 50
 """Number of conditions that the form shows."""
+LOOK_S = 0.5
+"""Time between two looks at what was entered [s]."""
+PAUSE_S = 1.5
+"""Time without a change after which the computing time of the study is estimated [s]."""
+LEAST_S = 5.0
+"""Shortest computing time that is told [s]: starting a process takes some seconds, too."""
 
 _BASICS = {
     "study.name": "Name",
@@ -106,6 +116,8 @@ class _Page:
         self._lab = lab
         self._draft = draft
         self._check: Check | None = None
+        self._estimate: Check | None = None
+        self._summary = _Summary()
         self._boxes: list[tuple[str, ui.element]] = []
         self._is_open = False
         # entered texts that are no values, by field: the draft cannot hold them
@@ -157,6 +169,7 @@ class _Page:
                 check = ui.button("Check", on_click=self._check_only).props("outline no-caps")
                 start = ui.button("Start study", on_click=self._start).props("unelevated no-caps")
         self._buttons = (check, start)
+        ui.timer(LOOK_S, self._look_at_size)
 
     def _show_summary(self) -> None:
         """Show the place for mistakes, above form and file."""
@@ -385,11 +398,16 @@ class _Page:
         self._waiting_for.text = f"{'Reading' if do == 'read' else 'Checking'} the study file…"
         self._waiting.set_visibility(True)
         try:
-            return await asyncio.wrap_future(check.found)
+            found = await asyncio.wrap_future(check.found)
         finally:
             if self._check is check:
                 self._check = None
                 self._waiting.set_visibility(False)
+        if "name" in found and text == self._summary.text:
+            self._end_estimate()
+            self._estimate = check
+            self._read_estimate(check)
+        return found
 
     def _cancel(self) -> None:
         if self._check is not None:
@@ -402,18 +420,17 @@ class _Page:
             self._form.show_problems(problems)
             return None
         text = self._whole()
+        summary = self._summary_of(text)
         found = await self._ask("check", text)
         if "name" not in found:
             self._show_mistakes(found)
             return None
         self._form.show_problems({})
-        n, replicates = found["n_conditions"], found["replicates"]
-        size = f"{counted(n, 'condition')} × {counted(replicates, 'run')}"
-        self._size.text = f"No mistakes. {size} = {counted(n * replicates, 'run')}."
+        summary.is_checked, summary.is_due = True, False
+        self._size.text = self._summary.words
         return {**found, "text": text}
 
     def _show_mistakes(self, found: dict[str, Any]) -> None:
-        self._size.text = ""
         places = found.get("places")
         if not places or self._is_text:
             self._form.show_problems({"": str(found["mistakes"])})
@@ -422,6 +439,60 @@ class _Page:
 
     async def _check_only(self) -> None:
         await self._checked()
+
+    # the size of the study and its computing time, which are always in view
+
+    async def _look_at_size(self) -> None:
+        """Show the size; some time after the last change, have the computing time estimated."""
+        text = "" if self._has_unread else self._whole()
+        summary = self._summary_of(text)
+        is_due = text and summary.is_due and time.monotonic() - summary.changed_s > PAUSE_S
+        if self._estimate is not None:
+            self._read_estimate(self._estimate)
+        elif is_due and self._check is None and self._lab.checks.is_idle:
+            summary.is_due = False
+            with contextlib.suppress(StudyError):
+                check = await run.io_bound(self._lab.checks.begin, "check", text)
+                if check is not None and self._summary is summary and self._estimate is None:
+                    self._estimate = check
+                elif check is not None:  # something was entered in the meantime
+                    check.end()
+        self._size.text = self._summary.words
+
+    @property
+    def _has_unread(self) -> bool:
+        """True if a field of the form has a text that is no value."""
+        return bool(self._unread) and not self._is_text
+
+    def _summary_of(self, text: str) -> _Summary:
+        """Return the summary of this text; a new one if the text has changed."""
+        if text != self._summary.text:
+            self._end_estimate()
+            self._summary = _Summary(text, time.monotonic(), *self._size_of_draft())
+        return self._summary
+
+    def _size_of_draft(self) -> tuple[int, int]:
+        """Return the numbers of conditions and of runs of each; 0 where that is not known."""
+        listed, replicates = self._draft.data.get("condition"), self._draft.value("study.replicates")
+        if self._is_text or self._has_unread or not isinstance(listed, list):
+            return 0, 0
+        return len(listed), replicates if isinstance(replicates, int) else 0
+
+    def _read_estimate(self, check: Check) -> None:
+        """Take what the check has found so far."""
+        summary = self._summary
+        if check.found.done() and "name" in (found := check.found.result()):
+            summary.n_conditions, summary.replicates = found["n_conditions"], found["replicates"]
+            summary.n_trials = found["n_trials"]
+            summary.is_estimating = not check.seconds.done()
+        if check.seconds.done():
+            summary.seconds = check.seconds.result()
+            self._estimate = None
+
+    def _end_estimate(self) -> None:
+        if self._estimate is not None:
+            self._estimate.end()
+            self._estimate = None
 
     async def _start(self) -> None:
         found = await self._checked()
@@ -433,6 +504,51 @@ class _Page:
             self._form.show_problems({"" if self._is_text else "study.name": str(error)})
         else:
             ui.navigate.to(f"/study/{found['name']}")
+
+
+@dataclass
+class _Summary:
+    """The size of a study, and its computing time.
+
+    Attributes:
+        text: Its file.
+        changed_s: When this was entered [s].
+        n_conditions, replicates: Its size; 0 if unknown.
+        n_trials: Trials that a robot drives.
+        is_checked: Whether a visitor had it checked, without a mistake.
+        is_due: Whether its computing time is still to be estimated.
+        is_estimating: Whether that is being done.
+        seconds: Computing time [s]; None if unknown.
+    """
+
+    text: str = ""
+    changed_s: float = 0.0
+    n_conditions: int = 0
+    replicates: int = 0
+    n_trials: int = 0
+    is_checked: bool = False
+    is_due: bool = True
+    is_estimating: bool = False
+    seconds: float | None = None
+
+    @property
+    def words(self) -> str:
+        """The summary in words; empty if the size is unknown."""
+        n, replicates = self.n_conditions, self.replicates
+        if n * replicates == 0:
+            return ""
+        parts = [
+            f"{counted(n, 'condition')} × {counted(replicates, 'run')} = {counted(n * replicates, 'run')}"
+        ]
+        if self.n_trials:
+            parts.append(f"{counted(self.n_trials, 'trial')} on the robot")
+        if self.is_estimating:
+            parts.append("estimating the time…")
+        elif self.seconds is not None and self.seconds < LEAST_S:
+            parts.append(f"less than {LEAST_S:.0f} s on this machine")
+        elif self.seconds is not None:
+            parts.append(f"about {duration(self.seconds)} on this machine")
+        return ("No mistakes. " if self.is_checked else "") + " · ".join(parts)
 
 
 def _problem_of(mistake: str) -> tuple[str, str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from typing import Any
 
 from nicegui import ui
@@ -19,7 +20,8 @@ class Player(Element, component="player.js"):
 
     def __init__(self, scene: dict[str, Any], trials: list[dict[str, Any]], *, live: bool = False) -> None:
         super().__init__()
-        self._props |= {"scene": scene, "trials": trials, "live": live}
+        # As one text: NiceGUI watches each list and number of other values, which takes a server's time on each page.
+        self._props |= {"shown": json.dumps({"scene": scene, "trials": trials}), "live": live}
 
 
 class LivePlayer:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import secrets
 from dataclasses import dataclass
 from typing import Any
@@ -32,6 +31,7 @@ from ._home import show_control, show_state
 from ._notices import attempt
 from ._part import Part, watching
 from ._player import LivePlayer, Player
+from ._progress import Progress
 
 MOST_REPLICATES = 1_000_000_000
 """Largest number of runs per condition that a study takes."""
@@ -204,7 +204,7 @@ class _Page:
         if self._standing.note:
             hint(self._standing.note)
         self._dialogs = ui.element("div")  # apart from the state, which is drawn again while a dialog is open
-        self._state = Part(lambda: self._standing, self._show_state)
+        self._state = Part(lambda: self._standing.steady, self._show_state)
         self._state.show()
         with ui.tabs().props("no-caps align=left") as tabs:
             overview = ui.tab("Overview")
@@ -258,7 +258,8 @@ class _Page:
     def _show_state(self, standing: Standing) -> None:
         with ui.row().classes("lab-row"):
             show_state(standing)
-            ui.label(standing.progress).props('role="status"')
+            self._progress = Progress()
+            self._progress.show_words().props('role="status"')
             show_control(self._lab, standing)
             if standing.has_robot:
                 ui.button("Open trials", on_click=self._open_trials).props("outline no-caps")
@@ -267,8 +268,8 @@ class _Page:
             if standing.word == "Complete":
                 ui.button("Run more replicates", on_click=self._ask_replicates).props("outline no-caps")
         if standing.word != "Complete":
-            share = standing.share
-            ui.linear_progress(share, show_value=False).props(f'aria-label="{100 * share:.0f} % done"')
+            self._progress.show_bar()
+        self._progress.put(self._standing)
         if standing.message:
             ui.label(standing.message).classes("lab-problem lab-lines")
 
@@ -348,6 +349,7 @@ class _Page:
             return
         self._standing, has_report, self._replicates = found
         self._state.look()
+        self._progress.put(self._standing)
         self._renew_figures()
         if has_report != self._has_report:
             self._has_report = has_report
@@ -360,9 +362,7 @@ class _Page:
         if state.n_done or state.n_driven_done:
             done = (state.n_done, state.n_driven_done)
             self._watcher.look(done, is_running=standing.word in _GROWING)
-        replicates = self._replicates
-        with contextlib.suppress(RealityGapError):  # it cannot be read in this moment
-            replicates = int(self._lab.studies.results(self._name).description["replicates"])
+        replicates = self._replicates if state.problem else state.replicates
         return standing, (self._lab.root / self._name / "report.html").is_file(), replicates
 
     def _show_driving(self, driven: tuple[StudyJob, dict[str, Any]] | None) -> None:

@@ -1,10 +1,11 @@
 // The player of notebooks, on a page: trials that were driven, or one that is being driven.
 export default {
-  props: { scene: Object, trials: Array, live: Boolean },
+  props: { shown: String, live: Boolean },
   template: `<div class="lab-player" ref="place"></div>`,
   async mounted() {
     const { default: player } = await import(`${window.path_prefix || ""}/lab-player/player.js`);
-    const { scene, trials, live } = this;
+    const { scene, trials } = JSON.parse(this.shown);
+    const live = this.live;
     const values = { scene, trials, speed: 1, live, was_live: live };
     const heard = (this.heard = {});
     const model = {

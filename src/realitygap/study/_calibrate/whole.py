@@ -333,7 +333,7 @@ def _bound_by_prior(fitted: Sequence[Fitted]) -> tuple[str, ...]:
     )
     return (
         f"Intervals that reach an end of their prior: {names}. The prior is around the robot file's numbers and may "
-        "not include this robot. Build on a robot file with other numbers (--base FILE).",
+        "not include this robot. Start from a robot model with other numbers (--base FILE).",
     )
 
 

@@ -225,6 +225,15 @@ def make_sim_room(shape, neat, hidden_room, dtype):
     return SimRoom(lanes, make_near(shape, dtype), make_wiring(np.zeros(0, dtype), neat, hidden_room))
 
 
+@stage
+def _take(numbers, row):
+    """Copy numbers to the first lanes of a row, and the last number to the others."""
+    for lane in range(numbers.size):
+        row[lane] = numbers[lane]
+    for lane in range(numbers.size, LANES):
+        row[lane] = numbers[numbers.size - 1]
+
+
 @kernel
 def _load(table, counters, first, n_lanes, lanes):
     """Lay out the numbers of trials `first` and on; lanes without a trial get those of the last one."""
@@ -233,8 +242,7 @@ def _load(table, counters, first, n_lanes, lanes):
             for lane in range(LANES):
                 lanes.p[row, lane] = table[row, 0]
         else:
-            for lane in range(LANES):
-                lanes.p[row, lane] = table[row, first + min(lane, n_lanes - 1)]
+            _take(table[row, first : first + n_lanes], lanes.p[row])
     for word in range(3):
         for lane in range(LANES):
             given = counters[first + min(lane, n_lanes - 1), word]

@@ -54,9 +54,31 @@ def _machine(codegen: Any) -> Any:
     return target.create_target_machine(**options)
 
 
+# Calls that LLVM itself inserts, such as those of memset, read their address from the table, too.
+_BY_TABLE = """
+!llvm.module.flags = !{!0}
+!0 = !{i32 7, !"RtLibUseGOT", i32 1}
+"""
+
+
+def emit(library: Any) -> bytes:
+    """Return the machine code of a library of Numba, whose functions are optimized.
+
+    Calls of other objects read their address from the object's table of addresses. For calls by a stub, LLVM makes
+    entries in that table which it does not count, and the process ends where they do not fit into the memory.
+    """
+    module = library._final_module
+    for function in module.functions:
+        if function.is_declaration and not function.name.startswith("llvm."):
+            function.add_function_attribute("nonlazybind")
+    module.link_in(llvmlite.binding.parse_assembly(_BY_TABLE))
+    code: bytes = _machine(library._codegen).emit_object(module)
+    return code
+
+
 def finish(library: Any) -> None:
-    """Make the machine code of a library of Numba, whose functions are optimized, and load it."""
-    code = _machine(library._codegen).emit_object(library._final_module)
+    """Make the machine code of a library of Numba and load it."""
+    code = emit(library)
     library._set_compiled_object(code)  # as Numba does with what comes from disk
     type(library)._finalize_final_module(library)
     library._compiled_object = code

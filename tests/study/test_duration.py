@@ -56,5 +56,11 @@ def test_study_that_only_a_robot_drives_has_no_computing_time():
     assert estimate_seconds(load_study("paper-robot")) is None
 
 
+def test_no_run_is_timed_where_each_takes_long_or_another_program_would_start(monkeypatch):
+    monkeypatch.setattr(_duration, "prepare_kernels", lambda _: pytest.fail("a run was started"))
+    study = STUDY + 'platform = "enki"\n[controller]\ninputs = ["range.0", "range.1", "bias"]\n'
+    assert estimate_seconds(parse_study(study.replace("noise = 0.1\n", ""), "timed.toml")) is None
+
+
 def test_estimate_of_real_runs_is_a_time():
     assert 0.0 < estimate_seconds(parse_study(STUDY, "timed.toml")) < 600.0

@@ -6,7 +6,6 @@ import statistics
 import time
 from concurrent.futures import ThreadPoolExecutor
 
-from realitygap.platforms import close_twins, release_twins
 from realitygap.runs import Condition, prepare_kernels, run_replicates
 from realitygap.trials import usable_processors
 
@@ -28,26 +27,21 @@ def estimate_seconds(study: Study) -> float | None:
     this does not count.
 
     Returns:
-        Time [s]; None for a study that runs Python files of tasks, or without simulated conditions.
+        Time [s]; None for a study without simulated conditions, with Python files of tasks, or on a platform each of
+        whose runs takes long, such as twins in MuJoCo.
     """
     conditions = [each for each in study.conditions if not each.is_physical]
-    if not conditions or python_tasks(study):
+    if not conditions or python_tasks(study) or any(each.on.is_slow for each in conditions):
         return None
     replicates = study.about.replicates
     prepare_kernels(conditions)
     began, costs = time.perf_counter(), []
     cores = usable_processors()
-    try:
-        with ThreadPoolExecutor(cores) as pool:
-            for condition in conditions:
-                costs.append(_seconds_per_run(condition, replicates, pool, cores))
-                if time.perf_counter() - began > MOST_S:
-                    break
-    except BaseException:
-        close_twins()
-        raise
-    finally:
-        release_twins()
+    with ThreadPoolExecutor(cores) as pool:
+        for condition in conditions:
+            costs.append(_seconds_per_run(condition, replicates, pool, cores))
+            if time.perf_counter() - began > MOST_S:
+                break
     return statistics.fmean(costs) * len(conditions) * replicates
 
 

@@ -1,7 +1,6 @@
 """The cache of compiled kernels: kept, renewed with the sources, and never in the way."""
 
 import os
-import platform
 import subprocess
 import sys
 import time
@@ -287,41 +286,6 @@ def test_the_warning_names_what_was_raised(monkeypatch):
     monkeypatch.setattr(elementary.tanh, "_plain_entry", lambda x: x)
     with pytest.warns(RuntimeWarning, match=r"Numba 0.99.0 .* \(KeyError: 'a part'\)"):
         assert elementary.tanh._call_plainly((0.5,), KeyError("a part")) == 0.5
-
-
-# constants by their distance
-
-OTHER_USER = """
-import numba
-assert numba.njit(lambda x: x + 1)(1) == 2
-"""
-ON_LINUX = sys.platform == "linux" and platform.machine() == "x86_64"
-
-
-@pytest.mark.slow
-def test_addresses_are_short_where_numba_keeps_objects_together(tmp_path):
-    got = {}
-    for before, choice, is_short in (
-        ("", None, ON_LINUX),
-        (OTHER_USER, None, False),
-        ("", "0", False),
-        (OTHER_USER, "1", ON_LINUX),
-    ):
-        code = before + CODE_OF_BOTH.replace("{broken}", "False").replace("{version}", "''")
-        code += "from realitygap.kernels.compile import addresses\nprint(addresses.ARE_SHORT)\n"
-        chosen = {} if choice is None else {"NUMBA_USE_LLVMLITE_MEMORY_MANAGER": choice}
-        for _ in range(2):  # compiled, and loaded
-            done = subprocess.run(
-                [sys.executable, "-c", code],
-                capture_output=True,
-                text=True,
-                env={"PATH": "/usr/bin:/bin", "REALITYGAP_CACHE": str(tmp_path), **chosen},
-                check=True,
-            )
-            *results, used = done.stdout.splitlines()
-            assert used == str(is_short), (before, choice)
-            got[tuple(results)] = used
-    assert len(got) == 1
 
 
 # kernels that others call

@@ -23,7 +23,6 @@ from numba.core import caching, serialize
 from numba.core.compiler import CompileResult
 from numba.core.runtime import rtsys
 
-from . import addresses
 from .progress import begin_compiling, end_compiling
 
 _PACKAGE = __name__.rsplit(".", 2)[0]
@@ -282,8 +281,7 @@ class SealedCache(caching._Cache):  # type: ignore[misc]
         return sources_hash(self._module)
 
     def _key(self, signature: Any, codegen: Any) -> tuple[Any, ...]:
-        machine = (*codegen.magic_tuple(), "short" if addresses.ARE_SHORT else "")
-        return (self._name, self._sources, self._code, self._way, signature, machine)
+        return (self._name, self._sources, self._code, self._way, signature, codegen.magic_tuple())
 
     def _stem(self, key: tuple[Any, ...]) -> str:
         return f"{self._name}-{hashlib.sha256(repr(key).encode()).hexdigest()[:16]}"

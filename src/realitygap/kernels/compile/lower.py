@@ -15,7 +15,7 @@ from numba.core.compiler_machinery import register_pass
 from numba.core.typed_passes import NativeLowering
 from numba.np import arrayobj
 
-from . import addresses, parts
+from . import parts
 from .parts import PartsBuilder
 
 # Of the symbol of a function that unpacks what Python calls with.
@@ -244,8 +244,6 @@ def _make_library(state: Any) -> Any:
     library.enable_object_caching()
     library._optimize_functions = functools.partial(_tidy, library)
     library.add_ir_module = functools.partial(_add_module, library)
-    if addresses.ARE_SHORT:
-        library._finalize_final_module = functools.partial(addresses.finish, library)
     return library
 
 

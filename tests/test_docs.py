@@ -28,6 +28,9 @@ ROOT = Path(__file__).parent.parent
 DOCS = ROOT / "docs"
 
 
+sys.path.append(str(DOCS))  # as for a script that runs there: some of them import another one
+
+
 def _load(name):
     if name not in sys.modules:
         spec = importlib.util.spec_from_file_location(name, DOCS / f"{name}.py")

@@ -12,8 +12,8 @@ from realitygap.kernels.compile.decorators import kernel, stage
 from realitygap.kernels.math.bits import highest_bit, lowest_bit, shift_left
 from realitygap.kernels.math.lanes import LANES, copy_row, words_of
 
-WORD = 32
-"""Lanes that are looked at together, a bit each; they divide `LANES`."""
+LANES_PER_WORD = 32
+"""Number of lanes that `list_fresh` gathers as the bits of a word; it divides `LANES`."""
 
 
 @stage
@@ -185,32 +185,33 @@ def list_fresh(line, columns, rows, fresh, any_fresh, n_lanes, cells, first, n_l
         n_line: (LANES,) how many there are, changed.
     """
     words = words_of(columns)
-    for start in range(0, n_lanes, WORD):
+    for start in range(0, n_lanes, LANES_PER_WORD):
         found = np.uint32(0)
-        for k in range(WORD):
+        for k in range(LANES_PER_WORD):
             bit = shift_left(np.uint32(1), np.uint32(k))
             found = np.uint32(found | (bit if any_fresh[start + k] != 0 else np.uint32(0)))
-        # Over the lanes that have any: whether a lane has some is a branch that a processor cannot foresee.
+        # A processor cannot predict a branch for each lane, so the loop visits only the lanes that have new cells.
         while found != 0:
             lane = start + lowest_bit(found)
             found = np.uint32(found & np.uint32(found - np.uint32(1)))
-            if lane < n_lanes:
-                upward = line.to_v[lane] >= line.from_v[lane]
-                rightward = line.to_u[lane] >= line.from_u[lane]
-                bottom = max(int(line.bottom[lane]), 0)
-                top = min(int(line.top[lane]), rows - 1)
-                n = n_line[lane]
-                for i in range(top - bottom + 1):
-                    row = bottom + i if upward else top - i
-                    for j in range(words):
-                        k = j if rightward else words - 1 - j
-                        bits = fresh[row * words + k, lane]
-                        while bits != 0:
-                            place = lowest_bit(bits) if rightward else highest_bit(bits)
-                            bits = np.uint32(bits & np.uint32(~shift_left(np.uint32(1), np.uint32(place))))
-                            cells[first + lane, n] = columns * row + 32 * k + place
-                            n += 1
-                n_line[lane] = n
+            if lane >= n_lanes:
+                break
+            upward = line.to_v[lane] >= line.from_v[lane]
+            rightward = line.to_u[lane] >= line.from_u[lane]
+            bottom = max(int(line.bottom[lane]), 0)
+            top = min(int(line.top[lane]), rows - 1)
+            n = n_line[lane]
+            for i in range(top - bottom + 1):
+                row = bottom + i if upward else top - i
+                for j in range(words):
+                    k = j if rightward else words - 1 - j
+                    bits = fresh[row * words + k, lane]
+                    while bits != 0:
+                        place = lowest_bit(bits) if rightward else highest_bit(bits)
+                        bits = np.uint32(bits & np.uint32(~shift_left(np.uint32(1), np.uint32(place))))
+                        cells[first + lane, n] = columns * row + 32 * k + place
+                        n += 1
+            n_line[lane] = n
 
 
 @kernel

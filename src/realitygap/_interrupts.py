@@ -62,7 +62,7 @@ def kept_interrupts() -> Iterator[None]:
 def on_interrupt(number: int, frame: FrameType | None) -> None:
     """Raise KeyboardInterrupt, or repeat the signal later if code that must not be cut off is running."""
     while frame is not None:
-        library = frame.f_globals.get("__name__", "").partition(".")[0]
+        library = str(frame.f_globals.get("__name__")).partition(".")[0]
         if frame.f_code.co_name in CALLBACKS or library == RUST_LIBRARY:
             _repeat_later()
             return

@@ -53,9 +53,8 @@ def _seconds_per_run(condition: Condition, replicates: int, pool: ThreadPoolExec
         return seconds / cores
     n_runs = 1
     while True:
-        seconds = min(
-            _seconds(condition, n_runs, pool, cores) for _ in range(2)
-        )  # another program may take a core
+        # The shorter of two times: another program may take a core for a moment.
+        seconds = min(_seconds(condition, n_runs, pool, cores) for _ in range(2))
         if seconds >= LEAST_S or n_runs * cores >= replicates:
             return seconds / (n_runs * cores)
         n_runs *= 2

@@ -535,7 +535,7 @@ class _Summary:
     def words(self) -> str:
         """The summary in words; empty if the size is unknown."""
         n, replicates = self.n_conditions, self.replicates
-        if n * replicates == 0:
+        if n <= 0 or replicates <= 0:
             return ""
         parts = [
             f"{counted(n, 'condition')} × {counted(replicates, 'run')} = {counted(n * replicates, 'run')}"

@@ -20,7 +20,7 @@ class Player(Element, component="player.js"):
 
     def __init__(self, scene: dict[str, Any], trials: list[dict[str, Any]], *, live: bool = False) -> None:
         super().__init__()
-        # As one text: NiceGUI watches each list and number of other values, which takes a server's time on each page.
+        # One text, because NiceGUI watches each list within a value, which takes much of the server's time.
         self._props |= {"shown": json.dumps({"scene": scene, "trials": trials}), "live": live}
 
 

@@ -8,7 +8,7 @@ from realitygap.lab._standing import Standing
 
 
 class Progress:
-    """Progress that changes in place: drawing its surroundings again with each run would keep the server busy."""
+    """Progress that changes in place, because drawing a page again after each run would keep the server busy."""
 
     def __init__(self) -> None:
         self._words: ui.label | None = None

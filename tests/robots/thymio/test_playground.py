@@ -1,11 +1,13 @@
 """The driver of the Thymio against Aseba's playground."""
 
+import itertools
 import math
 import os
 import random
 import signal
 import subprocess
 import sys
+import threading
 import time
 from dataclasses import replace
 
@@ -136,11 +138,33 @@ def test_resets_put_the_robot_where_they_say(playground):
             assert playground.path().shape == (1, 4)
 
 
-def test_a_driving_robot_cannot_be_placed(playground):
+@pytest.fixture
+def driving(playground):
+    """The playground with a robot that drives for 60 s of its time."""
     with Thymio(playground.port) as robot:
+        stands = playground.pose()
         robot.link.emit(0, (300, 300, 3000))
-        with pytest.raises(RobotError, match="it is driving"):
-            playground.place(Pose(0.5, ROW, 0.0))
+        until = time.monotonic() + 5.0
+        while playground.pose() == stands and time.monotonic() < until:
+            time.sleep(0.01)
+        yield playground
+
+
+def test_a_driving_robot_cannot_be_placed(driving):
+    with pytest.raises(RobotError, match="it is driving"):
+        driving.place(Pose(0.5, ROW, 0.0))
+
+
+def test_a_playground_that_answers_late_cannot_place_a_driving_robot(driving, monkeypatch):
+    """On a busy machine its program answers one question before it makes the steps that are due."""
+    pose, wanted = driving.pose, Pose(0.5, ROW, 0.0)
+    answers = itertools.cycle([lambda: wanted, pose, pose])
+    own_thread = threading.current_thread()  # another one follows the robot
+    monkeypatch.setattr(
+        driving, "pose", lambda: next(answers)() if threading.current_thread() is own_thread else pose()
+    )
+    with pytest.raises(RobotError, match="it is driving"):
+        driving.place(wanted)
 
 
 def test_the_clock_is_that_of_the_simulated_robot(playground):

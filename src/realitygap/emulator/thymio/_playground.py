@@ -46,6 +46,8 @@ START_S = 10.0
 STAND_S = 0.06
 """Time after which the pose of a robot at rest is constant [s of its time]."""
 STAND_TRIES = 50
+LOOKS = 3
+"""Times that the pose is read for each try: a program that was held up answers first, then moves its robot."""
 SAMPLE_S = 0.05
 """Time between two points of the path [s of the robot's time]."""
 _BUS_NAME = "ch.epfl.mobots.AsebaPlayground"
@@ -266,8 +268,9 @@ class Playground(ClosedOnExit):
         for _ in range(STAND_TRIES):
             for name, value in values.items():
                 self._call(self._path, _PROPERTIES, "Set", "ssv", _BODY, name, float(value))
-            time.sleep(STAND_S / self._speed)
-            found = self.pose()
+            for _ in range(LOOKS):
+                time.sleep(STAND_S / LOOKS / self._speed)
+                found = self.pose()
             turned = abs((found.heading - wanted.heading + np.pi) % (2 * np.pi) - np.pi)
             if max(abs(found.x - wanted.x), abs(found.y - wanted.y), turned) < 1e-6:
                 with self._lock:

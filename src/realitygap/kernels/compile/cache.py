@@ -23,6 +23,7 @@ from numba.core import caching, serialize
 from numba.core.compiler import CompileResult
 from numba.core.runtime import rtsys
 
+from . import addresses
 from .progress import begin_compiling, end_compiling
 
 _PACKAGE = __name__.rsplit(".", 2)[0]
@@ -196,6 +197,9 @@ def _without_bitcode(compiled: Any) -> Any:
 # Of the symbols of shared kernels; the rest of a symbol is the name of the file.
 SHARED = "realitygap.shared."
 
+# Marks what Numba's own pipeline compiles.
+PLAIN_WAY = "plain"
+
 # Libraries of shared kernels that other kernels can call, by symbol; what is forgotten here is unloaded.
 _loaded: dict[str, Any] = {}
 
@@ -216,9 +220,8 @@ def load_shared(symbol: str, folder: Path, target_context: Any) -> Any:
     if symbol not in _loaded:
         for needed in stored["needed"]:
             load_shared(needed, folder, target_context)
-        library = target_context.codegen().unserialize_library(
-            (symbol, "object", (stored["code"], _symbols_only([symbol])))
-        )
+        codegen = addresses.codegen_for(target_context.codegen())
+        library = codegen.unserialize_library((symbol, "object", (stored["code"], _symbols_only([symbol]))))
         _loaded[symbol] = library
     return key, stored
 
@@ -281,7 +284,9 @@ class SealedCache(caching._Cache):  # type: ignore[misc]
         return sources_hash(self._module)
 
     def _key(self, signature: Any, codegen: Any) -> tuple[Any, ...]:
-        return (self._name, self._sources, self._code, self._way, signature, codegen.magic_tuple())
+        is_short = self._way != PLAIN_WAY and addresses.is_short(addresses.codegen_for(codegen))
+        machine = (*codegen.magic_tuple(), "short" if is_short else "")
+        return (self._name, self._sources, self._code, self._way, signature, machine)
 
     def _stem(self, key: tuple[Any, ...]) -> str:
         return f"{self._name}-{hashlib.sha256(repr(key).encode()).hexdigest()[:16]}"
@@ -302,7 +307,8 @@ class SealedCache(caching._Cache):  # type: ignore[misc]
             _import_without_blas()
             return None
         # Shortened hashes could agree by chance.
-        return CompileResult._rebuild(target_context, *reduced) if stored == key else None
+        context = target_context if self._way == PLAIN_WAY else addresses.context_of(target_context)
+        return CompileResult._rebuild(context, *reduced) if stored == key else None
 
     def save_overload(self, signature: Any, compiled: Any) -> None:
         """Save the compiled function, unless that fails: the function works without its file."""

@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 import numba
 
-from .cache import SealedCache, usable_folder
+from .cache import PLAIN_WAY, SealedCache, usable_folder
 
 try:
     from . import pipeline
@@ -93,7 +93,7 @@ class Kernel:
     @functools.cached_property
     def _plain_entry(self) -> Any:
         entry = numba.njit(**self._options)(self.py_func)
-        _save_on_disk(entry, "plain")
+        _save_on_disk(entry, PLAIN_WAY)
         return entry
 
     @functools.cached_property

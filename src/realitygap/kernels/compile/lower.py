@@ -15,7 +15,7 @@ from numba.core.compiler_machinery import register_pass
 from numba.core.typed_passes import NativeLowering
 from numba.np import arrayobj
 
-from . import parts
+from . import addresses, parts
 from .parts import PartsBuilder
 
 # Of the symbol of a function that unpacks what Python calls with.
@@ -240,10 +240,13 @@ class LowerKernel(NativeLowering):
 
 def _make_library(state: Any) -> Any:
     """Return an empty library for a function."""
-    library = state.targetctx.codegen().create_library(state.func_id.func_qualname)
+    codegen = addresses.codegen_for(state.targetctx.codegen())
+    library = codegen.create_library(state.func_id.func_qualname)
     library.enable_object_caching()
     library._optimize_functions = functools.partial(_tidy, library)
     library.add_ir_module = functools.partial(_add_module, library)
+    if addresses.is_short(codegen):
+        library._finalize_final_module = functools.partial(addresses.finish, library)
     return library
 
 

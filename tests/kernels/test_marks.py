@@ -26,7 +26,8 @@ def marked(paths: list[Path], columns: int, rows: int, real: type) -> list[tuple
     assert len(paths) <= LANES
     line = Line(*np.zeros((len(Line._fields), LANES), real))
     words = rows * -(-columns // 32)
-    visited, fresh, ends = (np.zeros((words, LANES), np.uint32) for _ in range(3))
+    visited, ends = (np.zeros((words, LANES), np.uint32) for _ in range(2))
+    room, fresh = np.zeros((3, LANES), np.uint32), np.zeros((words + words // rows, LANES), np.uint32)
     any_fresh, n_line = np.zeros(LANES, np.uint32), np.zeros(LANES, np.int32)
     cells = np.zeros((len(paths), columns * rows), np.uint8)
     grid = np.array([0, 0, 1, SNAP[real]], real)
@@ -36,7 +37,7 @@ def marked(paths: list[Path], columns: int, rows: int, real: type) -> list[tuple
         x, y = np.zeros((2, LANES), real)
         x[: len(paths)], y[: len(paths)] = points[:, k].T
         marks.place_line(grid, x, y, line)
-        marks.mark_line(line, grid[3], columns, rows, visited, fresh, any_fresh)
+        marks.mark_line(line, grid[3], columns, rows, room, visited, fresh, any_fresh)
         marks.mark_ends(line, columns, rows, ends)
         marks.list_fresh(
             line, columns, rows, fresh, any_fresh, np.int64(len(paths)), cells, np.int64(0), n_line

@@ -279,8 +279,9 @@ def arrive(scene, lanes):
     """Mark the cells on the way to where the robots are now, and sense there."""
     place_line(scene.grid, lanes.pose.x, lanes.pose.y, lanes.line)
     mark_line(
-        lanes.line, scene.grid[3], scene.columns, scene.rows, lanes.visited, lanes.fresh, lanes.any_fresh
-    )
+        lanes.line, scene.grid[3], scene.columns, scene.rows, lanes.words, lanes.visited, lanes.fresh,
+        lanes.any_fresh,
+    )  # fmt: skip
     mark_ends(lanes.line, scene.columns, scene.rows, lanes.ends)
     sense(scene, lanes)
 

@@ -98,13 +98,13 @@ class Lanes(NamedTuple):
     rates: Rows  # (s,) room
     seen: Seen
     counters: Words  # (3,) the fixed words of each trial's random numbers
-    words: Words  # (4,) random
+    words: Words  # (4,) random, and room
     values: Rows  # (m,) activations: inputs, outputs, hidden nodes
     before: Rows  # (m,) those of the step before, in recurrent networks
     total: Row  # room
     line: Line
     visited: Words  # (rows * words,) a bit a column, along the line
-    fresh: Words  # (rows * words,) those visited first in this step
+    fresh: Words  # ((rows + 1) * words,) those visited first in this step, from the first row of its line on
     any_fresh: NDArray[np.uint32]
     ends: Words  # (rows * words,) at the ends of steps
     n_line: NDArray[np.int32]
@@ -142,7 +142,7 @@ def make_lanes(like, n_sensors, n_nodes, columns, rows):
         total=_row(like),
         line=Line(*(_row(like) for _ in Line._fields)),
         visited=np.zeros((words, LANES), np.uint32),
-        fresh=np.zeros((words, LANES), np.uint32),
+        fresh=np.zeros((words + words // rows, LANES), np.uint32),
         any_fresh=np.zeros(LANES, np.uint32),
         ends=np.zeros((words, LANES), np.uint32),
         n_line=np.zeros(LANES, np.int32),

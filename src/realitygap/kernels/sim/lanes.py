@@ -57,7 +57,7 @@ class SimLanes(NamedTuple):
     senses: Senses
     counters: Words  # (3,) the fixed words of each trial's random numbers
     drive_counters: Words  # (3,) likewise, for another purpose
-    words: Words  # (4,) random
+    words: Words  # (4,) random, and room
     values: Rows  # (m,) activations: inputs, outputs, hidden nodes
     before: Rows  # (m,) those of the step before, in recurrent networks
     total: Row  # room
@@ -102,6 +102,7 @@ class Near(NamedTuple):
     give: Rows  # (4,) what the body gives when it is pushed: `unsaturated` of `_sim_push`
     pushes: Rows  # (28,) room of `give_way`
     moved: Rows  # (5,) how it is pushed free: `give_way`
+    arc: Rows  # (4,) of a part of the step: chord [m], sine and cosine of half the turn, turn [turns]
     effort: Rows  # (4,) asked for, as lengths: straight on and by turning; carried out: length and turn
     gaps: Rows  # (n_walls,) how far the body is from each wall [m]
     heights: Rows  # (n_walls * parts,) how low the lowest corner of each part is along each wall's normal [m]
@@ -164,6 +165,7 @@ def make_near(shape, dtype):
         give=rows(4),
         pushes=rows(28),
         moved=rows(5),
+        arc=rows(4),
         effort=rows(4),
         gaps=rows(shape.n_walls),
         heights=rows(shape.n_walls * shape.part_corners.size),
@@ -216,7 +218,7 @@ def make_sim_room(shape, neat, hidden_room, dtype):
         total=row(),
         line=Line(*(row() for _ in Line._fields)),
         visited=bits(words),
-        fresh=bits(words),
+        fresh=bits(words + words // shape.rows),
         any_fresh=np.zeros(LANES, np.uint32),
         ends=bits(words),
         n_line=np.zeros(LANES, np.int32),

@@ -118,8 +118,9 @@ def _put_back(anchors, tried, grid, lanes, first, n_lanes, row):
 def _arrive(shape, rules, lanes):
     place_line(rules.grid, lanes.pose.x, lanes.pose.y, lanes.line)
     mark_line(
-        lanes.line, rules.grid[3], shape.columns, shape.rows, lanes.visited, lanes.fresh, lanes.any_fresh
-    )
+        lanes.line, rules.grid[3], shape.columns, shape.rows, lanes.words, lanes.visited, lanes.fresh,
+        lanes.any_fresh,
+    )  # fmt: skip
 
 
 @kernel

@@ -107,8 +107,9 @@ def _run_block(team, tables, neat, key, counters, first, n_lanes, rooms, cells, 
                 feel_motion(shape, rules, key, lanes, step)
             place_line(rules.grid, lanes.pose.x, lanes.pose.y, lanes.line)
             mark_line(
-                lanes.line, rules.grid[3], shape.columns, shape.rows, visited, lanes.fresh, lanes.any_fresh
-            )
+                lanes.line, rules.grid[3], shape.columns, shape.rows, lanes.words, visited, lanes.fresh,
+                lanes.any_fresh,
+            )  # fmt: skip
             mark_ends(lanes.line, shape.columns, shape.rows, ends)
             list_fresh(
                 lanes.line, shape.columns, shape.rows, lanes.fresh, lanes.any_fresh, n_lanes, cells, first, n_line

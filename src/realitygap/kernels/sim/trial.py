@@ -105,8 +105,9 @@ def arrive(shape, rules, lanes):
     """Mark the cells on the way to where the robots are now."""
     place_line(rules.grid, lanes.pose.x, lanes.pose.y, lanes.line)
     mark_line(
-        lanes.line, rules.grid[3], shape.columns, shape.rows, lanes.visited, lanes.fresh, lanes.any_fresh
-    )
+        lanes.line, rules.grid[3], shape.columns, shape.rows, lanes.words, lanes.visited, lanes.fresh,
+        lanes.any_fresh,
+    )  # fmt: skip
     mark_ends(lanes.line, shape.columns, shape.rows, lanes.ends)
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from realitygap.kernels.compile.decorators import kernel, stage
+from realitygap.kernels.compile.decorators import inlined, kernel, stage
 from realitygap.kernels.math.bits import highest_bit, lowest_bit, shift_left
 from realitygap.kernels.math.lanes import LANES, copy_row, words_of
 
@@ -61,19 +61,43 @@ def place_line(grid, x, y, line):
         at_top[lane] = column1 if upward else column0
 
 
+@inlined
+def _first_row(bottom):
+    """The first row of a line that counts: its lowest one, or the row below the grid."""
+    real = type(bottom)
+    return bottom if bottom > real(-1.0) else real(-1.0)
+
+
 @stage
-def _meet_border(line, border, snap):
-    """The columns in which lines meet a border between rows, below and above it.
+def _count_rows(line, rows):
+    """The most rows that a line meets, from `_first_row` on."""
+    bottoms, tops = line.bottom, line.top
+    real = bottoms.dtype.type
+    last_row = real(rows - 1)
+    most = np.int32(0)
+    for lane in range(LANES):
+        top = tops[lane]
+        top = top if top < last_row else last_row
+        n = np.int32(np.int32(top - _first_row(bottoms[lane])) + np.int32(1))
+        most = n if n > most else most
+    return most
+
+
+@stage
+def _meet_border(line, number, snap):
+    """The columns in which lines meet the border above row `number` from their first one, below and above it.
 
     They differ at a corner only: there a line goes on to the cell diagonally opposite. A line that passes a
     corner within `snap` goes through it.
     """
-    from_u, from_v, slope, shift = line.from_u, line.from_v, line.slope, line.shift
+    from_u, from_v, slope, shift, bottom = line.from_u, line.from_v, line.slope, line.shift, line.bottom
     leftmost, rightmost, below, above = line.leftmost, line.rightmost, line.below, line.above
     real = from_u.dtype.type
+    up = real(number + 1)
     for lane in range(LANES):
         first = leftmost[lane]
         last = rightmost[lane]
+        border = _first_row(bottom[lane]) + up
         u = from_u[lane] + (border - from_v[lane]) * slope[lane]
         nearest = np.floor(u + real(0.5))
         through = abs(u - nearest) < snap
@@ -90,11 +114,21 @@ def _meet_border(line, border, snap):
 
 
 @stage
-def _mark_word(line, row, first_column, last_place, visited, fresh, any_fresh):
-    """Set the bits of one word of one row."""
+def _find_bits(line, number, rows, words, word, last_place, places, bits):
+    """Find which bits of a word of row `number`, from its first one, a line sets.
+
+    Args:
+        line, rows: As in `mark_line`.
+        number: Of the row.
+        words, word: How many words a row has, and which one it is.
+        last_place: Of the last bit of this word.
+        places: (LANES,) written: number of the word among all.
+        bits: (LANES,) written.
+    """
     bottoms, tops, at_bottom, at_top = line.bottom, line.top, line.at_bottom, line.at_top
     entry, leave = line.entry, line.below
     real = bottoms.dtype.type
+    up, last_row, first_column = real(number), real(rows - 1), real(32 * word)
     for lane in range(LANES):
         bottom = bottoms[lane]
         top = tops[lane]
@@ -102,57 +136,68 @@ def _mark_word(line, row, first_column, last_place, visited, fresh, any_fresh):
         upper_end = at_top[lane]
         entered = entry[lane]
         left = leave[lane]
-        seen = visited[lane]
-        so_far = any_fresh[lane]
+        row = _first_row(bottom) + up
         one = lower_end if bottom == row else entered
         other = upper_end if top == row else left
         first = (one if one < other else other) - first_column
         last = (other if one < other else one) - first_column
         first = first if first > real(0.0) else real(0.0)
         last = last if last < last_place else last_place
-        inside = (bottom <= row) & (row <= top) & (first <= last)
-        bits = np.uint32(
+        inside = (real(0.0) <= row) & (row <= top) & (row <= last_row) & (first <= last)
+        those = np.uint32(
             shift_left(np.uint32(2), np.uint32(np.int32(last)))
             - shift_left(np.uint32(1), np.uint32(np.int32(first)))
         )
-        bits = bits if inside else np.uint32(0)
-        new = np.uint32(bits & np.uint32(~seen))
-        visited[lane] = np.uint32(seen | new)
-        fresh[lane] = new
-        any_fresh[lane] = np.uint32(so_far | new)
+        bits[lane] = those if inside else np.uint32(0)
+        place = np.uint32(np.int32(row) * np.int32(words) + np.int32(word))
+        places[lane] = place if inside else np.uint32(0)
 
 
 @stage
-def mark_line(line, snap, columns, rows, visited, fresh, any_fresh):
+def _visit(places, bits, visited, seen):
+    """Set a word's bits in `visited`, lane by lane; `seen` gets those that were set before."""
+    for lane in range(LANES):
+        place = places[lane]
+        before = visited[place, lane]
+        seen[lane] = before
+        visited[place, lane] = np.uint32(before | bits[lane])
+
+
+@stage
+def _note_fresh(bits, seen, fresh, any_fresh):
+    for lane in range(LANES):
+        new = np.uint32(bits[lane] & np.uint32(~seen[lane]))
+        fresh[lane] = new
+        any_fresh[lane] = np.uint32(any_fresh[lane] | new)
+
+
+@stage
+def mark_line(line, snap, columns, rows, room, visited, fresh, any_fresh):
     """Note the cells on the lines of a step.
+
+    Most lines meet one or two rows. So each lane goes through its own rows, with a word of `visited` for each.
 
     Args:
         line: As `place_line` left it.
         snap: How near to a border is on it.
         columns, rows: Size of the grid.
+        room: (3, LANES) uint32.
         visited: (rows * words, LANES) bits, changed.
-        fresh: (rows * words, LANES) written: what is new in `visited`.
+        fresh: ((rows + 1) * words, LANES) written: what is new in `visited`, from a line's first row on.
         any_fresh: (LANES,) written: whether anything is.
     """
     real = line.slope.dtype.type
     words = words_of(columns)
     for lane in range(LANES):
         any_fresh[lane] = np.uint32(0)
-    _meet_border(line, real(0.0), snap)
-    for row in range(rows):
+    for number in range(_count_rows(line, rows)):
         copy_row(line.above, line.entry)
-        _meet_border(line, real(row + 1), snap)
+        _meet_border(line, number, snap)
         for k in range(words):
-            last_place = min(columns - 32 * k, 32) - 1
-            _mark_word(
-                line,
-                real(row),
-                real(32 * k),
-                real(last_place),
-                visited[row * words + k],
-                fresh[row * words + k],
-                any_fresh,
-            )
+            last_place = real(min(columns - 32 * k, 32) - 1)
+            _find_bits(line, number, rows, words, k, last_place, room[0], room[1])
+            _visit(room[0], room[1], visited, room[2])
+            _note_fresh(room[1], room[2], fresh[number * words + k], any_fresh)
 
 
 @stage
@@ -198,18 +243,18 @@ def list_fresh(line, columns, rows, fresh, any_fresh, n_lanes, cells, first, n_l
                 break
             upward = line.to_v[lane] >= line.from_v[lane]
             rightward = line.to_u[lane] >= line.from_u[lane]
-            bottom = max(int(line.bottom[lane]), 0)
-            top = min(int(line.top[lane]), rows - 1)
+            bottom = int(_first_row(line.bottom[lane]))
+            n_rows = min(int(line.top[lane]), rows - 1) - bottom + 1
             n = n_line[lane]
-            for i in range(top - bottom + 1):
-                row = bottom + i if upward else top - i
+            for i in range(n_rows):
+                number = i if upward else n_rows - 1 - i
                 for j in range(words):
                     k = j if rightward else words - 1 - j
-                    bits = fresh[row * words + k, lane]
+                    bits = fresh[number * words + k, lane]
                     while bits != 0:
                         place = lowest_bit(bits) if rightward else highest_bit(bits)
                         bits = np.uint32(bits & np.uint32(~shift_left(np.uint32(1), np.uint32(place))))
-                        cells[first + lane, n] = columns * row + 32 * k + place
+                        cells[first + lane, n] = columns * (bottom + number) + 32 * k + place
                         n += 1
             n_line[lane] = n
 

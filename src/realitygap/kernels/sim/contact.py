@@ -13,14 +13,14 @@ from realitygap.kernels.math.bits import unmasked
 from realitygap.kernels.math.elementary import TWO_PI
 from realitygap.kernels.math.lanes import LANES, any_above_zero, copy_row, fill, keep_where_low
 
-from .drive import AXLE, arc_step
+from .drive import AXLE, along_arc, arc_of
 from .near import TOUCHES, copy_poses, flag_near_shapes, sizes_asked, to_axles
 from .push import CLEAR, SATURATION, give_way, go, saturated, unsaturated
 from .shape import FREEZE, SLIDE, WHEELS
 from .support import FAR
 from .touch import count_touching, touch
 from .turn import sin_cos_of
-from .walls import choose_walls, clearance
+from .walls import choose_walls, clearance, face_nearest_wall
 
 STALL_SHARE = 0.5  # of what was asked, of which less is done where a robot stalls
 SLIGHT = 0.05  # of all that was asked, below which nothing stalls
@@ -37,16 +37,46 @@ def _flag_touching(low, flag):
 
 
 @stage
-def _go_part(shape, length, turn, part, pose):
-    """Part of a motion, from where the axles are."""
-    x, y, heading, sine, cosine = pose.x, pose.y, pose.heading, pose.sine, pose.cosine
-    real = x.dtype.type
+def _divide(length, turn, part, arc):
+    """Compute the arc of each of equal parts of a motion.
+
+    Args:
+        length, turn: Of the whole motion [m, turns].
+        part: Share of the motion in a part.
+        arc: (4, LANES) written: chord [m], sine and cosine of half the turn, and the turn [turns].
+    """
+    chord, half_sine, half_cosine, turned = arc[0], arc[1], arc[2], arc[3]
+    real = length.dtype.type
     for k in range(LANES):
-        dx, dy, turned, s, c = arc_step(
-            length[k] * real(part), turn[k] * real(part), heading[k], sine[k], cosine[k]
-        )
-        x[k] = x[k] + dx
-        y[k] = y[k] + dy
+        around = turn[k] * real(part)
+        to, s, c = arc_of(length[k] * real(part), around)
+        chord[k] = to
+        half_sine[k] = s
+        half_cosine[k] = c
+        turned[k] = around
+
+
+@stage
+def _go_part(arc, pose, before):
+    """Apply a part of a motion to poses of axles, and keep the poses before it."""
+    chord, half_sine, half_cosine, turn = arc[0], arc[1], arc[2], arc[3]
+    x, y, heading, sine, cosine = pose.x, pose.y, pose.heading, pose.sine, pose.cosine
+    old_x, old_y, old_heading = before.x, before.y, before.heading
+    old_sine, old_cosine = before.sine, before.cosine
+    for k in range(LANES):
+        was_x = x[k]
+        was_y = y[k]
+        was = heading[k]
+        was_s = sine[k]
+        was_c = cosine[k]
+        dx, dy, turned, s, c = along_arc(chord[k], half_sine[k], half_cosine[k], turn[k], was, was_s, was_c)
+        old_x[k] = was_x
+        old_y[k] = was_y
+        old_heading[k] = was
+        old_sine[k] = was_s
+        old_cosine[k] = was_c
+        x[k] = was_x + dx
+        y[k] = was_y + dy
         heading[k] = turned
         sine[k] = s
         cosine[k] = c
@@ -228,18 +258,21 @@ def _resolve(shape, lanes, near):
         if sweep == 0 and part < last:
             if part == 0 or part == early:
                 sizes_asked(asked, around, reach, length, turn)
-            copy_poses(near.pose, near.before)
-            _go_part(shape, asked, around, 1.0 / parts, near.pose)
+                _divide(asked, around, 1.0 / parts, near.arc)
+            _go_part(near.arc, near.pose, near.before)
         if shape.contact == FREEZE and shape.mixing != WHEELS and part == early - 1:
             part += 1  # Jyro looks where a step ends, and not before it turns there
             continue
         if part == last and shape.enclosed:
             # Straight pushes turn nothing.
             clearance(shape, p, near.pose, sweep == 0, near, near.active, near.first.gap)
-            if shape.row_shape.size == 0 and count_touching(near.first.gap) == 0:
-                break
             choose_walls(shape, p, near)
-        n_touching = touch(shape, p, near)
+        if part == last and shape.enclosed and shape.row_shape.size == 0:
+            # A straight push follows the normal of the nearest wall, and needs no corner.
+            face_nearest_wall(near)
+            n_touching = count_touching(near.first.gap)
+        else:
+            n_touching = touch(shape, p, near)
         again = False
         if n_touching > 0:
             _note_touch(near.first.gap, near.low)

@@ -427,10 +427,10 @@ def plan(shape, rules, key, lanes, step):
 
 
 @inlined
-def arc_step(length, turn, heading, sine, cosine):
-    """Return the displacement of a point that drives an arc, and its heading there with sine and cosine.
+def arc_of(length, turn):
+    """Return the chord of an arc, and sine and cosine of half its turn.
 
-    It gets length * sin(h) / h, h being half the turn [rad], in the direction halfway.
+    The chord is length * sin(h) / h, h being half the turn [rad].
     """
     real = type(length)
     half = real(0.5) * turn
@@ -440,11 +440,30 @@ def arc_step(length, turn, heading, sine, cosine):
     chord = length * (
         real(1.0) - angle * angle * real(1.0 / 6.0) if small else s / (real(1.0) if small else angle)
     )
+    return chord, s, c
+
+
+@inlined
+def along_arc(chord, s, c, turn, heading, sine, cosine):
+    """Return the displacement of a point that drives an arc, and its heading there with sine and cosine.
+
+    Args:
+        chord, s, c: Result of `arc_of`; the chord has the direction halfway.
+        turn: [turns].
+        heading, sine, cosine: Before the arc.
+    """
+    real = type(chord)
     middle_s, middle_c = turned_by(sine, cosine, s, c)
     turned = heading + turn
     turned = turned - np.floor(turned + real(0.5))
     new_sine, new_cosine = turned_by(middle_s, middle_c, s, c)
     return chord * middle_c, chord * middle_s, turned, new_sine, new_cosine
+
+
+@inlined
+def _arc_step(length, turn, heading, sine, cosine):
+    chord, s, c = arc_of(length, turn)
+    return along_arc(chord, s, c, turn, heading, sine, cosine)
 
 
 @stage
@@ -463,7 +482,7 @@ def _arc(length, turn, axle, pose, proposed):
     to_x, to_y, to_heading = proposed.x, proposed.y, proposed.heading
     to_sine, to_cosine = proposed.sine, proposed.cosine
     for lane in range(LANES):
-        dx, dy, turned, s, c = arc_step(length[lane], turn[lane], heading[lane], sine[lane], cosine[lane])
+        dx, dy, turned, s, c = _arc_step(length[lane], turn[lane], heading[lane], sine[lane], cosine[lane])
         # The axle drives the arc; the origin turns around it.
         to_x[lane] = x[lane] + dx + axle[lane] * (cosine[lane] - c)
         to_y[lane] = y[lane] + dy + axle[lane] * (sine[lane] - s)
@@ -478,7 +497,7 @@ def _arc_on(length, turn, axle, pose):
     for lane in range(LANES):
         old_s = sine[lane]
         old_c = cosine[lane]
-        dx, dy, turned, s, c = arc_step(length[lane], turn[lane], heading[lane], old_s, old_c)
+        dx, dy, turned, s, c = _arc_step(length[lane], turn[lane], heading[lane], old_s, old_c)
         x[lane] = x[lane] + dx + axle[lane] * (old_c - c)
         y[lane] = y[lane] + dy + axle[lane] * (old_s - s)
         heading[lane] = turned

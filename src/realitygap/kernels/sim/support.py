@@ -8,6 +8,7 @@ from realitygap.kernels.math.vectors import load, pick, spread
 from .outline import PER_CORNER
 
 FAR = 1e9  # farther than anything [m]
+SURELY = 1e-5  # [m] by which boxes must be apart for what is in them to be so: more than rounding does
 
 
 @inlined

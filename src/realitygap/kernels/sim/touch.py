@@ -26,13 +26,12 @@ from realitygap.kernels.math.vectors import (
 )
 
 from .outline import PER_CORNER
-from .support import FAR, low_height, lowest
+from .support import FAR, SURELY, low_height, lowest
 from .walls import touch_walls
 
 # Of parallel faces each is met at corners that follow from the other's: their normals are turned by so much
 # [rad] for the search, so that none of the corners is met by chance.
 TILT = 1e-5
-SURELY = 1e-5  # [m] by which boxes must be apart for what is in them to be so: more than rounding does
 # A quarter of a body's reach: in a part of a step it moves less. An obstacle that is farther is no contact. The
 # limit depends on the lane alone, so a trial goes the same way in any team.
 WITHIN = 0.25

@@ -11,7 +11,7 @@ from realitygap.kernels.math.bits import unmasked
 from realitygap.kernels.math.lanes import LANES, fill
 from realitygap.kernels.math.vectors import WIDTH, any_of, load, load_row, pick, spread, store, store_row
 
-from .support import FAR, low_height, lowest_two
+from .support import FAR, SURELY, low_height, lowest_two
 
 N_NEAREST = 2
 PER_WALL = 4  # rows of a wall that is near: normal x, y, offset, gap
@@ -106,6 +106,15 @@ def choose_walls(shape, p, near):
         )  # fmt: skip
 
 
+@kernel
+def face_nearest_wall(near):
+    """Write the normal of the wall that `choose_walls` found nearest to the deepest contact."""
+    for lane in range(0, LANES, WIDTH):
+        _, a, b = _see_plane(near.walls, 0, near.pose, lane)
+        store_row(a, near.first.facing, lane)
+        store_row(b, near.first.beside, lane)
+
+
 @inlined
 def _deeper_in_wall(one, u, v, two, next_u, next_v, r, a, b, first, second, lane):
     """Merge a wall's lowest two corners into the deepest two contacts."""
@@ -152,10 +161,22 @@ def _write(contact, gap, a, b, u, v, r, lane):
 
 
 @inlined
+def _may_reach(shape, p, center, a, b, gap, lane):
+    """Return whether the box around any body reaches deeper into a wall than a gap."""
+    zero, bounds = center - center, shape.row_bounds
+    least_x, most_x = load(p, bounds, lane), load(p, bounds + 1, lane)
+    least_y, most_y = load(p, bounds + 2, lane), load(p, bounds + 3, lane)
+    low = a * pick(a > zero, least_x, most_x) + b * pick(b > zero, least_y, most_y)
+    return any_of(center + low - spread(p.dtype.type(SURELY)) < gap)
+
+
+@inlined
 def touch_walls(shape, p, near, lane):
     """The touch by the walls in `near.walls`: by two corners of each part of the body at each."""
     for k in range(N_NEAREST):
         center, a, b = _see_plane(near.walls, PER_WALL * k, near.pose, lane)
+        if k > 0 and not _may_reach(shape, p, center, a, b, load_row(near.second.gap, lane), lane):
+            continue
         for part in range(shape.part_corners.size):
             n = shape.part_corners[part]
             r = load(p, shape.row_part[part] + 2 * n, lane)

@@ -206,7 +206,7 @@ def test_settings_without_default_may_be_in_either_table(
         ("scribbler", "expected scribbler:PORT"),
         ("toy", "'toy' is no platform"),
         ("python:toy.py", "expected python:FILE.py:CLASS"),
-        (f"python:{EXAMPLE}:ToyPlatform", "you have not allowed this"),
+        (f"python:{__file__}:ToyPlatform", "you have not allowed this"),
     ],
 )
 def test_wrong_name_gets_one_message(spec: str, message: str) -> None:

@@ -1,7 +1,7 @@
 """The response of a body that meets a wall or an obstacle, in lanes.
 
 `freeze`: the whole step is refused (Jyro). `stop`: translation is refused, turning goes on where the body allows it.
-`slide`: the body is pushed free of the deepest two contacts, and turns and skids along them (`_sim_push`).
+`slide`: the body is pushed free of the deepest two contacts, and turns and skids along them (`push.py`).
 """
 
 from __future__ import annotations

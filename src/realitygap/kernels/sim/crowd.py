@@ -1,12 +1,15 @@
 """Several robots of the platform `sim` in one arena: each is a separate trial, with the others as obstacles.
 
-A step of one robot is that of `_sim.step_sim` in two parts, so that all can move before any of them looks.
+A step of one robot is that of `step_sim` in two parts, so that all can move before any of them looks.
 """
 
 from __future__ import annotations
 
+import numpy as np
+
 from realitygap.kernels.compile.decorators import kernel
 from realitygap.kernels.math.lanes import LANES
+from realitygap.kernels.math.philox import FIRST
 
 from .contact import settle
 from .drive import drive, take_commands
@@ -14,6 +17,8 @@ from .lanes import start_block
 from .outline import place_obstacle
 from .senses import feel_motion
 from .trial import _list, arrive, sense
+
+ONE = np.int64(1)  # a literal 1 would have the kernel that it is passed to compiled once more
 
 
 @kernel
@@ -32,7 +37,7 @@ def put_others(shape, room, first, poses):
 def begin_sim(shape, table, rules, counters, room, cells):
     """`start_sim` for one robot, but for what its sensors answer: that is `look_sim` before step 0."""
     lanes = room.lanes
-    start_block(shape, rules, table, counters, 0, 1, lanes)
+    start_block(shape, rules, table, counters, FIRST, ONE, lanes)
     arrive(shape, rules, lanes)
     _list(shape, lanes, 1, cells, 0)
 

@@ -99,7 +99,7 @@ class Near(NamedTuple):
     second: Contact  # the next
     active: Row  # above 0 where contact is of interest
     low: Row  # the least gap met so far
-    give: Rows  # (4,) what the body gives when it is pushed: `unsaturated` of `_sim_push`
+    give: Rows  # (4,) what the body gives when it is pushed: `unsaturated` of `push.py`
     pushes: Rows  # (28,) room of `give_way`
     moved: Rows  # (5,) how it is pushed free: `give_way`
     arc: Rows  # (4,) of a part of the step: chord [m], sine and cosine of half the turn, turn [turns]

@@ -1,6 +1,6 @@
 """Trials of the platform `sim` for fits: commands given one by one, or networks, in lanes, every step kept.
 
-The physics is that of `_sim.py`. What is new: many trials get the same commands, and a robot may be put back, before
+The physics is that of `trial.py`. What is new: many trials get the same commands, and a robot may be put back, before
 a step, to where it was seen then, while its wheels, its queue of commands and its averages go on.
 """
 

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from realitygap.kernels.compile.decorators import kernel, stage
+from realitygap.kernels.compile.decorators import kernel, shared_stage, stage
 from realitygap.kernels.math.bits import unmasked
 from realitygap.kernels.math.lanes import LANES, copy_row, fill
+from realitygap.kernels.math.philox import FIRST
 from realitygap.kernels.neat.wiring import think, wire
 from realitygap.kernels.tasks.marks import (
     count_cells,
@@ -45,7 +46,7 @@ from .shape import (
 )
 
 
-@stage
+@shared_stage
 def sense(shape, rules, key, lanes, step):
     """Compute the readings of the sensors before a step, with noise, into `lanes.readings`."""
     cast_rays(shape, lanes)
@@ -219,7 +220,7 @@ def start_sim(shape, table, rules, key, counters, n, room, cells):
     Arguments as in `run_sim_trials`; n columns of the table are used, or the only one.
     """
     lanes = room.lanes
-    start_block(shape, rules, table, counters, 0, n, lanes)
+    start_block(shape, rules, table, counters, FIRST, n, lanes)
     arrive(shape, rules, lanes)
     _list(shape, lanes, n, cells, 0)
     sense(shape, rules, key, lanes, 0)

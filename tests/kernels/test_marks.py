@@ -116,3 +116,19 @@ def test_a_lane_does_not_depend_on_its_neighbors() -> None:
     paths = [[(rng.uniform(-1, 13), rng.uniform(-1, 7)) for _ in range(5)] for _ in range(LANES)]
     together = marked(paths, 12, 6, np.float32)
     assert together == [marked([path], 12, 6, np.float32)[0] for path in paths]
+
+
+@pytest.mark.parametrize("real", [np.float32, np.float64])
+def test_a_position_that_is_no_number_marks_nothing(real: type) -> None:
+    paths = [[(0.5, 0.5), (math.nan, 0.5), (1.5, 0.5)], [(0.5, 0.5), (0.5, math.nan), (1.5, 0.5)]]
+    assert marked(paths, 12, 6, real)[1] == ([0], {0, 1})
+    assert marked(paths, 12, 6, real)[0][1] == {0, 1}
+
+
+@pytest.mark.parametrize("real", [np.float32, np.float64])
+@pytest.mark.parametrize("far", [math.inf, -math.inf, 1e30, -1e30])
+def test_a_position_far_beyond_the_grid_lists_what_it_marks(far: float, real: type) -> None:
+    for path in ([(0.5, 3.5), (0.5, far), (1.5, 0.5)], [(0.5, 3.5), (far, 3.5)], [(0.5, 3.5), (far, far)]):
+        ((order, ends),) = marked([path], 12, 6, real)  # it compares both
+        assert order[0] == 36
+        assert ends <= {36, 1}

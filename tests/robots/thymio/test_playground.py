@@ -147,6 +147,7 @@ def driving(playground):
         until = time.monotonic() + 5.0
         while playground.pose() == stands and time.monotonic() < until:
             time.sleep(0.01)
+        assert playground.pose() != stands
         yield playground
 
 

@@ -1,7 +1,7 @@
 """Machine code that finds its constants by their distance, in memory that keeps all parts of an object together.
 
 Numba takes the parts of an object to be anywhere in memory. Each constant then needs an instruction of ten bytes for
-its address, and a register to hold it: with AVX2, a tenth of the time of a robot-step in `sim`. Here, kernels have
+its address, and a register to hold it: with AVX2, 7 % of the time of a robot-step in `sim`. Here, kernels have
 an engine of LLVM for themselves, whose manager of memory reserves one piece for all parts of an object. The numbers
 are the same.
 

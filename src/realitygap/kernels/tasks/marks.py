@@ -143,7 +143,8 @@ def _find_bits(line, number, rows, words, word, last_place, places, bits):
         last = (other if one < other else one) - first_column
         first = first if first > real(0.0) else real(0.0)
         last = last if last < last_place else last_place
-        inside = (real(0.0) <= row) & (row <= top) & (row <= last_row) & (first <= last)
+        # The first comparison is false if a position is no number.
+        inside = (bottom <= row) & (real(0.0) <= row) & (row <= top) & (row <= last_row) & (first <= last)
         those = np.uint32(
             shift_left(np.uint32(2), np.uint32(np.int32(last)))
             - shift_left(np.uint32(1), np.uint32(np.int32(first)))
@@ -244,7 +245,7 @@ def list_fresh(line, columns, rows, fresh, any_fresh, n_lanes, cells, first, n_l
             upward = line.to_v[lane] >= line.from_v[lane]
             rightward = line.to_u[lane] >= line.from_u[lane]
             bottom = int(_first_row(line.bottom[lane]))
-            n_rows = min(int(line.top[lane]), rows - 1) - bottom + 1
+            n_rows = int(min(rows - 1, line.top[lane])) - bottom + 1
             n = n_line[lane]
             for i in range(n_rows):
                 number = i if upward else n_rows - 1 - i

@@ -1,6 +1,7 @@
 """An inbox: others leave chunks, the holder of the lock publishes them."""
 
 import contextlib
+import os
 import threading
 
 import pytest
@@ -75,6 +76,25 @@ def test_an_inbox_goes_while_others_still_deliver_into_it(tmp_path):
             worker.join()
         ended.clear()
         assert not list(folder.path.glob(".inbox-*"))
+
+
+@pytest.mark.parametrize("late", [1, 3])
+def test_a_file_that_is_made_while_an_inbox_is_removed_goes_with_it(tmp_path, monkeypatch, late):
+    folder = make_folder(tmp_path / "r", 0)
+    rmdir, made = os.rmdir, []
+
+    def make_and_rmdir(path, **where):
+        """A worker found the inbox before it was renamed, and opens its file after the others were listed."""
+        if len(made) < late:
+            (left,) = folder.path.glob(".inbox-*")
+            made.append(left / ".chunk.tmp")
+            made[-1].touch()
+        rmdir(path, **where)
+
+    with folder.inbox():
+        monkeypatch.setattr(os, "rmdir", make_and_rmdir)
+    assert len(made) == late
+    assert not list(folder.path.glob(".inbox-*"))
 
 
 def test_chunks_that_were_not_accepted_are_removed_with_the_inbox(tmp_path):

@@ -10,6 +10,7 @@ import contextlib
 import re
 import secrets
 import shutil
+import time
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,6 +21,8 @@ from realitygap.records._chunk import ChunkName, encode_chunk
 from realitygap.records._files import write_durably, writing
 
 _NAME = re.compile(r"\.inbox-[0-9a-f]{16}")
+_WAITS = (0.0, 0.01, 0.1, 0.0)
+"""Pauses after attempts to remove an inbox [s]."""
 
 
 @dataclass(frozen=True)
@@ -90,12 +93,17 @@ def remove_inbox(inbox: Path) -> None:
     """Remove an inbox and what is in it; what a network file system keeps for a moment goes the next time.
 
     It gets a name that no worker knows first. A chunk that a worker delivers while the files are removed would
-    otherwise stay, and with it the inbox.
+    otherwise stay, and with it the inbox. A worker that had found the inbox just before may still make a file in it;
+    it does so once, so the removal is repeated.
     """
     unknown = _fresh_name(inbox.parent)
     with contextlib.suppress(OSError):
         inbox = inbox.rename(unknown)
-    shutil.rmtree(inbox, ignore_errors=True)
+    for wait in _WAITS:
+        shutil.rmtree(inbox, ignore_errors=True)
+        if not inbox.exists():
+            return
+        time.sleep(wait)
 
 
 def _fresh_name(folder: Path) -> Path:

@@ -121,7 +121,7 @@ def _poses(like):
 def make_lanes(like, n_sensors, n_nodes, columns, rows):
     """Room for a block of trials in the precision of the array `like`."""
     real = like.dtype
-    words = rows * -(-columns // 32)
+    words = -(-columns // 32)
     return Lanes(
         pose=_poses(like),
         proposed=_poses(like),
@@ -141,10 +141,10 @@ def make_lanes(like, n_sensors, n_nodes, columns, rows):
         before=np.zeros((n_nodes, LANES), real),
         total=_row(like),
         line=Line(*(_row(like) for _ in Line._fields)),
-        visited=np.zeros((words, LANES), np.uint32),
-        fresh=np.zeros((words + words // rows, LANES), np.uint32),
+        visited=np.zeros((rows * words, LANES), np.uint32),
+        fresh=np.zeros(((rows + 1) * words, LANES), np.uint32),
         any_fresh=np.zeros(LANES, np.uint32),
-        ends=np.zeros((words, LANES), np.uint32),
+        ends=np.zeros((rows * words, LANES), np.uint32),
         n_line=np.zeros(LANES, np.int32),
     )
 

@@ -178,7 +178,7 @@ def make_near(shape, dtype):
 def make_sim_room(shape, neat, hidden_room, dtype):
     """Return room for a block of trials with networks of `hidden_room` hidden nodes, in a precision."""
     n_nodes = neat.n_inputs + neat.n_outputs + hidden_room
-    words = shape.rows * -(-shape.columns // 32)
+    words = -(-shape.columns // 32)
     n_rays = int(shape.first_ray[-1])
 
     def row():
@@ -217,10 +217,10 @@ def make_sim_room(shape, neat, hidden_room, dtype):
         before=rows(n_nodes),
         total=row(),
         line=Line(*(row() for _ in Line._fields)),
-        visited=bits(words),
-        fresh=bits(words + words // shape.rows),
+        visited=bits(shape.rows * words),
+        fresh=bits((shape.rows + 1) * words),
         any_fresh=np.zeros(LANES, np.uint32),
-        ends=bits(words),
+        ends=bits(shape.rows * words),
         n_line=np.zeros(LANES, np.int32),
         spare=rows(N_SPARE),
     )

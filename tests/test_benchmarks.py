@@ -4,6 +4,7 @@ import json
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 BENCHMARKS = Path(__file__).parent.parent / "benchmarks"
@@ -12,6 +13,7 @@ sys.path.insert(0, str(BENCHMARKS))
 import environments  # noqa: E402
 import memory_and_start  # noqa: E402
 import ours  # noqa: E402
+import parts  # noqa: E402
 import peers  # noqa: E402
 import work  # noqa: E402
 from environments import Peer, PeerError  # noqa: E402
@@ -86,6 +88,13 @@ def test_peak_memory_counts_the_processes_that_a_command_starts():
 def test_a_measured_command_that_fails_is_an_error():
     with pytest.raises(SystemExit, match="status 3"):
         memory_and_start.run([sys.executable, "-c", "raise SystemExit(3)"])
+
+
+@pytest.mark.slow
+def test_robots_that_are_pressed_end_the_nearer_to_the_finest_the_more_parts_a_step_has():
+    finest = parts.places("pressed", parts.FINEST)
+    away = [np.median(np.hypot(*(parts.places("pressed", number) - finest).T)) for number in parts.PARTS]
+    assert 0 < away[0] < away[1] < away[2] < away[3] < 0.1
 
 
 @pytest.mark.slow

@@ -178,7 +178,16 @@ def test_tables_on_the_page_of_closing_the_gap_follow_from_its_data():
 def test_tables_and_figure_of_the_fresh_twins_follow_from_their_data():
     make_closing_fresh = _load("make_closing_fresh")
     for path, text in make_closing_fresh.texts(make_closing_fresh.stored_summary()).items():
-        assert path.read_text("utf-8") == text, path
+        stored = path.read_text("utf-8")
+        if path.suffix == ".svg":
+            assert _drawn(stored) == _drawn(text), path
+        else:
+            assert stored == text, path
+
+
+def _drawn(svg):
+    """Words, lines, and points of a figure. Versions of matplotlib differ in fonts and in places of words."""
+    return [re.findall(each, svg) for each in (">([^<]+)<", ' d="([^"]*)"', r'<use [^>]*x="(\S+)" y="(\S+)"')]
 
 
 def test_scripts_of_closing_the_gap_end_with_one_message_without_results(monkeypatch, tmp_path):

@@ -81,10 +81,16 @@ def _no_file_is_allowed_yet(tmp_path_factory: pytest.TempPathFactory) -> Iterato
 def twin_processes() -> list[int]:
     """Processes in which a twin lives, children of this one; none are found where there is no /proc."""
     listed = Path("/proc/self/task").glob("*/children")
-    children = [Path("/proc") / pid for each in listed for pid in each.read_text().split()]
-    return [
-        int(each.name) for each in children if b"platforms.twin._worker" in (each / "cmdline").read_bytes()
-    ]
+    children = [int(pid) for each in listed for pid in _content(each).split()]
+    return [pid for pid in children if b"platforms.twin._worker" in _content(Path(f"/proc/{pid}/cmdline"))]
+
+
+def _content(path: Path) -> bytes:
+    """Return the bytes of a file in /proc; none if its thread or process has ended meanwhile."""
+    try:
+        return path.read_bytes()
+    except OSError:
+        return b""
 
 
 @pytest.fixture(autouse=True, scope="module")

@@ -1,6 +1,6 @@
 """A robot that is watched does what it does alone, and the page hears of all of it."""
 
-import time
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -78,37 +78,51 @@ def test_it_meets_the_contract_of_robots(heard):
         assert robot.trial.n_steps == 0
 
 
-def test_pages_hear_at_most_twenty_times_a_second_and_miss_nothing(monkeypatch):
+@pytest.fixture
+def clock(monkeypatch):
+    """Time that passes only when a test lets it, so that a busy machine does not count."""
+    clock = SimpleNamespace(now=10.0, slept=[], monotonic=lambda: clock.now)
+    monkeypatch.setattr(_live, "time", clock)
+    monkeypatch.setattr(_live, "_sleep", clock.slept.append)
+    return clock
+
+
+def test_pages_hear_at_most_twenty_times_a_second_and_miss_nothing(monkeypatch, clock):
     watched = WatchedRobot(JyroRobot(), speed=None)
     messages = []
     monkeypatch.setattr(watched.widget, "send", lambda content, buffers=None: messages.append(content))
     watched.reset()
-    began = time.monotonic()
-    n_steps = 0
-    while time.monotonic() - began < 0.4:
+    began, n_steps = clock.now, 200
+    for _ in range(n_steps):
+        clock.now += 0.002
         watched.drive(Command(0.1, 0.2))
-        n_steps += 1
-    seconds = time.monotonic() - began
-    assert n_steps > 40, "it is not held back"
-    assert 2 <= len(told(messages)) <= seconds / _live.PERIOD_S + 2
+    seconds = clock.now - began
+    assert clock.slept == [], "it is not held back"
+    assert seconds / _live.PERIOD_S - 1 <= len(told(messages)) <= seconds / _live.PERIOD_S + 2
     watched._asked(None, {"kind": "all"}, None)
     assert [message["kind"] for message in messages[-2:]] == ["begin", "now"]
     assert len(messages[-1]["trail"]) >= n_steps
     assert messages[-1]["cells"] == list(watched.robot.visited_cells)
 
 
-def test_a_simulated_robot_is_held_back_and_a_real_one_never(monkeypatch):
-    slept = []
-    monkeypatch.setattr(_live, "_sleep", slept.append)
-    watched = WatchedRobot(JyroRobot(), speed=2.0)
+def test_a_simulated_robot_is_held_back_and_a_real_one_never(monkeypatch, clock):
+    robot = JyroRobot()
+    drive = robot.drive
+
+    def drive_slowly(command):
+        clock.now += 0.02
+        drive(command)
+
+    monkeypatch.setattr(robot, "drive", drive_slowly)
+    watched = WatchedRobot(robot, speed=2.0)
     watched.reset()
     watched.drive(Command(0.1, 0.0))
-    assert slept == pytest.approx([0.05], abs=0.03)
+    assert clock.slept == pytest.approx([0.03])
     real = WatchedRobot(FakeRobot())
     real.label = "REAL"
     real.reset()
     real.drive(Command(0.1, 0.0))
-    assert len(slept) == 1
+    assert len(clock.slept) == 1
 
 
 def test_an_emulated_scribbler_is_seen_by_its_witness(heard):

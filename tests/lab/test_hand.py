@@ -16,7 +16,7 @@ pytestmark = pytest.mark.slow
 PORT = "emulator://s2?fluke=2&speed=1"
 
 
-def wait_for(is_so: Callable[[], bool], seconds: float = 60.0) -> None:
+def wait_for(is_so: Callable[[], bool], seconds: float = 300.0) -> None:
     end = time.monotonic() + seconds
     while not is_so():
         assert time.monotonic() < end, "it did not come about"
@@ -46,11 +46,21 @@ def x(hand: Hand) -> float:
     return float(hand.senses["pose"][0])
 
 
+def drive_until_it_moves(hand: Hand) -> None:
+    """Say it ten times a second, as the page does: a busy process may come to a word when that is too old."""
+    until = time.monotonic() + 300.0
+    while not hand.senses["moves"]:
+        assert time.monotonic() < until, "it does not move"
+        hand.drive(1.0, 0.0, hand.n_stops)
+        time.sleep(0.1)
+
+
 def test_a_word_moves_the_robot_and_silence_stops_it(hand):
     began = x(hand)
-    hand.drive(1.0, 0.0, 0)
-    wait_for(lambda: hand.senses["moves"])
+    drive_until_it_moves(hand)
     wait_for(lambda: not hand.senses["moves"])  # nothing more was said
+    time.sleep(0.5)  # for a last word that was held up
+    wait_for(lambda: not hand.senses["moves"])
     stood = x(hand)
     assert stood > began + 0.005
     time.sleep(0.5)
@@ -58,15 +68,13 @@ def test_a_word_moves_the_robot_and_silence_stops_it(hand):
 
 
 def test_stop_is_heard_while_it_drives(hand):
-    hand.drive(1.0, 0.0, 0)
-    wait_for(lambda: hand.senses["moves"])
+    drive_until_it_moves(hand)
     hand.stop()
     wait_for(lambda: not hand.senses["moves"])
 
 
 def test_a_handle_that_is_held_when_somebody_presses_stop_drives_no_more(hand):
-    hand.drive(1.0, 0.0, 0)
-    wait_for(lambda: hand.senses["moves"])
+    drive_until_it_moves(hand)
     hand.stop()
     wait_for(lambda: not hand.senses["moves"])
     for pause in (
@@ -81,8 +89,7 @@ def test_a_handle_that_is_held_when_somebody_presses_stop_drives_no_more(hand):
     time.sleep(0.3)
     assert not hand.senses["moves"]
     hand.release()
-    hand.drive(1.0, 0.0, hand.n_stops)
-    wait_for(lambda: hand.senses["moves"])
+    drive_until_it_moves(hand)
 
 
 def test_a_press_that_began_before_a_stop_and_whose_first_word_comes_after_it_drives_nowhere(hand):

@@ -2,7 +2,6 @@
 
 import os
 import struct
-import threading
 import time
 
 import pytest
@@ -35,11 +34,20 @@ def device(tmp_path, monkeypatch):
     os.close(keep)
 
 
-def later(action):
-    """Do something soon, in another thread."""
-    timer = threading.Timer(0.1, action)
-    timer.start()
-    return timer
+@pytest.fixture
+def later(monkeypatch):
+    """Do something when a function waits for the first time, after it has read the gamepad."""
+    wait = _gamepad._let_time_pass
+    due = []
+
+    def act_and_wait(seconds):
+        if due:
+            due.pop()()
+        wait(seconds)
+
+    monkeypatch.setattr(_gamepad, "_let_time_pass", act_and_wait)
+    yield due.append
+    assert not due, "the function has not waited"
 
 
 def test_now_returns_one_item_or_a_dictionary(device):
@@ -53,32 +61,28 @@ def test_now_returns_one_item_or_a_dictionary(device):
     assert getGamepadNow("count") == getGamepad("count") == 1
 
 
-def test_values_are_returned_once_for_each_change(device):
+def test_values_are_returned_once_for_each_change(device, later):
     assert getGamepadNow("button") == [0, 0]
-    timer = later(lambda: device((BUTTON, 0, 1)))
+    later(lambda: device((BUTTON, 0, 1)))
     assert getGamepad("button", wait=0.01) == [1, 0]
-    timer.join()
-    timer = later(lambda: device((AXIS, 0, 5), (BUTTON, 0, 0)))
+    later(lambda: device((AXIS, 0, 5), (BUTTON, 0, 0)))
     assert getGamepad("button", wait=0.01) == [0, 0]  # not the pressed button again, and not the axis
-    timer.join()
 
 
-def test_any_counts_a_button_that_was_let_up(device):
+def test_any_counts_a_button_that_was_let_up(device, later):
     device((BUTTON, 1, 1))
     assert getGamepadNow("button") == [0, 1]
-    timer = later(lambda: device((BUTTON, 1, 0)))
+    later(lambda: device((BUTTON, 1, 0)))
     assert getGamepad("button", "any", wait=0.01) == [0, 1]
-    timer.join()
 
 
-def test_a_simulated_robot_moves_on_while_a_person_does_nothing(device):
+def test_a_simulated_robot_moves_on_while_a_person_does_nothing(device, later):
     initialize("sim", speed="off", start="center")
     motors(0.5, 0.5)
     before = robot_or_none().now()
-    timer = later(lambda: device((BUTTON, 0, 1)))
+    later(lambda: device((BUTTON, 0, 1)))
     began = time.monotonic()
     getGamepad("button", wait=0.02)
-    timer.join()
     assert 0.02 <= robot_or_none().now() - before <= time.monotonic() - began
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import time
+import threading
 from types import SimpleNamespace
 
 import pytest
@@ -47,14 +47,21 @@ def test_robot_driven_by_hand_stops_as_it_is_handed_over(lab):
 
 
 def test_robot_is_taken_without_an_answer_only_while_it_stands_still(lab, monkeypatch):
-    monkeypatch.setattr(module, "HANDOVER_S", 0.05)
+    timers = []
+
+    def note_timer(seconds, act, given):
+        timer = threading.Timer(seconds, act, given)
+        timers.append(timer)
+        return timer
+
+    monkeypatch.setattr(module, "threading", SimpleNamespace(Timer=note_timer))
     lab.ask_for_robot(BEN)
     with pytest.raises(StudyError, match="Request control first"):
         lab.take_over(BEN)
-    until = time.monotonic() + 10
-    while lab.request.state == "asked":
-        assert time.monotonic() < until
-        time.sleep(0.01)
+    (timer,) = timers
+    timer.cancel()
+    assert timer.interval == module.HANDOVER_S
+    timer.function(*timer.args)  # the time is over
     assert lab.operator is ANNA
     lab.hand.senses = {"moves": True}
     with pytest.raises(StudyError, match="The robot is moving"):

@@ -57,11 +57,25 @@ def is_lost(page, robot) -> None:
     page.locator(".lab-robot-lost .lab-chip", has_text=chip).wait_for()
 
 
-def is_silent(page) -> None:
-    """The page states that the robot is silent, long before its link is given up."""
-    silence = page.get_by_text(re.compile(r"No answer for \d+\ss\. The link is being opened again"))
-    silence.wait_for()
-    seconds = int(re.search(r"for (\d+)", silence.inner_text())[1])
+WATCH_SILENCE = """() => {
+  window.silence = "";
+  const look = () => {
+    const said = [...document.querySelectorAll(".lab-problem")].find((it) => it.checkVisibility()
+      && /^No answer for \\d+\\ss\\. The link is being opened again/.test(it.textContent));
+    if (said && !window.silence) window.silence = said.textContent;
+  };
+  const all = { subtree: true, childList: true, characterData: true, attributes: true };
+  new MutationObserver(look).observe(document.body, all);
+}"""
+"""Keep what the page states first of a silent robot: a test on a busy machine sees it later."""
+
+
+def kill_and_see_silence(page, robot) -> None:
+    """Kill the robot; the page states that it is silent, long before its link is given up."""
+    page.evaluate(WATCH_SILENCE)
+    robot.kill()
+    page.wait_for_function("() => window.silence")
+    seconds = int(re.search(r"for (\d+)", page.evaluate("window.silence"))[1])
     assert seconds <= 4, "1.5 s on an idle machine"
     page.locator(".lab-robot-silent .lab-chip", has_text="no readings").wait_for()
 
@@ -76,7 +90,7 @@ def test_robot_lost_in_a_trial_of_a_study_is_shown_and_the_study_resumes(lab, vi
     page.get_by_label("Witness").fill(robot.witness)
     page.get_by_role("button", name=CONNECT).click()
     page.get_by_role("button", name="Start trial").click()
-    page.get_by_text(re.compile("^Step 3 of 40")).wait_for()
+    page.get_by_text(re.compile(r"^Step ([3-9]|[12]\d) of 40")).wait_for()  # the page may skip some
     robot.kill()
     page.get_by_text(re.compile(r"No answer for \d+\ss\. The link is being opened again")).wait_for()
     page.locator(".lab-robot-silent .lab-chip", has_text="no readings").wait_for()
@@ -116,8 +130,7 @@ def test_robot_lost_in_a_gap_keeps_its_trials_and_the_gap_resumes(lab, visit, ro
     page.get_by_label("Witness").fill(robot.witness)
     page.get_by_role("button", name="Measure the gap").click()
     page.get_by_text(re.compile(r"[1-3] of 4 trials")).first.wait_for()
-    robot.kill()
-    is_silent(page)
+    kill_and_see_silence(page, robot)
     problem = page.locator(".lab-problem", has_text="trials on the target. They are saved. Resume once")
     problem.wait_for()
     n_done = int(re.match(r"Link lost after (\d) of 4", problem.inner_text())[1])
@@ -148,8 +161,7 @@ def test_robot_lost_in_a_calibration_keeps_its_trials_and_the_calibration_resume
     page.get_by_role("button", name="Back").click()
     calibrate(page, "sensors", Robot=f"scribbler:{robot.port}")
     page.get_by_text(re.compile(r"^Trial [2-9] of 18")).wait_for()
-    robot.kill()
-    is_silent(page)
+    kill_and_see_silence(page, robot)
     problem = page.locator(
         ".lab-problem", has_text=re.compile(r"Link lost after \d+ of 18 trials\. They are")
     )

@@ -27,7 +27,7 @@ class Driven:
 
 @pytest.fixture(autouse=True)
 def _patient(monkeypatch):
-    """A panel that is not told anything for a while stops its robot: not where a busy machine comes late to the next line."""
+    """A panel that is told nothing for a while stops its robot: not where a busy machine is late."""
     monkeypatch.setattr(panels, "HOLD_S", 60.0)
 
 

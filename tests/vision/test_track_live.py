@@ -1,5 +1,6 @@
 """A robot followed while it drives: a camera beside driver and emulator, and one that is lost."""
 
+import threading
 import time
 
 import numpy as np
@@ -12,6 +13,7 @@ from realitygap.study import CameraObserver, connect_robot, drive_study
 from realitygap.testing import Film, FilmedCamera, path_through
 from realitygap.trials import Operator, RobotTarget, TrialPlan, WitnessObserver
 from realitygap.vision import LiveTrack, Marks, Track, Tracked
+from realitygap.vision.track import _live
 from realitygap.world import paper_arena
 from tests.study.physical import small_study
 
@@ -67,6 +69,41 @@ def test_an_error_of_the_camera_reaches_the_caller_that_waits(film):
         pytest.raises(VisionError, match="camera 7 failed: the cable is out"),
     ):
         live.tracked(until_s=1.0)
+
+
+class _EmptyRoom:
+    """Marks and a tracker for pictures without a robot, which take no time."""
+
+    tag = None
+
+    def tracked(self, found):
+        return found
+
+    def take(self, at, image):
+        pass
+
+    def sightings(self):
+        return ()
+
+
+@pytest.mark.slow
+def test_a_picture_may_take_long_to_come_up_as_long_as_others_come(monkeypatch):
+    """All of them together took longer than one may, so that the camera was said to give none."""
+    room, has_to_end = _EmptyRoom(), threading.Event()
+    monkeypatch.setattr(_live, "PATIENCE_S", 1.0)
+    monkeypatch.setattr(_live, "Tracker", lambda tag: room)
+
+    def pictures():
+        for at in range(15):
+            time.sleep(0.1)
+            yield float(at), None
+        has_to_end.wait(60)
+
+    with LiveTrack(_Played(pictures()), room, lambda: 0.0) as live:
+        assert live.tracked(until_s=14.0) == ()
+        with pytest.raises(VisionError, match="camera 7 gave no picture for 1 s"):
+            live.tracked(until_s=15.0)
+        has_to_end.set()
 
 
 class _AboveEmulator:

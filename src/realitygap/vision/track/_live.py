@@ -69,9 +69,13 @@ class LiveTrack(ClosedOnExit):
             VisionError: The camera is gone, or what it saw does not do, as `Marks.tracked`.
         """
         with self._has_come:
-            if until_s is not None:
-                self._has_come.wait_for(lambda: self._last >= until_s or bool(self._problem), PATIENCE_S)
-                if self._last < until_s:
+            while until_s is not None and self._last < until_s:
+                before = self._last  # each picture counts, as many may still wait to be processed
+                self._has_come.wait_for(
+                    lambda before=before: self._last > before or bool(self._problem),  # type: ignore[misc]
+                    PATIENCE_S,
+                )
+                if self._last <= before:
                     raise VisionError(
                         self._problem or f"{self._source.name} gave no picture for {PATIENCE_S:g} s."
                     )

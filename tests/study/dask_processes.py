@@ -48,6 +48,17 @@ def free_port() -> int:
         return probe.getsockname()[1]
 
 
+def reserved_port() -> socket.socket:
+    """Return a socket whose port the system gives to nobody who asks for any port.
+
+    A scheduler can listen on it, again and again, because neither socket insists on a port of its own.
+    """
+    reserved = socket.socket()
+    reserved.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    reserved.bind(("127.0.0.1", 0))
+    return reserved
+
+
 def wait_until(condition: Callable[[], object], seconds: float = 60.0) -> None:
     until = time.monotonic() + seconds
     while not condition():
@@ -71,7 +82,8 @@ class DaskProcesses:
     def __init__(self, folder: Path) -> None:
         self._folder = folder
         self._started: list[Process] = []
-        self.port = free_port()
+        self._reserved = reserved_port()
+        self.port = self._reserved.getsockname()[1]
         self.address = f"tcp://127.0.0.1:{self.port}"
 
     def __enter__(self) -> DaskProcesses:
@@ -80,6 +92,7 @@ class DaskProcesses:
     def __exit__(self, *_: object) -> None:
         for process in self._started:
             kill(process)
+        self._reserved.close()
 
     def scheduler(self, prelude: str = "", *, new: bool = False) -> Process:
         options = ["--host", "127.0.0.1", "--port", str(self.port), "--no-dashboard"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
 import subprocess
@@ -196,11 +197,14 @@ def test_ctrl_c_ends_a_study_on_a_twin_in_the_middle_of_a_run(file: Path, tmp_pa
         until = time.monotonic() + 120
         while not children and time.monotonic() < until:
             time.sleep(0.2)
-            found = Path(f"/proc/{process.pid}/task").glob("*/children")
-            pids = [int(pid) for listed in found for pid in listed.read_text().split()]
-            children = [
-                pid for pid in pids if "platforms.twin._worker" in Path(f"/proc/{pid}/cmdline").read_text()
-            ]
+            with contextlib.suppress(OSError):  # a thread or a process that ended meanwhile
+                found = Path(f"/proc/{process.pid}/task").glob("*/children")
+                pids = [int(pid) for listed in found for pid in listed.read_text().split()]
+                children = [
+                    pid
+                    for pid in pids
+                    if "platforms.twin._worker" in Path(f"/proc/{pid}/cmdline").read_text()
+                ]
         time.sleep(5)  # the twin is up, and at work
         process.send_signal(signal.SIGINT)
         began = time.monotonic()

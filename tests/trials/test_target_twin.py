@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
 import subprocess
@@ -120,7 +121,8 @@ def test_a_process_that_dies_is_started_again_and_its_trial_tried_once_more(
         def kill() -> None:
             while not stop.wait(0.05):
                 for pid in mortal.pids:
-                    os.kill(pid, signal.SIGKILL)
+                    with contextlib.suppress(ProcessLookupError):  # its end was noticed meanwhile
+                        os.kill(pid, signal.SIGKILL)
 
         killer = threading.Thread(target=kill)
         killer.start()

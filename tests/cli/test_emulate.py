@@ -124,7 +124,7 @@ def test_in_a_terminal_there_is_a_live_view():
     master, slave = pty.openpty()
     process = subprocess.Popen([*COMMAND, "--tcp", "0"], stdout=slave, stderr=slave, stdin=slave)
     os.close(slave)
-    seen, until = b"", time.monotonic() + 20
+    seen, until = b"", time.monotonic() + 120
     while b"last command" not in seen and time.monotonic() < until:
         if select.select([master], [], [], 0.5)[0]:
             seen += os.read(master, 65536)

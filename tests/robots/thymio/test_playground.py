@@ -87,7 +87,7 @@ import sys, time
 from realitygap.robots import Command, RecordedRobot, read_recording
 from realitygap.robots.thymio import Thymio
 with Thymio(sys.argv[1], step_s=0.1) as robot:
-    print("driving", flush=True)
+    print("driving", robot.link._guardian.process_id, flush=True)
     if sys.argv[2] == "long life":
         robot.link.expect_motion()
         robot.link.emit(0, (100, 300, 30_000))  # the program on board would stop it after ten minutes
@@ -95,6 +95,16 @@ with Thymio(sys.argv[1], step_s=0.1) as robot:
     while True:
         robot.drive(Command(0.3, 1.0))
 """
+
+
+def stays_put(playground):
+    """Whether the robot stands for a while in which a playground that is held up would have moved it."""
+    stands = playground.pose()
+    for _ in range(20):
+        time.sleep(0.02)
+        if playground.pose() != stands:
+            return False
+    return True
 
 
 @pytest.mark.parametrize(
@@ -110,16 +120,19 @@ def test_the_robot_stands_when_its_program_is_ended(playground, number, life):
         [sys.executable, "-c", DRIVER, playground.port, life], stdout=subprocess.PIPE, text=True
     ) as driver:
         try:
-            assert driver.stdout.readline() == "driving\n"
-            time.sleep(0.3)
-            before = playground.pose()
-            time.sleep(0.05)
-            assert playground.pose() != before
-            os.kill(driver.pid, number)
-            time.sleep(0.6)
             stands = playground.pose()
-            time.sleep(0.1)
-            assert playground.pose() == stands
+            word, guardian = driver.stdout.readline().split()
+            assert word == "driving"
+            until = time.monotonic() + 30
+            while playground.pose() == stands:
+                assert time.monotonic() < until, "it does not drive"
+                time.sleep(0.01)
+            os.kill(driver.pid, number)
+            if number == signal.SIGSTOP:
+                os.kill(int(guardian), signal.SIGKILL)  # it would stop the robot after a second
+            until = time.monotonic() + 10
+            while not stays_put(playground):
+                assert time.monotonic() < until, "it drives on"
         finally:
             driver.kill()
 

@@ -132,7 +132,7 @@ sys.exit(work.main())
 
 def run(code: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        [sys.executable, "-c", DROPPING + code], capture_output=True, text=True, timeout=60, check=False
+        [sys.executable, "-c", DROPPING + code], capture_output=True, text=True, timeout=300, check=False
     )
 
 

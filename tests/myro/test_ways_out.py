@@ -74,7 +74,7 @@ def test_functions_that_run_together_end_with_ctrl_c(served, tmp_path):
         assert process.poll() is None
     time.sleep(0.5)
     process.send_signal(signal.SIGINT)
-    process.communicate(timeout=20)
+    process.communicate(timeout=60)
     assert stands_within(served, 2)
 
 

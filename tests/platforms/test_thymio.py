@@ -204,7 +204,7 @@ def test_emulate_serves_the_robot_and_its_witness_to_other_programs():
             assert trial.poses[-1][0] > trial.poses[0][0] + 0.01
         finally:
             served.send_signal(signal.SIGTERM)
-            _, said = served.communicate(timeout=20)
+            _, said = served.communicate(timeout=120)
     assert served.returncode == 0
     assert "no encoders and no stall" in said
 

@@ -119,8 +119,7 @@ def test_wide_tables_scroll_on_a_phone_and_say_so(show):  # noqa: F811
 def test_print_has_the_first_screen_on_one_page_and_the_last_frame(show):  # noqa: F811
     page = show(color_scheme="dark", size=(720, 1000))
     page.emulate_media(media="print")
-    page.wait_for_timeout(200)
-    assert page.locator("#replay-scrub").evaluate("scrub => scrub.value") == "30"
+    page.wait_for_function("() => document.querySelector('#replay-scrub').value == '30'")
     assert page.locator("#lead-clock").text_content().endswith("step 30 of 30")
     # A4 within its margins, 178 x 261 mm at 96 dots per inch
     page.set_viewport_size({"width": 672, "height": 986})
@@ -128,8 +127,7 @@ def test_print_has_the_first_screen_on_one_page_and_the_last_frame(show):  # noq
     assert figure["y"] + figure["height"] <= 986
     assert not page.locator("#lead-play").is_visible()
     page.emulate_media(media="screen")
-    page.wait_for_timeout(100)
-    assert page.locator("#replay-scrub").evaluate("scrub => scrub.value") == "0"
+    page.wait_for_function("() => document.querySelector('#replay-scrub').value == '0'")
 
 
 EVERY = """(narrow) => {

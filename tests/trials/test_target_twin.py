@@ -162,7 +162,7 @@ def test_the_calling_process_never_opens_the_file_and_ctrl_c_ends_the_processes(
         assert not is_gone(int(pid))
         time.sleep(0.3)
         process.send_signal(signal.SIGINT)
-        process.wait(10)
+        process.wait(60)
         assert is_gone(int(pid))
         assert process.returncode not in (0, None)
 

@@ -85,7 +85,7 @@ def test_last_of_several_trials_that_end_together_is_reported():
         telling.show("robot", done, 10)
     began = time.monotonic()
     while ("robot", 3) not in channel.done:
-        assert time.monotonic() - began < 2
+        assert time.monotonic() - began < 60
         time.sleep(0.02)
 
 

@@ -93,9 +93,10 @@ def test_only_the_current_step_is_open_and_its_action_is_in_view(lab, visit, siz
 def test_cells_are_marked_and_saved_with_the_keyboard(lab, visit):
     drive_sheet(lab.root)
     page = visit(PAGE)
+    page.locator('[data-counting="1"]').evaluate("card => { card.dataset.old = 'yes'; }")
     page.get_by_label("Your name").fill("anna")
     page.wait_for_function("() => document.cookie.includes('realitygap_who')")
-    page.wait_for_timeout(1000)  # the grid is drawn again for another name
+    page.locator('[data-counting="1"]:not([data-old])').wait_for()  # drawn again for another name
     grid = page.get_by_role("grid", name="Cells crossed in trial 1")
     assert grid.get_by_role("row").count() == 6
     page.locator('[data-counting="1"] [data-cell="0"]').focus()

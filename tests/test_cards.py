@@ -98,6 +98,18 @@ def test_a_card_reads_only_files_that_are_new(folder, monkeypatch):
     assert page[table] == before[table]
 
 
+def test_a_card_has_the_trials_that_a_robot_is_driving(tmp_path):
+    """What is committed is in a file beside the ledger until the ledger is closed."""
+    conditions = [{"name": "a", "hash": "hash", "settings": {"task": {"kind": "coverage"}}}]
+    made = ResultsFolder.create(tmp_path / "r", {"conditions": conditions, "replicates": 1})
+    with new_ledger(made.path) as ledger:
+        drive(ledger, 1)
+        assert "<polyline" not in made._repr_html_()
+        drive(ledger, 2)
+        ledger.close_generation("a", 0, 0, [0.5, 0.25], [None, None])
+        assert f"<td>1</td><td>{2 / 72:.3f}</td>" in made._repr_html_()
+
+
 def test_a_card_of_many_bytes_leaves_medians_out(folder, monkeypatch):
     monkeypatch.setattr("realitygap.records._cards.MOST_READ_BYTES", 1)
     page = ResultsFolder.open(folder.path)._repr_html_()

@@ -110,8 +110,9 @@ def _read_again(folder: PublishedResults, description: Mapping[str, Any]) -> _Re
     """Return the bests of a folder, read again if a file has changed; None if they are too many."""
     files = folder.files()
     paths = [path for _, path in files]
-    ledger = folder.path / LEDGER_NAME
-    stats = [(path.name, path.stat()) for path in (*paths, *([ledger] if ledger.exists() else ()))]
+    # While a robot is driven, SQLite writes into a file beside the ledger, which itself stays as it is.
+    ledger = [folder.path / (LEDGER_NAME + ending) for ending in ("", "-wal")]
+    stats = [(path.name, path.stat()) for path in (*paths, *(path for path in ledger if path.exists()))]
     identity = tuple((name, status.st_size, status.st_mtime_ns) for name, status in stats)
     known = _read.get(folder)
     if known is not None and known.identity == identity:

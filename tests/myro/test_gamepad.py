@@ -2,7 +2,6 @@
 
 import os
 import struct
-import time
 
 import pytest
 
@@ -81,9 +80,8 @@ def test_a_simulated_robot_moves_on_while_a_person_does_nothing(device, later):
     motors(0.5, 0.5)
     before = robot_or_none().now()
     later(lambda: device((BUTTON, 0, 1)))
-    began = time.monotonic()
     getGamepad("button", wait=0.02)
-    assert 0.02 <= robot_or_none().now() - before <= time.monotonic() - began
+    assert 0.02 <= robot_or_none().now() - before < 0.03  # it waits once, and a message takes a millisecond
 
 
 def test_a_gamepad_that_is_not_there_or_that_is_gone_has_a_message(device, monkeypatch):

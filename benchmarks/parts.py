@@ -1,6 +1,6 @@
 """Measure what the parts of a step cost in `sim`, and how far robots end from where many parts lead them.
 
-    python benchmarks/parts.py [--seconds S] [--json]
+    python benchmarks/parts.py [--json]
 
 The trials are those of `realitygap bench realism`. Their steps have one part until the delayed command begins, and four
 more. Each row has other numbers of parts. The error is the distance between the places of the same robot, with the same
@@ -25,6 +25,7 @@ from realitygap.study._realism import AVOIDING, PRESSED, RealisticTrials
 PARTS = ((4, 1), (3, 1), (2, 1), (1, 1))  # after the delayed command begins, and before
 FINEST = (128, 32)
 STEPS = 20
+SECONDS = 1.0
 REPEATS = 5
 KINDS = {"pressed": (PRESSED, False), "boxes": (AVOIDING, True)}
 
@@ -45,13 +46,13 @@ def places(name: str, parts: tuple[int, int]) -> NDArray[np.float64]:
     return trials.ended
 
 
-def measure(name: str, seconds: float) -> list[dict[str, Any]]:
+def measure(name: str) -> list[dict[str, Any]]:
     """Return a row for each of `PARTS`."""
     finest = places(name, FINEST)
     rows = []
     for parts in PARTS:
         trials = with_parts(name, parts)
-        rates = [trials.rate(seconds) / (peak_flops() / 1e9) for _ in range(REPEATS)]
+        rates = [trials.rate(SECONDS) / (peak_flops() / 1e9) for _ in range(REPEATS)]
         away = np.hypot(*(places(name, parts) - finest).T)
         rows.append(
             {
@@ -71,10 +72,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--seconds", type=float, default=1.0, help="measuring time of each figure [s]")
     parser.add_argument("--json", action="store_true", help="print data instead of a table")
     options = parser.parse_args()
-    rows = [row for name in KINDS for row in measure(name, options.seconds)]
+    rows = [row for name in KINDS for row in measure(name)]
     if options.json:
         print(json.dumps({"machine": machine(), "rows": rows}, indent=1))
         return

@@ -40,7 +40,7 @@ ARGUMENTS = [
 ]
 DESKTOP, PHONE = (1440, 900), (390, 844)
 PATIENCE_MS = 120_000
-OUTAGE = ("net::ERR", "WebSocket connection", "reloading because", "status of 403")
+OUTAGE = ("net::ERR", "Failed to fetch", "WebSocket connection", "reloading because", "status of 403")
 """What a browser says of a page whose lab is gone, or was started again with another token."""
 
 ENDLESS_CHECKS = """

@@ -90,7 +90,7 @@ def test_progress_of_a_running_study_changes_in_place(lab, visit, path):
     page.wait_for_url("**/study/running")
     page = visit(path)
     first = page.wait_for_function(PROGRESS, arg="").json_value()
-    pause = page.get_by_role("button", name="Pause")
+    pause = page.get_by_role("button", name="Pause", exact=True)
     pause.evaluate(MARK)
     second = page.wait_for_function(PROGRESS, arg=first).json_value()
     page.wait_for_function(PROGRESS, arg=second)

@@ -304,7 +304,7 @@ def test_a_trial_is_chosen_in_the_table_with_a_tap_or_a_key(lab, visit):
 
 def test_open_page_comes_back_with_the_new_token_when_the_lab_was_started_again(lab, visit):
     make_study(lab.root)
-    page = visit(PAGE, forgive=[*OUTAGE, "Failed to load resource", "Failed to fetch"])
+    page = visit(PAGE, forgive=[*OUTAGE, "Failed to load resource"])
     page.get_by_label("Your name").fill("anna")
     lab.kill()
     page.get_by_text("Reconnecting…").wait_for()

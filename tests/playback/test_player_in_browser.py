@@ -104,15 +104,15 @@ def test_the_slider_goes_through_the_trial(show):
 def test_it_plays_as_fast_as_asked_and_stops_at_the_end(show):
     page = show(play(straight(10)))
     page.select_option("select", "8")
-    page.click("button[aria-label=Play]")
-    page.wait_for_selector("button[aria-label=Play]")
+    page.click('button[aria-label="Play trials"]')
+    page.wait_for_selector('button[aria-label="Play trials"]')
     assert clock(page).startswith("step 10 of 10 · 1.0\u00a0s")
     assert page.evaluate("() => window.model.get('speed')") == 8
     page.select_option("select", "0.25")
     began = time.monotonic()
-    page.click("button[aria-label=Play]")
+    page.click('button[aria-label="Play trials"]')
     page.wait_for_function("() => /step [2-9] /.test(document.querySelector('.rg-clock').textContent)")
-    page.click("button[aria-label=Pause]")
+    page.click('button[aria-label="Pause trials"]')
     shown = float(clock(page).split(" · ")[1].removesuffix("\u00a0s"))
     took = time.monotonic() - began
     assert 0.0 < shown <= 0.25 * took + 0.05, "it begins anew at its end, and a quarter as fast"
@@ -134,9 +134,9 @@ def test_keys_do_what_buttons_do(show):
         page.keyboard.press(key)
         assert clock(page).startswith(f"step {step} of 87")
     page.keyboard.press(" ")
-    page.wait_for_selector("button[aria-label=Pause]")
+    page.wait_for_selector('button[aria-label="Pause trials"]')
     page.keyboard.press(" ")
-    page.wait_for_selector("button[aria-label=Play]")
+    page.wait_for_selector('button[aria-label="Play trials"]')
     assert field.get_attribute("aria-label").startswith("a: step")
 
 
@@ -193,7 +193,7 @@ def test_several_trials_have_a_pen_each_and_letters_that_do_not_hide_each_other(
 @pytest.mark.slow
 def test_reduced_motion_shows_steps_instead_of_motion(show):
     page = show(play(turning(2)), reduced_motion="reduce")
-    page.click("button[aria-label=Play]")
+    page.click('button[aria-label="Play trials"]')
     page.wait_for_function("() => !document.querySelector('.rg-clock').textContent.startsWith('step 0 ')")
     turns, shown = page.evaluate(
         "() => [document.querySelector('.rg-robot').getAttribute('transform'),"
@@ -215,7 +215,7 @@ def test_every_control_has_a_name_and_can_be_reached_by_keyboard(show):
             )
         )
     assert names[0].startswith("a: step 0 of 10")
-    assert names[1:] == ["Play", "Step", "Speed", "rays", "trails", "cells"]
+    assert names[1:] == ["Play trials", "Step", "Speed", "rays", "trails", "cells"]
 
 
 @pytest.mark.slow
@@ -227,7 +227,7 @@ def test_a_robot_that_runs_is_followed_and_can_be_played_afterwards(show):
     widget.live = True
     page = show(widget)
     assert page.evaluate("() => window.sent") == [{"kind": "all"}]
-    assert page.locator("button[aria-label=Play]").is_disabled()
+    assert page.locator('button[aria-label="Play trials"]').is_disabled()
     now = {"kind": "now", "rays": [0.2, 0.1, None], "stalled": False, "lasts": 0.0, "time": 0.1, "trail": []}
     page.evaluate(
         "message => window.tell(message)", {**now, "pose": [0.2, 0.2, 0.0], "step": 1, "cells": [13]}
@@ -258,12 +258,12 @@ def test_a_robot_that_runs_is_followed_and_can_be_played_afterwards(show):
         done,
     )
     assert clock(page).startswith("step 10 of 10")
-    assert page.locator("button[aria-label=Play]").is_enabled()
+    assert page.locator('button[aria-label="Play trials"]').is_enabled()
 
 
 @pytest.mark.slow
 def test_a_view_that_is_closed_listens_no_longer(show):
     page = show(play(straight(10)))
-    page.click("button[aria-label=Play]")
+    page.click('button[aria-label="Play trials"]')
     page.evaluate("() => window.cleanup()")
     assert page.evaluate("() => window.heard()") == 0

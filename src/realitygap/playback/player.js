@@ -79,7 +79,7 @@ function render({ model, el }) {
 
   // controls
   const bar = tag("div", { class: "rg-bar" });
-  const play = tag("button", { type: "button", class: "rg-play", "aria-label": "Play" });
+  const play = tag("button", { type: "button", class: "rg-play", "aria-label": "Play trials" });
   const slider = tag("input", { type: "range", min: "0", step: "1", value: "0", "aria-label": "Step" });
   const speed = tag("select", { "aria-label": "Speed" });
   for (const value of SPEEDS) speed.append(tag("option", { value: String(value) }, `${value}×`));
@@ -271,7 +271,7 @@ function render({ model, el }) {
     playing = wanted;
     if (playing && at >= duration - 1e-9) at = 0;
     last = null;
-    play.setAttribute("aria-label", playing ? "Pause" : "Play");
+    play.setAttribute("aria-label", playing ? "Pause trials" : "Play trials");
     play.classList.toggle("rg-playing", playing);
     status.textContent = playing ? "" : clock.textContent;
     draw();

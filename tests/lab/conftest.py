@@ -22,6 +22,8 @@ from .forked_children import FOR_CHILDREN, Forking
 from .served import LOG, begin
 
 playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright: uv sync --extra dev")
+expect = playwright.expect
+"""Waits for what it expects: a page on a busy machine shows it later."""
 
 CHROMIUM = next(
     filter(
@@ -40,6 +42,7 @@ ARGUMENTS = [
 ]
 DESKTOP, PHONE = (1440, 900), (390, 844)
 PATIENCE_MS = 120_000
+expect.set_options(timeout=PATIENCE_MS)
 OUTAGE = ("net::ERR", "Failed to fetch", "WebSocket connection", "reloading because", "status of 403")
 """What a browser says of a page whose lab is gone, or was started again with another token."""
 

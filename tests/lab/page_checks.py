@@ -6,6 +6,8 @@ Each returns the faults that it finds, so that a test reads `assert covered(butt
 from __future__ import annotations
 
 import os
+import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -77,6 +79,13 @@ _FOCUSED = """() => {
   return style.outlineStyle !== "none" || border === "2px" ? "" : `no visible focus: ${it.outerHTML.slice(0, 200)}`;
 }"""
 
+_STOP_MOVING = """async () => {
+  for (const _ of "12") await new Promise(requestAnimationFrame);
+  const moving = document.getAnimations().filter((it) => it.effect.getComputedTiming().endTime !== Infinity);
+  await Promise.all(moving.map((it) => it.finished.catch(() => {})));
+}"""
+"""Transitions begin with the next frame, late on a busy machine; one that is given up rejects `finished`."""
+
 _AXE = Axe()
 _RUN_AXE = """async (options) => {
   const found = await axe.run(document, { resultTypes: ["violations"], ...options });
@@ -88,6 +97,7 @@ def settle(page: Any) -> None:
     """Wait until nothing fades in any more, and a page has its size."""
     is_still = page.evaluate("() => matchMedia('(prefers-reduced-motion: reduce)').matches")
     page.wait_for_timeout(STILL_MS if is_still else SETTLED_MS)
+    page.evaluate(_STOP_MOVING)
 
 
 def covered(locator: Any) -> list[str]:
@@ -106,6 +116,14 @@ def wide(page: Any) -> list[str]:
     """Return by how much the page is wider than the screen."""
     over = page.evaluate("() => document.documentElement.scrollWidth - window.innerWidth")
     return [f"{over} px wider than the screen"] if over > 0 else []
+
+
+def _lasting(page: Any, look: Callable[[Any], list[str]]) -> list[str]:
+    """Return what a check finds for five seconds: a busy page draws its plots in their new size later."""
+    end = time.monotonic() + 5.0
+    while (found := look(page)) and time.monotonic() < end:
+        page.wait_for_timeout(100)
+    return found
 
 
 def small(page: Any) -> list[str]:
@@ -186,7 +204,11 @@ def faults(page: Any, root: Path) -> list[str]:
     for size, (width, height) in SIZES.items():
         page.set_viewport_size({"width": width, "height": height})
         settle(page)
-        problems = [*wide(page), *cut(page), *(axe(page, size) if size in AXE_SIZES else [])]
+        problems = [
+            *_lasting(page, wide),
+            *_lasting(page, cut),
+            *(axe(page, size) if size in AXE_SIZES else []),
+        ]
         if (width, height) == PHONE:
             problems += small(page)
         if (width, height) == DESKTOP:

@@ -10,7 +10,7 @@ import pytest
 from realitygap.lab._gap_work import _Telling, rounds
 from realitygap.records import read_observations
 
-from .conftest import open_advanced
+from .conftest import expect, open_advanced
 
 pytestmark = pytest.mark.slow
 
@@ -54,7 +54,7 @@ def test_gap_is_measured_with_its_progress_and_mistakes_are_shown_at_their_field
     assert re.fullmatch(r"−?\d\.\d{3} \[−?\d\.\d{3}, −?\d\.\d{3}\]", terms.locator("+ dd").inner_text())
     scatter = page.locator(".lab-scatter svg")
     words = page.locator(".lab-scatter .lab-curves-words")
-    assert scatter.locator("rect").count() == 10
+    expect(scatter.locator("rect")).to_have_count(10)
     scatter.locator("rect").nth(4).hover()
     words.get_by_text(re.compile(r".+: \d\.\d{3} ± \d\.\d{3} on sim \(SIM\), .* on jyro \(SIM\)")).wait_for()
     scatter.focus()

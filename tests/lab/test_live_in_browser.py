@@ -7,7 +7,7 @@ import pytest
 from realitygap.robots.twin import sample_twin
 from realitygap.study import parse_study, run_study
 
-from .conftest import PHONE
+from .conftest import PHONE, expect
 
 pytestmark = pytest.mark.slow
 
@@ -53,7 +53,7 @@ def test_a_network_drives_live_and_can_be_played_when_it_is_stopped(lab, visit):
         live.wait_for()
         assert live.locator(".rg-label").text_content() == label
         page.wait_for_function("() => /step [2-9]/.test(document.querySelector('.rg-clock').textContent)")
-        assert live.locator(".rg-ray").count() == 3
+        expect(live.locator(".rg-ray")).to_have_count(3)
         rates = []
         while not rates or (rates[-1] < 20 and len(rates) < MOST_LOOKS):
             rates.append(page.evaluate(FRAMES, 2))

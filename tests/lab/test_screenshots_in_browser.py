@@ -14,7 +14,7 @@ from PIL import Image
 from realitygap.study import parse_study, run_study
 
 from .conftest import PHONE
-from .robot_study import begin_sitting, make_study, start_trial
+from .robot_study import await_trial, begin_sitting, make_study, start_trial
 from .sheets import drive_sheet, photo_of
 
 pytestmark = pytest.mark.slow
@@ -97,6 +97,7 @@ def test_screenshots_show_a_sitting_on_a_phone(lab, visit):
     make_study(lab.root, steps=60)
     page = visit("study/by-robot/trials", size=PHONE, has_touch=True, **FINE)
     begin_sitting(page, "emulator://s2?fluke=2&speed=1")
+    await_trial(page, 1)
     page.get_by_role("button", name="Start trial").scroll_into_view_if_needed()
     page.locator(".lab-question").evaluate("it => it.scrollIntoView({block: 'center'})")
     keep(page, "place")

@@ -14,7 +14,7 @@ import pytest
 from realitygap.emulator import connect_witness
 from realitygap.study import parse_study, run_study
 
-from .conftest import PATIENCE_MS, PHONE, open_advanced
+from .conftest import PHONE, expect, open_advanced
 from .page_checks import covered
 from .test_robot_in_browser import hold
 from .test_studies_in_browser import TINY, start
@@ -106,18 +106,26 @@ class Motors:
         """Let them turn, act, and check how long they turn then; three times at most, for the same reason."""
         times = []
         while len(times) < 3 and (not times or times[-1] >= limit_s):
-            begin()
+            self._turn(begin, end)
             times.append(self._time_of_stop(act))
             end()
         print(f"the motors turned for {times} s afterwards")
         assert times[-1] < limit_s
 
+    def _turn(self, begin: Any, end: Any) -> None:
+        """Begin until they turn: a page that is drawn at this moment, or a robot that is silent, drops a press."""
+        for _ in range(24):
+            begin()
+            until = time.monotonic() + 5.0
+            while time.monotonic() < until:
+                if time.monotonic() - self.moved_s < 0.05:
+                    return
+                time.sleep(0.01)
+            end()
+        raise AssertionError("the motors do not turn")
+
     def _time_of_stop(self, press: Any) -> float:
         """How long they turn after a press [s]."""
-        end = time.monotonic() + PATIENCE_MS / 1000
-        while time.monotonic() - self.moved_s > 0.05:
-            assert time.monotonic() < end, "the motors do not turn"
-            time.sleep(0.01)
         pressed = time.monotonic()
         press()
         time.sleep(1.0)
@@ -229,6 +237,7 @@ def test_motors_stop_within_half_a_second_when_the_tab_is_closed_with_a_key_down
         pages[-1].keyboard.down("ArrowLeft")
 
     def open_again() -> None:
+        pages[-1].close()  # unless that is what was measured
         again = page.context.new_page()
         again.goto(page.url)
         again.get_by_text(f"Connected to {emulated[0]}").wait_for()
@@ -268,5 +277,5 @@ def test_page_without_the_lab_shows_the_stop_and_disables_everything_else(visit)
     page.context.set_offline(False)
     page.get_by_text("Reconnecting…").wait_for(state="hidden")
     page.locator(".lab-stop").wait_for(state="hidden")
-    assert page.get_by_label("Target").input_value() == "twin:mine.toml"
-    assert page.get_by_text("No gaps measured yet.").is_visible()
+    expect(page.get_by_label("Target")).to_have_value("twin:mine.toml")
+    expect(page.get_by_text("No gaps measured yet.")).to_be_visible()

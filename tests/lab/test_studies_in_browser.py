@@ -7,7 +7,7 @@ import pytest
 from realitygap.records import ResultsFolder
 from realitygap.study import parse_study, run_study
 
-from .conftest import DESKTOP, NEW_PYTHONS, OUTAGE, PHONE, open_advanced
+from .conftest import DESKTOP, NEW_PYTHONS, OUTAGE, PHONE, expect, open_advanced
 from .robot_study import make_study
 
 TINY = """
@@ -124,7 +124,7 @@ def test_studies_have_a_picture_and_one_primary_action_and_can_be_found(lab, vis
     names.first.and_(robot).wait_for()
     page.get_by_label("Filter studies").fill("TIN")
     robot.wait_for(state="detached")
-    assert names.count() == 1
+    expect(names).to_have_count(1)
     page.get_by_label("Filter studies").fill("nonsense")
     page.get_by_text("No study has this text in its name or title.").wait_for()
     other = visit("gap")

@@ -8,7 +8,7 @@ import pytest
 
 import realitygap
 
-from .conftest import DESKTOP, OUTAGE, PHONE
+from .conftest import DESKTOP, OUTAGE, PHONE, expect
 from .test_hand import wait_for
 
 pytestmark = pytest.mark.slow
@@ -41,7 +41,7 @@ def test_papers_study_runs_with_one_click_and_its_figures_grow(lab, visit):
         assert len(words) <= 1, seen
         assert words != ["Complete"] or (progress == "" and waiting != "No runs yet"), seen
     assert [words for words, _, _ in seen if words == ["In use"]] == []
-    assert page.get_by_text(LAST).count()
+    page.get_by_text(LAST).first.wait_for(state="attached")
     page.locator(".lab-figure img").nth(4).wait_for()
     wait_for(lambda: (lab.root / "paper" / "lab" / "figures.json").is_file())
     lab.stop()
@@ -206,7 +206,7 @@ def test_form_cannot_be_edited_before_a_changed_file_is_read(lab, visit):
     assert 'name = "from-form"' in file.input_value()
     page.get_by_role("tab", name="Form").click()
     name.wait_for()
-    assert name.input_value() == "from-form"
+    expect(name).to_have_value("from-form")
 
 
 def test_file_with_a_mistake_keeps_its_text_until_it_is_corrected_or_discarded(lab, visit):
@@ -223,7 +223,7 @@ def test_file_with_a_mistake_keeps_its_text_until_it_is_corrected_or_discarded(l
     assert not name.is_visible()
     page.get_by_role("button", name="Discard the changes of the file").click()
     page.get_by_role("alert").filter(has_text="Expected a study file").wait_for(state="hidden")
-    assert file.input_value() == before
+    expect(file).to_have_value(before)
     page.get_by_role("tab", name="Form").click()
     name.wait_for()
     page.get_by_role("button", name="Start study").click()

@@ -8,9 +8,19 @@ from collections.abc import Callable
 
 import pytest
 
-from .conftest import DESKTOP, OUTAGE, PHONE, open_advanced, open_fold
+from .conftest import DESKTOP, OUTAGE, PHONE, expect, open_advanced, open_fold
 from .page_checks import covered
-from .robot_study import FAST, SLOW, begin_sitting, count, ledger_of, make_study, start_trial, tap
+from .robot_study import (
+    FAST,
+    SLOW,
+    await_trial,
+    begin_sitting,
+    count,
+    ledger_of,
+    make_study,
+    start_trial,
+    tap,
+)
 from .sheets import drive_sheet
 
 pytestmark = pytest.mark.slow
@@ -78,6 +88,7 @@ def test_only_the_current_step_is_open_and_its_action_is_in_view(lab, visit, siz
     page.get_by_text("No trials yet. Connect a robot to drive 4 trials.").wait_for()
     check("Place", "Connect robot", ["Robot"])
     begin_sitting(page, "emulator://s2?fluke=2&speed=2")
+    await_trial(page, 1)
     check("Place", "Start trial", [])
     page.get_by_role("button", name="Start trial").click()
     check("Drive", "Abort trial", [])
@@ -98,7 +109,7 @@ def test_cells_are_marked_and_saved_with_the_keyboard(lab, visit):
     page.wait_for_function("() => document.cookie.includes('realitygap_who')")
     page.locator('[data-counting="1"]:not([data-old])').wait_for()  # drawn again for another name
     grid = page.get_by_role("grid", name="Cells crossed in trial 1")
-    assert grid.get_by_role("row").count() == 6
+    expect(grid.get_by_role("row")).to_have_count(6)
     page.locator('[data-counting="1"] [data-cell="0"]').focus()
     for key in ("ArrowUp", "ArrowRight", "ArrowRight", "Space"):
         page.keyboard.press(key)
@@ -153,6 +164,20 @@ def test_a_lab_killed_in_the_middle_of_a_trial_loses_nothing(lab, visit):
     page.get_by_role("button", name="Void and repeat").click()
     start_trial(page, 3)
     wait_for(lambda: states(lab)[:2] == ["void", "driven"])
+
+
+def test_a_slow_link_is_shown_before_the_first_trial_and_can_be_driven_anyway(lab, visit):
+    make_study(lab.root)
+    page = visit(PAGE)
+    for answer in ("Cancel", "Drive anyway"):
+        begin_sitting(page, f"{FAST}&seed=1&faults=delay=0.4")
+        page.locator(".lab-question .lab-problem", has_text="the link is too slow").wait_for()
+        page.get_by_role("button", name=answer).click()
+        if answer == "Cancel":
+            page.get_by_text("nothing was driven").wait_for()
+            assert states(lab) == ["planned", "planned"]
+    start_trial(page, 1)
+    wait_for(lambda: states(lab)[:1] == ["driven"])
 
 
 def test_an_aborted_trial_stops_the_robot_and_is_asked_about(lab, visit):
@@ -299,7 +324,7 @@ def test_a_trial_is_chosen_in_the_table_with_a_tap_or_a_key(lab, visit):
     count(page, 1, 0)
     page.locator('[data-counting="2"]').wait_for()
     page.get_by_role("button", name="Score trial 1").wait_for(state="detached")  # anna has
-    assert page.get_by_label("Note on the study").input_value() == "half a note"
+    expect(page.get_by_label("Note on the study")).to_have_value("half a note")
 
 
 def test_open_page_comes_back_with_the_new_token_when_the_lab_was_started_again(lab, visit):

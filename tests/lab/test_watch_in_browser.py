@@ -9,7 +9,7 @@ import pytest
 
 from realitygap.study import parse_study, run_study
 
-from .conftest import DESKTOP, PHONE
+from .conftest import DESKTOP, PHONE, expect
 from .robot_study import SLOW, begin_sitting, make_study, start_trial
 
 pytestmark = pytest.mark.slow
@@ -70,7 +70,7 @@ def test_compare_adds_up_to_three_trials_to_the_one_that_plays(lab, visit):
         replay.locator(".rg-names > *").nth(number).wait_for()
     choose(4)
     page.get_by_role("alert").filter(has_text="4 trials are shown.").wait_for()
-    assert replay.locator(".rg-names > *").count() == 4
+    expect(replay.locator(".rg-names > *")).to_have_count(4)
     run.fill("99")
     run.press("Tab")
     page.wait_for_timeout(600)
@@ -89,7 +89,7 @@ def test_condition_of_the_table_filters_both_panels(lab, visit, size):
     row.get_by_role("button").click()
     page.get_by_text(f"Showing {name}.").wait_for()
     page.locator(".lab-panel .rg-head", has_text=name).wait_for()
-    assert page.locator(".lab-curves g.lab-curve-off").count() == 1
+    expect(page.locator(".lab-curves g.lab-curve-off")).to_have_count(1)
     page.locator(".lab-curves > svg").focus()
     page.keyboard.press("ArrowRight")
     assert page.locator(".lab-curves-words").inner_text().startswith(f"{name}, generation 0: 0.")

@@ -68,7 +68,8 @@ def test_commands_work_on_a_playground():
         assert len(json.loads(run("sense", port, "--json").stdout)["prox.horizontal"]) == 7
         before = playground.pose()
         assert run("drive", port, "--seconds", "0.5", "--", "-0.5").exit_code == 0
-        assert playground.pose().x < before.x - 0.015
+        # 35 mm on an idle machine; the playground leaves out time in which it did not run
+        assert playground.pose().x < before.x - 0.005
         assert run("stop", port).stdout == "The motors are off.\n"
         assert "no reading of its battery" in str(run("battery", port).exception)
         assert "has no picture" in str(run("picture", port).exception)

@@ -176,6 +176,11 @@ def test_first_screen_has_findings_a_moving_path_and_a_figure(show):
     paused = moving.get_attribute("transform")
     page.wait_for_timeout(300)
     assert moving.get_attribute("transform") == paused
+    page.locator("#lead-play").click()
+    page.wait_for_function(
+        "paused => document.querySelector('#lead-stage .robot').getAttribute('transform') != paused",
+        arg=paused,
+    )
     page.locator("#lead-open").click()
     page.wait_for_function(
         "() => document.querySelector('#replay-stage').getBoundingClientRect().top < innerHeight"

@@ -79,12 +79,13 @@ _FOCUSED = """() => {
   return style.outlineStyle !== "none" || border === "2px" ? "" : `no visible focus: ${it.outerHTML.slice(0, 200)}`;
 }"""
 
-_STOP_MOVING = """async () => {
-  for (const _ of "12") await new Promise(requestAnimationFrame);
+_UNTIL_STILL = """async () => {
+  await new Promise(requestAnimationFrame);
+  await new Promise(requestAnimationFrame);
   const moving = document.getAnimations().filter((it) => it.effect.getComputedTiming().endTime !== Infinity);
   await Promise.all(moving.map((it) => it.finished.catch(() => {})));
 }"""
-"""Transitions begin with the next frame, late on a busy machine; one that is given up rejects `finished`."""
+"""Transitions begin with the next frame, which is late on a busy machine. A canceled one rejects `finished`."""
 
 _AXE = Axe()
 _RUN_AXE = """async (options) => {
@@ -97,7 +98,7 @@ def settle(page: Any) -> None:
     """Wait until nothing fades in any more, and a page has its size."""
     is_still = page.evaluate("() => matchMedia('(prefers-reduced-motion: reduce)').matches")
     page.wait_for_timeout(STILL_MS if is_still else SETTLED_MS)
-    page.evaluate(_STOP_MOVING)
+    page.evaluate(_UNTIL_STILL)
 
 
 def covered(locator: Any) -> list[str]:

@@ -7,7 +7,7 @@ import polars as pl
 import pytest
 
 from realitygap.errors import LogError
-from realitygap.logs import LogMap, guess_log_map, load_log_map, read_logs, trials_of
+from realitygap.logs import LogMap, guess_log_map, import_log, load_log_map, read_logs, trials_of
 from realitygap.world import load_robot
 from tests.logs.made import SPEED, STEP_S, TRACK, drive, rows, write
 
@@ -23,6 +23,11 @@ def log_map(**changed):
 def read(path, **changed):
     (log,) = read_logs(path, log_map(**changed), ROBOT)
     return log
+
+
+def load_log_map_text(folder, text):
+    (folder / "again.toml").write_text(text, "utf-8")
+    return load_log_map(folder / "again.toml")
 
 
 @pytest.fixture
@@ -154,6 +159,65 @@ def test_counters_of_wheels_are_ways_since_the_start(tmp_path):
     speeds = {"time": "t", "left": "left", "right": "right", "unit": "m/s"}
     (log,) = read_logs(path, LogMap(commands=COMMANDS, wheels=speeds), ROBOT)
     assert np.abs(log.wheels - ways).max() < 0.05
+
+
+def test_increments_belong_to_the_interval_that_ends_at_their_row(tmp_path):
+    commands, poses = drive(60)
+    ways = np.concatenate(
+        [np.full((1, 2), 0.7), commands * SPEED * STEP_S]
+    )  # the first is from before the log
+    mean, turn = ways.mean(1), (ways[:, 1] - ways[:, 0]) / TRACK
+    table = np.column_stack([STEP_S * np.arange(61), ways, mean, turn, poses])
+    path = write(tmp_path / "log.csv", table, "t,dl,dr,dc,da,x,y,heading")
+    wheels = {"time": "t", "left": "dl", "right": "dr", "per": "row"}
+    driven = np.concatenate([np.zeros((1, 2)), np.cumsum(ways[1:], 0)])
+    both = LogMap(commands=wheels, wheels={**wheels, "unit": "ticks", "ticks_per_m": 1}, poses=POSES)
+    twist = LogMap(commands={"time": "t", "forward": "dc", "turn": "da", "per": "row"}, poses=POSES)
+    for mapped in (both, twist):
+        (log,) = read_logs(path, mapped, ROBOT)
+        assert log.commands == pytest.approx(commands)
+        if len(log.wheels):
+            assert log.wheels == pytest.approx(driven)
+    assert load_log_map_text(tmp_path, both.to_toml()) == both
+
+
+def test_increments_have_no_unit_of_a_speed_and_no_row_is_left_out(tmp_path):
+    commands, poses = drive(60)
+    table = rows(commands, poses)
+    path = write(tmp_path / "log.csv", table)
+    for part in ("commands", "wheels"):
+        mapped = LogMap(
+            **{"poses": POSES, part: {**COMMANDS, "per": "row", "unit": "ticks/s", "ticks_per_m": 9}}
+        )
+        with pytest.raises(
+            LogError, match=f"{part}.unit is 'ticks/s', expected m,.*a distance since the row"
+        ):
+            list(read_logs(path, mapped, ROBOT))
+    table[7, 1] = np.nan
+    write(path, table)
+    mapped = LogMap(wheels={**COMMANDS, "per": "row"}, poses=POSES)
+    for drop in (False, True):
+        with pytest.raises(LogError, match="has no number in left"):
+            list(read_logs(path, mapped, ROBOT, drop_bad_rows=drop))
+
+
+def test_log_of_encoders_and_poses_has_no_commands(tmp_path):
+    commands, poses = drive(60)
+    ways = np.concatenate([np.zeros((1, 2)), np.cumsum(commands * SPEED * STEP_S, 0)])
+    table = np.column_stack([STEP_S * np.arange(61), ways, poses])
+    path = write(tmp_path / "log.csv", table)
+    mapped = LogMap(wheels={**COMMANDS, "unit": "m"}, poses=POSES)
+    (log,) = read_logs(path, mapped, ROBOT)
+    assert not log.has_commands
+    assert any("no commands" in note for note in log.notes)
+    assert log.wheels == pytest.approx(ways)
+    assert log.poses == pytest.approx(poses)
+    assert log.commands == pytest.approx(commands)  # as shares of full speed
+    (trial,) = trials_of(log, mapped)
+    assert trial.wheels == pytest.approx(ways)
+    assert trial.poses == pytest.approx(poses)
+    report = import_log(path, tmp_path / "trials.jsonl", mapped.model_copy(update={"robot": "pioneer"}))
+    assert report.observe == "wheels, poses"
 
 
 def test_a_column_splits_trials(tmp_path):

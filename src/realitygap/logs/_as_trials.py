@@ -60,6 +60,8 @@ def _observe_of(log: Log) -> Observe:
 def trials_of(log: Log, log_map: LogMap, first: int = 0) -> Iterator[TrialRecord]:
     """Yield the stretches of a log in which everything is known, as trials.
 
+    If the log has no commands, those of the trials are the speeds of the encoders.
+
     Args:
         log: One trial of a log.
         log_map: Mapping of the log.
@@ -69,11 +71,13 @@ def trials_of(log: Log, log_map: LogMap, first: int = 0) -> Iterator[TrialRecord
         LogError: A command exceeds the robot's speed, or no part of the log has observations.
     """
     left, right = log.commands.T
-    fastest = float(np.abs(log.commands).max(initial=0.0))
+    wheel = np.nan_to_num(np.abs(log.commands)).max(1)
+    k = int(np.argmax(wheel))
+    fastest = float(wheel[k])
     if fastest > MOST_COMMAND:
-        k = int(np.argmax(np.abs(log.commands).max(1)))
+        verb = "is told" if log.has_commands else "has by its encoder"
         raise LogError(
-            f"At {log.time_s[k]:.4g} s a wheel is told {fastest:.3g} times the robot's full speed. Set speed in the "
+            f"At {log.time_s[k]:.4g} s a wheel {verb} {fastest:.3g} times the robot's full speed. Set speed in the "
             "mapping to its full speed [m/s], or name the robot that drove with --base."
         )
     poses = log.poses

@@ -11,7 +11,7 @@ from realitygap.errors import LogError
 
 from ._log_map import Commands, Part, Poses, Readings, WheelPart, Wheels
 from ._source import Floats
-from ._units import ANGLES, LENGTHS, LEVEL, RATES, SHARES, SPEEDS, unit_factor
+from ._units import ANGLES, LENGTHS, LEVEL, RATES, SHARES, SPEEDS, TICKS, unit_factor
 
 
 class Convert(Protocol):
@@ -30,6 +30,9 @@ class Convert(Protocol):
 def converter(part: Part, speed: float, track: float) -> Convert:
     """Return what converts a part.
 
+    Commands are shares of full speed. Encoders, and commands with `per = "row"`, are distances of the wheels since
+    their first row [m].
+
     Args:
         part: Part of the mapping.
         speed: Speed of a wheel at full command [m/s].
@@ -39,8 +42,12 @@ def converter(part: Part, speed: float, track: float) -> Convert:
         LogError: A unit is unknown, or a number that it needs is missing.
     """
     if isinstance(part, Commands):
+        if part.per:
+            return _Increments(_to_wheels(part, _way(part, "commands"), _turn_way(part, track)))
         return _CommandConverter(part, speed, track)
     if isinstance(part, Wheels):
+        if part.per:
+            return _Increments(_to_wheels(part, _way(part, "wheels")))
         return _WheelConverter(part)
     if isinstance(part, Poses):
         return _PoseConverter(part)
@@ -49,9 +56,11 @@ def converter(part: Part, speed: float, track: float) -> Convert:
     raise TypeError(f"{type(part).__name__} is no part of a log.")
 
 
-def _per_meter(place: str, part: WheelPart, unit: str) -> float:
+def _in_meters(place: str, part: Commands | Wheels, known: dict[str, float]) -> float:
     """Return the length of one unit of a wheel, in meters or m/s."""
-    if unit.split("/")[0] == "ticks":
+    unit = part.unit
+    factor = unit_factor(f"{place}.unit", unit, known)
+    if unit in TICKS:
         if not part.ticks_per_m:
             raise LogError(
                 f"{place}.unit is {unit!r}: give ticks_per_m, the ticks of a wheel for each meter."
@@ -60,53 +69,91 @@ def _per_meter(place: str, part: WheelPart, unit: str) -> float:
     if unit in ANGLES or unit in RATES:
         if not part.wheel_diameter_mm:
             raise LogError(f"{place}.unit is {unit!r}: give wheel_diameter_mm, to turn it into meters.")
-        return (ANGLES | RATES)[unit] * part.wheel_diameter_mm / 2000
-    return 0.0
+        return factor * part.wheel_diameter_mm / 2000
+    return factor
+
+
+def _way(part: Commands | Wheels, place: str) -> float:
+    """Return the length of one unit of an increment [m]."""
+    try:
+        return _in_meters(place, part, LENGTHS | ANGLES | {"ticks": 1.0})
+    except LogError as error:
+        raise LogError(f"{error}{_SINCE_THE_ROW_BEFORE if part.unit.endswith('/s') else ''}") from None
+
+
+_SINCE_THE_ROW_BEFORE = ' With per = "row", a number is a distance since the row before, and no speed.'
+
+
+def _turn_way(part: Commands, track: float) -> float:
+    """Return the distance of a wheel for one unit of a turn in place [m]; 0 if the part has wheels."""
+    return unit_factor("commands.turn_unit", part.turn_unit, ANGLES) * track / 2 if part.turn else 0.0
+
+
+def _to_wheels(part: WheelPart, first: float, turn: float = 0.0) -> Floats:
+    """Return the matrix that turns a row into values of both wheels.
+
+    Args:
+        part: Part with wheels, or with forward speed and turn rate.
+        first: Value of one unit of a wheel, or of the forward speed.
+        turn: Value of one unit of the turn rate.
+    """
+    if isinstance(part, Commands) and part.forward:
+        return np.array([[first, first], [-turn * part.turn_sign, turn * part.turn_sign]])
+    return np.diag([first * part.left_sign, first * part.right_sign])
 
 
 class _CommandConverter:
     width = 2
 
     def __init__(self, part: Commands, speed: float, track: float) -> None:
-        self._is_twist = bool(part.forward)
-        first = self._share_of("commands", part, part.unit, speed)
-        if self._is_twist:
-            turn = self._turn_share(part, speed, track)
-            self._to_wheels = np.array([[first, first], [-turn * part.turn_sign, turn * part.turn_sign]])
-        else:
-            self._to_wheels = np.diag([first * part.left_sign, first * part.right_sign])
+        turn = 0.0
+        if part.forward:
+            turn = unit_factor("commands.turn_unit", part.turn_unit, RATES, SHARES)
+            turn *= 1.0 if part.turn_unit in SHARES else track / 2 / speed
+        self._to_wheels = _to_wheels(part, self._share(part, speed), turn)
 
     @staticmethod
-    def _share_of(place: str, part: Commands, unit: str, speed: float) -> float:
-        if unit in SHARES:
-            return SHARES[unit]
-        if unit == LEVEL:
+    def _share(part: Commands, speed: float) -> float:
+        if part.unit in SHARES:
+            return SHARES[part.unit]
+        if part.unit == LEVEL:
             if not part.full:
                 raise LogError("commands.unit is 'level': give full, the number that stands for full speed.")
             return 1 / part.full
-        in_meters = _per_meter(place, part, unit)
-        if in_meters:
-            return in_meters / speed
         known = SPEEDS | SHARES | RATES | {LEVEL: 1.0, "ticks/s": 1.0}
-        return unit_factor(f"{place}.unit", unit, known) / speed
-
-    @staticmethod
-    def _turn_share(part: Commands, speed: float, track: float) -> float:
-        if part.turn_unit in SHARES:
-            return SHARES[part.turn_unit]
-        return unit_factor("commands.turn_unit", part.turn_unit, RATES, SHARES) * track / 2 / speed
+        return _in_meters("commands", part, known) / speed
 
     def __call__(self, times: Floats, raw: Floats) -> Floats:
         return np.asarray(raw @ self._to_wheels)
+
+
+class _Increments:
+    """Distances of the wheels since the first row, from distances since the row before."""
+
+    width = 2
+
+    def __init__(self, to_wheels: Floats) -> None:
+        self._to_wheels = to_wheels
+        self._way: Floats | None = None
+
+    def __call__(self, times: Floats, raw: Floats) -> Floats:
+        if not len(raw):
+            return raw
+        steps = raw @ self._to_wheels
+        if self._way is None:  # the increment of the first row is from before the log
+            steps[0] = 0.0
+            self._way = np.zeros(2)
+        ways = self._way + np.cumsum(steps, axis=0)
+        self._way = ways[-1]
+        return np.asarray(ways)
 
 
 class _WheelConverter:
     width = 2
 
     def __init__(self, part: Wheels) -> None:
-        known = LENGTHS | SPEEDS | ANGLES | RATES | {"ticks": 1.0, "ticks/s": 1.0}
-        factor = _per_meter("wheels", part, part.unit) or unit_factor("wheels.unit", part.unit, known)
-        self._factors = factor * np.array([part.left_sign, part.right_sign])
+        known = LENGTHS | SPEEDS | ANGLES | RATES | dict.fromkeys(TICKS, 1.0)
+        self._factors = _in_meters("wheels", part, known) * np.array([part.left_sign, part.right_sign])
         self._is_speed = part.unit.endswith("/s") or part.unit == "rpm"
         self._wraps_at = part.wraps_at
         self._last: tuple[float, Floats, Floats] | None = None

@@ -120,7 +120,10 @@ class _Found:
 
     def __init__(self, first: Log, robot: RobotModel) -> None:
         self._speed, self._track = robot.drive.speed, robot.drive.track
-        seen = [name for name in ("commands", "wheels", "poses", "readings") if len(getattr(first, name))]
+        parts = ("commands", "wheels", "poses", "readings")
+        seen = [
+            name for name in parts if len(getattr(first, name)) and (name != "commands" or first.has_commands)
+        ]
         notes = list(first.notes)
         if len(first.poses) and not first.has_heading:
             notes.append(NO_HEADING)

@@ -65,6 +65,18 @@ class WheelPart(Part):
         0.0, ge=0, description="Needed for rad/s, deg/s, rpm, rad, deg, and turn."
     )
     ticks_per_m: float = Field(0.0, ge=0, description="Needed for ticks and ticks/s.")
+    per: Literal["", "row"] = Field(
+        "",
+        description="row if a number is the increment since the row before, such as ticks or meters. Default: commands "
+        "are speeds, and encoders count on.",
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _increments_have_units_of_distances(cls, values: Any) -> Any:
+        if isinstance(values, dict) and values.get("per") == "row":
+            return {"unit": "m", **({"turn_unit": "rad"} if values.get("turn") else {}), **values}
+        return values
 
 
 class Commands(WheelPart):
@@ -75,10 +87,12 @@ class Commands(WheelPart):
     unit: str = Field(
         "m/s",
         description="Unit of wheels or forward speed: m/s, cm/s, mm/s, in/s, share (-1 to 1), percent, level, ticks/s, "
-        "rad/s, deg/s, turn/s, or rpm.",
+        "rad/s, deg/s, turn/s, or rpm. With per = row: m, cm, mm, in, ticks, rad, deg, or turn.",
     )
     turn_unit: str = Field(
-        "rad/s", description="Unit of the turn rate: rad/s, deg/s, turn/s, rpm, share, or percent."
+        "rad/s",
+        description="Unit of the turn rate: rad/s, deg/s, turn/s, rpm, share, or percent. With per = row: rad, deg, or "
+        "turn.",
     )
     turn_sign: Sign = Field(1, description="-1 if a positive rate turns the robot to the right.")
     full: float = Field(0.0, ge=0, description="Number that stands for full speed; needed for unit level.")
@@ -96,7 +110,7 @@ class Commands(WheelPart):
 
 
 class Wheels(WheelPart):
-    """Counts of the wheels' encoders: ways, or speeds."""
+    """Encoders of the wheels: counters, increments, or speeds."""
 
     unit: str = Field(
         "m",
@@ -111,6 +125,8 @@ class Wheels(WheelPart):
     def _has_both(self) -> Self:
         if not (self.left and self.right):
             raise ValueError("expected left and right")
+        if self.per and self.wraps_at:
+            raise ValueError("wraps_at is for counters, and per = row for increments: expected one of them")
         return self
 
     def columns(self) -> list[str]:
@@ -214,7 +230,7 @@ class LogMap(MapFile):
     def _has_motion(self) -> Self:
         if self.commands is None and self.wheels is None:
             raise ValueError(
-                "expected [commands], [wheels], or both: poses alone do not show what the robot was told"
+                "expected [commands], [wheels], or both: poses alone do not show what the wheels did"
             )
         return self
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -13,10 +13,10 @@ from realitygap.errors import LogError
 from realitygap.world import RobotModel
 
 from ._convert import Convert, converter
-from ._log_map import LogMap, Part
+from ._log_map import LogMap, Part, WheelPart
 from ._open import open_source
 from ._resample import Grid, Held, HeldMean, Interpolated
-from ._rows import RowChecker
+from ._rows import ADVICE, OF_INCREMENTS, RowChecker
 from ._source import RECORDED, Floats, Source, check_columns
 from ._units import TIMES, unit_factor
 
@@ -35,7 +35,8 @@ class Log:
         name: Name within its file; empty if it is the only trial.
         start_s: Time of its start, by the log's clock [s].
         step_s: Length of a step [s].
-        commands: (n, 2) left and right wheel during each step, as shares of full speed.
+        commands: (n, 2) left and right wheel during each step, as shares of full speed. If the log has no commands,
+            the speeds of the encoders, which are no commands: see `has_commands`.
         poses: (n + 1, 3) x [m], y [m], heading [rad] at the start of each step and at the end; nan if unknown, and in
             the third column if the log has no headings. No rows if it has no poses.
         wheels: (n + 1, 2) distance of the left and the right wheel since the start [m]; nan if unknown. No rows if the
@@ -43,6 +44,7 @@ class Log:
         readings: (n + 1, s) reading of each range sensor, 0 to 1; nan if unknown. No rows if the log has none.
         raw_headings: (n + 1,) headings before full turns were counted [rad]; as many rows as poses.
         notes: Notes on changes to the rows.
+        has_commands: False if the log has encoders and no commands.
     """
 
     name: str
@@ -54,6 +56,7 @@ class Log:
     readings: Floats
     raw_headings: Floats
     notes: tuple[str, ...] = ()
+    has_commands: bool = True
 
     @property
     def time_s(self) -> Floats:
@@ -114,15 +117,26 @@ class _Stream:
                 f"[{name}] names no column of the time. Give `time`, or `rate_hz` if there is none."
             )
         self.to_s = unit_factor(f"{name}.time_unit", part.time_unit, TIMES) if part.time else 1.0
-        self._speed, self._track, self._drop = speed, track, drop
+        self.speed, self._track, self._drop = speed, track, drop
+        self.has_increments = isinstance(part, WheelPart) and bool(part.per)
         self.renew()
 
     def renew(self) -> None:
         """Forget the rows of the trial before."""
-        self.convert: Convert = converter(self.part, self._speed, self._track)
+        self.convert: Convert = converter(self.part, self.speed, self._track)
         self.check = RowChecker(
-            self.source.path, self.name, self.columns, needs_all=self.name == "commands", drop=self._drop
+            self.source.path,
+            self.name,
+            self.columns,
+            needs_all=self.name == "commands" or self.has_increments,
+            drop=self._drop and not self.has_increments,
+            advice=OF_INCREMENTS if self.has_increments else ADVICE,
         )
+
+    def resampled(self, grid: Grid) -> HeldMean | Interpolated | Held:
+        """Return what puts its values on a grid."""
+        kind = Interpolated if self.has_increments else _RESAMPLED[self.name]
+        return kind(grid, self.convert.width)
 
     @property
     def needed(self) -> list[str]:
@@ -138,12 +152,19 @@ class _Stream:
         return times, self.convert(times, raw)
 
 
-_RESAMPLED: dict[str, Callable[[Grid, int], HeldMean | Interpolated | Held]] = {
+_RESAMPLED: dict[str, type[HeldMean | Interpolated | Held]] = {
     "commands": HeldMean,
     "wheels": Interpolated,
     "poses": Interpolated,
     "readings": Held,
 }
+
+_METHODS = {
+    HeldMean: "mean over each step",
+    Interpolated: "straight lines between rows",
+    Held: "last reading before each step",
+}
+NO_COMMANDS = "The log has no commands: those of its trials are the speeds of the encoders."
 
 
 class _Assembler:
@@ -189,13 +210,12 @@ class _Assembler:
         if grid is None:
             return
         if stream.name not in self._resampled:
-            self._resampled[stream.name] = _RESAMPLED[stream.name](grid, stream.convert.width)
+            self._resampled[stream.name] = stream.resampled(grid)
             usual = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
-            how = {"commands": "mean over each step", "readings": "last reading before each step"}
             rate = f"about {1 / usual:.3g} rows/s" if usual > 0 else "one row"
-            self._notes.append(
-                f"{stream.name}: {rate}, {how.get(stream.name, 'straight lines between rows')}."
-            )
+            increments = "increments, " if stream.has_increments else ""
+            how = _METHODS[type(self._resampled[stream.name])]
+            self._notes.append(f"{stream.name}: {rate}, {increments}{how}.")
         self._resampled[stream.name].push(times, values)
         self._ends[stream.name] = float(times[-1])
 
@@ -214,14 +234,18 @@ class _Assembler:
                     f"No row of [{part}] is between {grid.start_s:.6g} and {self._ends[first]:.6g} s, when there are "
                     f"{first}: it ends at {self._ends[part]:.6g} s. Give the clock's offset_s, or its time_unit."
                 )
-        if "commands" in self._resampled:
+        told = self._streams[0]
+        if told.name == "commands" and not told.has_increments:
             commands = self._rows("commands", n)
         else:
-            commands = np.nan_to_num(np.diff(wheels, axis=0)) / grid.step_s
+            ways = self._rows(told.name, n + 1)
+            commands = np.diff(ways, axis=0) / grid.step_s / told.speed
         if len(wheels):
             known = wheels[np.isfinite(wheels[:, 0])]
             wheels = wheels - known[0]
         notes = [f"Steps of {grid.step_s:.4g} s.", *self._notes]
+        if told.name != "commands":
+            notes.append(NO_COMMANDS)
         for stream in self._streams:
             notes += stream.check.notes
             stream.renew()
@@ -229,6 +253,7 @@ class _Assembler:
             *(name, grid.start_s, grid.step_s, commands),
             *(poses[:, :3], wheels, readings, poses[:, 3]),
             notes=tuple(notes),
+            has_commands=told.name == "commands",
         )
 
     def _rows(self, name: str, n: int) -> Floats:

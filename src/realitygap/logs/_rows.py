@@ -13,6 +13,7 @@ from realitygap.errors import LogError
 from ._source import Floats
 
 ADVICE = "Mend the log, or leave such rows out with --drop-bad-rows."
+OF_INCREMENTS = "Mend the log: a row of increments cannot be left out, because its distance would be lost."
 
 
 class RowChecker:
@@ -24,10 +25,13 @@ class RowChecker:
         names: Names of its columns.
         needs_all: True if a missing number is a mistake. For poses it is not: the robot was not observed there.
         drop: True to leave out rows with mistakes.
+        advice: Next step, for messages.
     """
 
-    def __init__(self, path: Path, part: str, names: list[str], *, needs_all: bool, drop: bool) -> None:
-        self._path, self._part, self._names = path, part, names
+    def __init__(
+        self, path: Path, part: str, names: list[str], *, needs_all: bool, drop: bool, advice: str = ADVICE
+    ) -> None:
+        self._path, self._part, self._names, self._advice = path, part, names, advice
         self._needs_all, self._drop = needs_all, drop
         self._last = -math.inf
         self.n_rows = self.n_dropped = self.n_unseen = 0
@@ -93,7 +97,7 @@ class RowChecker:
         if not self._drop:
             row = rows[np.argmax(where)]
             more = f"; {n - 1} more near it" if n > 1 else ""
-            raise LogError(f"{self._path}: row {row} of [{self._part}] {what}{more}. {ADVICE}")
+            raise LogError(f"{self._path}: row {row} of [{self._part}] {what}{more}. {self._advice}")
         self.n_dropped += n
 
     @property

@@ -20,7 +20,8 @@ from PIL import Image
 
 import realitygap
 from realitygap import _limits
-from realitygap._limits import LimitError, is_file, open_image, parse_json, parse_toml, read_file
+from realitygap._image_file import open_image
+from realitygap._limits import LimitError, is_file, parse_json, parse_toml, read_file
 from realitygap.errors import LedgerError, RealityGapError, RecordError
 from realitygap.records._parquet_size import check_size
 from tests.formats import FORMATS
@@ -32,7 +33,8 @@ PARSERS = {
     "pl.read_parquet", "pl.read_csv", "sqlite3.connect",
 }  # fmt: skip
 ALLOWED = {
-    "_limits.py": {"tomllib.loads", "Image.open"},
+    "_image_file.py": {"Image.open"},
+    "_limits.py": {"tomllib.loads"},
     "logs/_end_poses.py": {"pl.read_csv"},  # of a text of limited size
     "logs/_text.py": {"pl.read_csv"},  # of blocks of limited size
     "records/_chunk.py": {"pl.read_parquet"},  # after check_size
@@ -40,7 +42,6 @@ ALLOWED = {
     "records/_observations_file.py": {"json.loads"},  # of what was just written
     "study/_closing/plan.py": {"json.loads"},  # of what was just written
     "study/_transfer/strategies.py": {"json.loads"},  # of what was just written
-    "vision/_photo.py": {"Image.open"},  # with limits of its own
     "world/_svg.py": {"ElementTree.fromstring"},
     # between two processes of one program
     "lab/_channel.py": {"json.loads"},

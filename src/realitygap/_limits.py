@@ -6,7 +6,6 @@ parts takes `tomllib` minutes, and nested brackets end in a `RecursionError`. So
 
 from __future__ import annotations
 
-import contextlib
 import errno
 import json
 import math
@@ -14,13 +13,9 @@ import os
 import re
 import stat
 import tomllib
-import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO
-
-if TYPE_CHECKING:
-    from PIL.Image import Image
+from typing import Any, BinaryIO
 
 MOST_TOML_BYTES = 4_000_000
 """Maximum size of a TOML, SVG or Python file. A drawing of a large maze has some 100,000."""
@@ -47,6 +42,8 @@ MOST_DIGITS = 300
 """Maximum number of digits of a number."""
 LEAST_INTEGER, MOST_INTEGER = -(2**63), 2**64 - 1
 """Integers beyond do not fit into 64 bits."""
+
+_PLAIN_FLAGS = sum(getattr(os, name, 0) for name in ("O_NONBLOCK", "O_CLOEXEC", "O_NOCTTY", "O_BINARY"))
 
 _JSON_STRING = re.compile(r'"[^"\\]*+(?:\\.[^"\\]*+)*+"?', re.DOTALL)
 _TOML_STRING_OR_COMMENT = re.compile(
@@ -84,9 +81,7 @@ def read_file(path: Path, most: int, *, plain: bool = False) -> bytes:
     Raises:
         OSError: The file cannot be read, is too large, or is not plain.
     """
-    if plain and not stat.S_ISREG(path.stat().st_mode):  # before it is opened, which may wait for ever
-        raise OSError(errno.EINVAL, "it is not a plain file", str(path))
-    with path.open("rb") as file:
+    with open_plain(path) if plain else path.open("rb") as file:
         status = os.fstat(file.fileno())
         is_fit = status.st_size <= most
         # the size of a pipe is not known before its end
@@ -94,6 +89,19 @@ def read_file(path: Path, most: int, *, plain: bool = False) -> bytes:
     if not is_fit or len(data) > most:
         raise OSError(errno.EFBIG, f"it has more than {most:,} bytes", str(path))
     return data
+
+
+def open_plain(path: Path) -> BinaryIO:
+    """Open a file for reading, and never wait for the other end of a pipe.
+
+    Raises:
+        OSError: It cannot be read, or is a pipe, a device, or a folder.
+    """
+    descriptor = os.open(path, os.O_RDONLY | _PLAIN_FLAGS)
+    if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+        os.close(descriptor)
+        raise OSError(errno.EINVAL, "it is not a plain file", str(path))
+    return os.fdopen(descriptor, "rb")
 
 
 def _read_pipe(file: BinaryIO, most: int) -> bytes:
@@ -171,43 +179,6 @@ def parse_toml(text: str) -> dict[str, Any]:
     values = tomllib.loads(text)
     _check_values(values)
     return values
-
-
-@contextlib.contextmanager
-def open_image(
-    source: Path | BinaryIO, most_side: int, kinds: tuple[str, ...] | None = None
-) -> Iterator[Image]:
-    """Open an image file, after a look at its size; inside the context all that a decoder raises is a ValueError.
-
-    Args:
-        source: The file.
-        most_side: The largest width and height [px].
-        kinds: Pillow's names of the formats that it may have; all if not given.
-
-    Raises:
-        LimitError: It is larger.
-        OSError: It cannot be read.
-        ValueError: It is no whole image.
-    """
-    from PIL import Image
-
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of the size, which is checked here, and of odd entries
-            with Image.open(source, formats=kinds) as image:
-                if max(image.size) > most_side:
-                    raise LimitError(
-                        f"it is {image.width} x {image.height} pixels, expected at most {most_side} each way"
-                    )
-                yield image
-    except Image.DecompressionBombError:
-        raise LimitError(f"it has too many pixels, expected at most {most_side} each way") from None
-    except (OSError, ValueError) as error:
-        if isinstance(error, ValueError) or error.errno is not None:
-            raise
-        raise ValueError(f"it is no whole image ({error})") from None
-    except Exception as error:  # a torn file makes decoders raise all kinds
-        raise ValueError(f"it is no whole image ({error})") from None
 
 
 def _check_size(size: int, most: int) -> None:

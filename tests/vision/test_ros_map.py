@@ -86,6 +86,99 @@ def test_a_pixel_is_free_as_its_file_says(tmp_path, free, values, is_free):
     assert found.free.tolist() == [[is_free, is_free]]
 
 
+MODES = {
+    "gray": (lambda g: g.astype(np.uint8), ".pgm"),
+    "16 bits": (lambda g: (g * 257).astype(np.uint16), ".png"),
+    "color": (lambda g: np.stack([g] * 3, -1).astype(np.uint8), ".png"),
+    "fractions": (lambda g: (g / 255).astype(np.float32), ".tif"),
+}
+
+
+@pytest.mark.parametrize(("picture", "ending"), MODES.values(), ids=MODES)
+def test_map_is_the_same_whatever_the_depth_of_its_image(tmp_path, picture, ending):
+    path = write_map(tmp_path, room())
+    expected = read_map(path).free
+    assert expected.sum() == 34 * 54
+    Image.fromarray(picture(room())).save(tmp_path / f"room{ending}")
+    path.write_text(path.read_text().replace("room.pgm", f"room{ending}"))
+    assert (read_map(path).free == expected).all()
+
+
+def map_server_cell(red, green, blue, alpha, *, mean, negate, occupied, free):
+    """One pixel as map_server reads it in mode trinary: 100, 0, or -1; `mean` is the gray of before Jazzy."""
+    shade = (red + green + blue) / 3 if mean else 0.212656 * red + 0.715158 * green + 0.072186 * blue
+    share = shade / 255 if negate else 1 - shade / 255
+    if alpha is not None and alpha < 255:
+        return -1
+    return 100 if share > occupied else 0 if share < free else -1
+
+
+@pytest.mark.parametrize("negate", [0, 1])
+@pytest.mark.parametrize("kind", ["RGB", "RGBA"])
+def test_pixel_is_free_only_if_both_versions_of_map_server_agree(tmp_path, kind, negate):
+    rng = np.random.default_rng(3)
+    pixels = rng.integers(160, 256, (30, 40, len(kind)))
+    pixels = (255 - pixels if negate else pixels).astype(np.uint8)
+    if kind == "RGBA":
+        pixels[..., 3] = rng.choice([0, 100, 255], pixels.shape[:2])
+    Image.fromarray(pixels).save(tmp_path / "colors.png")
+    found = read_map(write_map(tmp_path, [[0]], image="colors.png", negate=negate)).free
+    rule = {"negate": negate, "occupied": 0.65, "free": 0.196}
+    expected = [
+        [
+            all(
+                map_server_cell(*pixel, *[None] * (4 - len(pixel)), mean=mean, **rule) == 0
+                for mean in (True, False)
+            )
+            for pixel in row
+        ]
+        for row in pixels.tolist()
+    ]
+    assert found.tolist() == expected
+    assert 0 < found.sum() < found.size
+
+
+@pytest.mark.parametrize("mode", ["trinary", "scale", "raw"])
+def test_transparent_surroundings_are_unknown(tmp_path, mode):
+    pixels = np.zeros((20, 20, 4), np.uint8)  # transparent, and black, which is free in mode raw
+    pixels[..., :3] = 0 if mode == "raw" else 255
+    pixels[5:15, 5:15, 3] = 255
+    Image.fromarray(pixels).save(tmp_path / "clear.png")
+    found = read_map(write_map(tmp_path, [[0]], image="clear.png", mode=mode)).free
+    assert found.sum() == 100
+    assert found[5:15, 5:15].all()
+
+
+def test_gray_of_unknown_that_counts_as_free_gets_a_warning(tmp_path, recwarn):
+    read_map(write_map(tmp_path, room()))
+    assert not recwarn
+    with pytest.warns(
+        UserWarning, match=r"384 pixels of gray 205, .* count as free, because free_thresh is 0\.25"
+    ):
+        read_map(write_map(tmp_path, room(), free_thresh=0.25))
+
+
+@pytest.mark.parametrize(
+    ("key", "text", "expected"),
+    [
+        ("resolution", "5e-2", 0.05),
+        ("resolution", "1e+0", 1.0),
+        ("resolution", "+.5", 0.5),
+        ("resolution", "010", 10.0),
+        ("mode", "Trinary", None),
+        ("negate", "False", None),
+        ("origin", "[1e-05, -2.5e1, 0]", None),
+    ],
+)
+def test_values_are_read_as_map_server_reads_them(tmp_path, key, text, expected):
+    found = read_map(write_map(tmp_path, room(), **{key: text}))
+    assert found.free.sum() == 34 * 54
+    if expected is not None:
+        assert found.resolution == expected
+    if key == "origin":
+        assert found.origin == Pose(1e-5, -25.0, 0.0)
+
+
 def test_a_start_chooses_its_room(tmp_path):
     gray = room()
     gray[:, 20] = 0  # a wall between a small room and a large one
@@ -169,10 +262,10 @@ WRONG = {
     "mode": ({"mode": "magic"}, "mode: expected trinary, scale, raw, got 'magic'"),
     "negate": ({"negate": 2}, "negate: expected a number from 0 to 1, got 2"),
     "image": ({"image": "other.pgm"}, "image: there is no file .*other.pgm"),
-    "another folder": ({"image": "../room.pgm"}, "image: expected a file in the folder of the map, got"),
-    "another place": ({"image": "/etc/hostname"}, "image: expected a file in the folder of the map, got"),
+    "another folder": ({"image": "../room.pgm"}, "image: expected a plain file in the same folder"),
+    "another place": ({"image": "/etc/hostname"}, "image: expected a plain file in the same folder"),
     "large": ({"resolution": 10**400}, "resolution: expected a number from 0.0001 to 1000, got"),
-    "image's name": ({"image": 7}, "image: expected the name of an image file, got 7"),
+    "image's name": ({"image": 7}, "image: expected the name of a file, got 7"),
     "itself": ({"image": "room.yaml"}, "image: room.yaml is no image that can be read"),
 }
 

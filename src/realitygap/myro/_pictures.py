@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import PIL.Image
 
-from realitygap._limits import open_image
+from realitygap._image_file import eight_bits, open_image, plain
 
 from ._colors import Color, darker, lighter
 from ._mistakes import MyroError, whole
@@ -225,7 +225,7 @@ class Pixel:
 def _opened(filename: str) -> PIL.Image.Image:
     try:
         with open_image(Path(filename).expanduser(), _LARGEST) as image:
-            return image.convert("RGBA")
+            return eight_bits(plain(image)).convert("RGBA")
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or "it is no picture that can be read"
         raise MyroError(f"The picture {filename!r} cannot be opened: {reason}.") from error

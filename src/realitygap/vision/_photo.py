@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import io
-import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+
+from realitygap._image_file import UnknownImageError, eight_bits, on_white, open_image, plain
+from realitygap._limits import LimitError, read_file
 
 from ._errors import SheetError
 
@@ -20,8 +23,8 @@ MOST_BYTES = 64 << 20
 MOST_PIXELS = 120_000_000
 ENOUGH_PIXELS = 30_000_000  # what has more is halved, which takes less memory and time
 LEAST_SIDE, MOST_SIDE = 400, 20_000  # below, neither tags nor lines can be told; above, OpenCV gives up [px]
+MOST_DECLARED = 1 << 31  # a side that a file declares [px]; sizes are checked with a better message
 KINDS = ("JPEG", "PNG", "TIFF", "WEBP")
-DEEP_MODES = ("I", "I;16", "I;16B", "I;16L", "I;16N")
 
 
 def read_photo(photo: str | Path | bytes) -> NDArray[np.uint8]:
@@ -33,29 +36,25 @@ def read_photo(photo: str | Path | bytes) -> NDArray[np.uint8]:
     Raises:
         SheetError: It cannot be read, or is no such picture, or is too large or too small.
     """
-    from PIL import Image, UnidentifiedImageError
-
     name = "The file" if isinstance(photo, bytes) else str(photo)
     data = photo_bytes(photo)
     if not data:
         raise SheetError(f"{name} is empty, expected a photograph of a sheet. Was it copied to the end?")
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of size, which is checked here, and of odd entries
-            with Image.open(io.BytesIO(data), formats=KINDS) as picture:
-                _check_size(name, *picture.size)
-                return _upright(picture)
+        with open_image(io.BytesIO(data), MOST_DECLARED, KINDS) as picture:
+            _check_size(name, *picture.size)
+            return _upright(picture)
     except SheetError:
         raise
-    except UnidentifiedImageError as error:
+    except UnknownImageError as error:
         raise SheetError(
             f"{name} is no picture that can be read: expected JPEG, PNG, TIFF or WebP.{_hint(data)}"
         ) from error
-    except Image.DecompressionBombError as error:
+    except LimitError as error:
         raise SheetError(
             f"{name} has too many pixels, expected at most {MOST_PIXELS // 1_000_000} million."
         ) from error
-    except Exception as error:  # a torn file makes decoders raise all kinds
+    except (OSError, ValueError) as error:
         raise SheetError(f"{name} cannot be read as a picture: {error}. Is the file whole?") from error
 
 
@@ -70,20 +69,15 @@ def _check_size(name: str, width: int, height: int) -> None:
 
 def _upright(picture: Image.Image) -> NDArray[np.uint8]:
     """Return any kind of picture as (h, w, 3): gray, 16 bits deep, for print, with a palette or transparent."""
-    from PIL import Image, ImageOps
+    from PIL import ImageOps
 
     turn = picture.getexif().get(ORIENTATION, 1)
     if _is_large(picture):
         picture.draft(None, (picture.width // 2, picture.height // 2))  # a JPEG file is read at half its size
-    whole: Image.Image = picture
-    if whole.mode in DEEP_MODES:
-        whole = Image.fromarray((np.asarray(whole).clip(0, 65535) // 257).astype(np.uint8))
+    whole = eight_bits(plain(picture))
     if _is_large(whole):
-        whole = (whole.convert("RGB") if whole.mode in ("P", "1") else whole).reduce(2)
-    if whole.has_transparency_data:  # on white, as it is shown
-        clear = whole.convert("RGBA")
-        whole = Image.alpha_composite(Image.new("RGBA", clear.size, "white"), clear)
-    whole = whole.convert("RGB")
+        whole = whole.reduce(2)
+    whole = on_white(whole).convert("RGB")  # as it is shown
     whole.getexif()[ORIENTATION] = turn
     return np.array(ImageOps.exif_transpose(whole))
 
@@ -128,12 +122,12 @@ def photo_bytes(photo: str | Path | bytes) -> bytes:
     else:
         name = str(photo)
         try:
-            if Path(photo).stat().st_size > MOST_BYTES:
+            data = read_file(Path(photo), MOST_BYTES)
+        except OSError as error:
+            if error.errno == errno.EFBIG:
                 raise SheetError(
                     f"{name} is larger than {MOST_BYTES >> 20} MiB, expected a photograph of a sheet."
-                )
-            data = Path(photo).read_bytes()
-        except OSError as error:
+                ) from None
             raise SheetError(
                 f"{name} cannot be read: {error.strerror or error}. Name a photograph."
             ) from error

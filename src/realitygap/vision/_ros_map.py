@@ -3,19 +3,27 @@
 from __future__ import annotations
 
 import io
+import json
 import math
+import re
+import warnings
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from realitygap._limits import open_image, read_file
+from realitygap._image_file import MOST_IMAGE_BYTES, open_image, plain
+from realitygap._limits import read_file
+from realitygap._named_file import NamedFileError, open_named
 from realitygap.errors import DescriptionError, from_extra
 from realitygap.records import write_whole
 from realitygap.settings import shown
 from realitygap.world import Arena, ArenaFile, Obstacle, Pose
+
+if TYPE_CHECKING:
+    from PIL.Image import Image
 
 MOST_SIDE = 8192
 """Width and height of a map at most [px]."""
@@ -32,6 +40,9 @@ OCCUPIED, UNKNOWN, FREE = 0, 205, 254
 OCCUPIED_THRESH, FREE_THRESH = 0.65, 0.196
 """Thresholds of a map that is written; 205 is between them."""
 
+_RESOLUTIONS = (1e-4, 1e3)
+"""Smallest and largest side of a pixel [m]."""
+
 _MARGIN = 4
 """Unknown pixels around a map that is written."""
 
@@ -41,8 +52,22 @@ _TOLERANCE = 1.5
 _FINE = 4
 """Parts of a pixel to which the border of free space is traced."""
 
+_BAND = 256
+"""Rows of an image whose occupancy is computed together, so that memory does not grow with the image."""
+
+_LUMA = (212_656, 715_158, 72_186)
+"""Weights of red, green, and blue in the gray of ImageMagick, which nav2 reads with since Jazzy (ITU-R BT.709)."""
+
 _MOST_YAML_BYTES = 65_536
 _MOST_LETTERS = 1_000
+
+_PLAIN_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_.-]*")
+"""Names that YAML reads as they are."""
+_YAML_NUMBER = re.compile(
+    r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?|[-+]?\.inf|\.nan", re.IGNORECASE
+)
+"""Numbers as yaml-cpp reads them, with which map_server reads."""
+_YAML_TYPES = ("bool", "null")
 
 _KEYS = ("image", "resolution", "origin")
 _MODES = ("trinary", "scale", "raw")
@@ -85,7 +110,8 @@ class OccupancyMap:
 def read_map(path: str | Path) -> OccupancyMap:
     """Return the map of ROS in a YAML file and the image that it names (PGM, PNG, or another).
 
-    A pixel is free if its occupancy is below `free_thresh`. Others, the unknown ones among them, count as occupied.
+    A pixel is free if its occupancy is below `free_thresh` and it is not transparent. Others, the unknown ones among
+    them, count as occupied. There is a warning if gray 205, which map_saver writes for unknown, counts as free.
 
     Args:
         path: The YAML file, with image, resolution, origin, and as needed negate, occupied_thresh, free_thresh, mode.
@@ -94,19 +120,22 @@ def read_map(path: str | Path) -> OccupancyMap:
         DescriptionError: The file or its image cannot be read, or a value is missing or out of range.
         MissingExtraError: The extra `ros` is not installed.
 
-    Source: map_server of ROS 1 and ROS 2 (nav2_map_server), modes trinary, scale, and raw. Differs: an image's
-    transparency counts for nothing.
+    Source: map_server of ROS 1 and ROS 2 (nav2_map_server, `map_io.cpp`), modes trinary, scale, and raw. Differs: where
+    its versions disagree, a pixel is free only if it is free by both. Since Jazzy, a color has the gray of ImageMagick,
+    before it was the mean of its channels. A pixel at `free_thresh` is free since Jazzy only. Before, transparency was
+    one more channel in mode trinary; here such pixels are unknown, as since Jazzy. Mode raw has no thresholds there,
+    and ignores transparency.
     """
     path = Path(path)
     values = _values(path)
-    resolution = _number(path, "resolution", values["resolution"], 1e-4, 1e3)
+    resolution = _number(path, "resolution", values["resolution"], *_RESOLUTIONS)
     origin = values["origin"]
     if not (isinstance(origin, list) and len(origin) in (2, 3)):
         raise DescriptionError(f"{path}: origin: expected [x, y, yaw], got {shown(origin)}.")
     x, y, yaw = (_number(path, "origin", value, -1e4, 1e4) for value in [*origin, 0.0][:3])
-    mode = values.get("mode", "trinary")
+    mode = str(values.get("mode", "trinary")).lower()
     if mode not in _MODES:
-        raise DescriptionError(f"{path}: mode: expected {', '.join(_MODES)}, got {shown(mode)}.")
+        raise DescriptionError(f"{path}: mode: expected {', '.join(_MODES)}, got {shown(values['mode'])}.")
     free_thresh = _number(path, "free_thresh", values.get("free_thresh", FREE_THRESH), 0.0, 1.0)
     occupied = _number(path, "occupied_thresh", values.get("occupied_thresh", OCCUPIED_THRESH), 0.0, 1.0)
     if not free_thresh < occupied:
@@ -114,12 +143,21 @@ def read_map(path: str | Path) -> OccupancyMap:
             f"{path}: free_thresh: expected less than occupied_thresh, {occupied:g}, got {free_thresh:g}."
         )
     negate = _number(path, "negate", values.get("negate", 0), 0, 1)
-    gray = _gray(path, values["image"])
-    if mode == "raw":
-        occupancy = np.where(gray <= 100, gray / 100.0, 1.0)
-    else:
-        occupancy = gray / 255.0 if negate else (255 - gray) / 255.0
-    return OccupancyMap(path.stem, occupancy < free_thresh, resolution, Pose(x, y, yaw))
+    image = _image(path, values["image"])
+    free = np.zeros((image.height, image.width), bool)
+    unknown, n_unknown = (UNKNOWN if negate else 255 - UNKNOWN) / 255, 0
+    for top in range(0, image.height, _BAND):
+        band = image.crop((0, top, image.width, min(top + _BAND, image.height)))
+        occupancy = _occupancy(np.asarray(band), mode, negate=bool(negate))
+        free[top : top + _BAND] = occupancy < free_thresh
+        n_unknown += int((occupancy == unknown).sum())
+    if n_unknown and unknown < free_thresh and mode != "raw":
+        warnings.warn(
+            f"{path}: {n_unknown:,} pixels of gray {UNKNOWN}, which map_saver writes for unknown, count as free, "
+            f"because free_thresh is {free_thresh:g}. If they are unknown, write free_thresh: {FREE_THRESH:g}.",
+            stacklevel=2,
+        )
+    return OccupancyMap(path.stem, free, resolution, Pose(x, y, yaw))
 
 
 def arena_of_map(
@@ -226,13 +264,14 @@ def save_map(arena: Arena, path: str | Path, *, resolution: float = RESOLUTION) 
         DescriptionError: The map would have more than 8,192 pixels each way, or a wall covers the start.
         MissingExtraError: The extra `ros` is not installed.
         RecordError: A file cannot be written.
-        ValueError: The resolution is not above 0.
+        ValueError: The resolution is not from 0.0001 to 1,000 m.
     """
     from PIL import Image, ImageDraw
 
     path = Path(path)
-    if not (math.isfinite(resolution) and resolution > 0):
-        raise ValueError(f"resolution is {resolution!r}, expected a length above 0 [m].")
+    least, most = _RESOLUTIONS
+    if not least <= resolution <= most:
+        raise ValueError(f"resolution is {resolution!r}, expected {least:g} to {most:g} m.")
     points = [(x, y) for x1, y1, x2, y2 in arena.walls for x, y in ((x1, y1), (x2, y2))]
     points += [point for obstacle in arena.obstacles for point in obstacle.outline()]
     points += [(pose.x, pose.y) for pose in arena.starts]
@@ -274,12 +313,21 @@ def save_map(arena: Arena, path: str | Path, *, resolution: float = RESOLUTION) 
     start = ", ".join(f"{value:g}" for value in arena.start)
     text = (
         f"# Arena {' '.join(arena.name.split())}. Start: {start} (x [m], y [m], heading [rad])\n"
-        f"image: {file.name}\nmode: trinary\nresolution: {resolution:g}\n"
-        f"origin: [{origin[0]:.6g}, {origin[1]:.6g}, 0.0]\nnegate: 0\n"
+        f"image: {_yaml_text(file.name)}\nmode: trinary\nresolution: {_yaml_number(resolution)}\n"
+        f"origin: [{_yaml_number(origin[0])}, {_yaml_number(origin[1])}, 0.0]\nnegate: 0\n"
         f"occupied_thresh: {OCCUPIED_THRESH:g}\nfree_thresh: {FREE_THRESH:g}\n"
     )
     write_whole(path, text.encode())
     return file
+
+
+def _yaml_number(value: float) -> str:
+    """Return a length to a nanometer. PyYAML takes 1e-05, without a point, for text."""
+    return np.format_float_positional(round(float(value), 9), trim="0")
+
+
+def _yaml_text(name: str) -> str:
+    return name if _PLAIN_NAME.fullmatch(name) else json.dumps(name)
 
 
 def _draw_obstacle(draw: Any, obstacle: Obstacle, pixel: Any) -> None:
@@ -310,7 +358,7 @@ def _values(path: Path) -> dict[str, Any]:
                 raise DescriptionError(
                     f"{path}: a value has {len(event.value):,} letters, expected at most {_MOST_LETTERS:,}."
                 )
-        values = yaml.safe_load(text)
+        values = yaml.load(text, _loader(yaml))
     except (yaml.YAMLError, RecursionError, ValueError) as error:
         said = str(error).split("\n")[0]
         raise DescriptionError(f"{path}: not YAML ({said}).") from None
@@ -320,6 +368,32 @@ def _values(path: Path) -> dict[str, Any]:
             f"{path}: it has no {', '.join(missing)}, expected the YAML file of a map: image, resolution, and origin."
         )
     return dict(values)
+
+
+def _loader(yaml: Any) -> Any:
+    """Return a loader that reads numbers as map_server does: 5e-2 is a number, 010 is ten, and 1:30 is text."""
+
+    class Loader(yaml.SafeLoader):  # type: ignore[misc]
+        yaml_implicit_resolvers: ClassVar = {
+            letter: [(tag, form) for tag, form in forms if tag.rpartition(":")[2] in _YAML_TYPES]
+            for letter, forms in yaml.SafeLoader.yaml_implicit_resolvers.items()
+        }
+
+    def number(_: Any, node: Any) -> float:
+        text = str(node.value)
+        return (
+            int(text)
+            if text.lstrip("+-").isdecimal()
+            else float(text.lower().replace(".inf", "inf").replace(".nan", "nan"))
+        )
+
+    Loader.add_implicit_resolver(
+        "tag:yaml.org,2002:float",
+        re.compile(f"(?:{_YAML_NUMBER.pattern})$", re.IGNORECASE),
+        list("+-.0123456789"),
+    )
+    Loader.add_constructor("tag:yaml.org,2002:float", number)
+    return Loader
 
 
 def _number(path: Path, key: str, value: Any, least: float, most: float) -> float:
@@ -333,20 +407,35 @@ def _number(path: Path, key: str, value: Any, least: float, most: float) -> floa
     return float(value)
 
 
-def _gray(path: Path, name: Any) -> NDArray[np.float64]:
-    """Return the gray values of the image, 0 to 255."""
-    if not isinstance(name, str) or not name or "\x00" in name:
-        raise DescriptionError(f"{path}: image: expected the name of an image file, got {shown(name)}.")
-    file = path.parent / name
-    if not file.resolve().is_relative_to(path.parent.resolve()):
-        raise DescriptionError(
-            f"{path}: image: expected a file in the folder of the map, got {shown(name)}. Copy the image there, and "
-            "change its name in the YAML file."
-        )
+def _image(path: Path, name: Any) -> Image:
+    """Return the image that a map names, as L, LA, RGB, RGBA, or I;16."""
     try:
-        with open_image(file, MOST_SIDE) as picture:
-            return np.asarray(picture.convert("L"), dtype=np.float64)
-    except FileNotFoundError:
-        raise DescriptionError(f"{path}: image: there is no file {file}.") from None
+        with open_named(path.parent, name, MOST_IMAGE_BYTES) as file, open_image(file, MOST_SIDE) as image:
+            return plain(image)
+    except NamedFileError as error:
+        raise DescriptionError(f"{path}: image: {error}") from None
     except (OSError, ValueError) as error:
         raise DescriptionError(f"{path}: image: {name} is no image that can be read ({error}).") from None
+
+
+def _occupancy(pixels: NDArray[Any], mode: str, *, negate: bool) -> NDArray[np.float64]:
+    """Return (h, w) the occupancy of pixels, 0 to 1; 1 where they are transparent.
+
+    Args:
+        pixels: (h, w) gray, or (h, w, c) with the channels LA, RGB, or RGBA, of 8 or 16 bits.
+        mode: trinary, scale, or raw, in which a gray up to 100 is the occupancy in percent.
+        negate: True if white is occupied.
+    """
+    full = np.iinfo(pixels.dtype).max
+    layers = [pixels] if pixels.ndim == 2 else list(np.moveaxis(pixels, -1, 0))
+    alpha = layers.pop() if len(layers) in (2, 4) else None
+    red, green, blue = (layer.astype(np.int64) for layer in (layers * 3)[:3])
+    weighted = (_LUMA[0] * red + _LUMA[1] * green + _LUMA[2] * blue) / sum(_LUMA)
+    mean = (red + green + blue) / 3
+    if mode == "raw":
+        percent = [np.rint(gray / full * 255) for gray in (weighted, mean)]
+        shares = [np.where(value <= 100, value / 100, 1.0) for value in percent]
+    else:
+        shares = [gray / full if negate else (full - gray) / full for gray in (weighted, mean)]
+    occupancy = np.maximum(*shares)
+    return occupancy if alpha is None else np.where(alpha < full, 1.0, occupancy)

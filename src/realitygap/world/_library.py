@@ -12,7 +12,9 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from realitygap._limits import MOST_TOML_BYTES, is_file, open_image, parse_toml
+from realitygap._image_file import MOST_IMAGE_BYTES, on_white, open_image, plain
+from realitygap._limits import MOST_TOML_BYTES, is_file, parse_toml
+from realitygap._named_file import NamedFileError, open_named
 from realitygap.errors import DescriptionError, did_you_mean
 
 from ._arena import NAMED_STARTS, Arena, paper_arena
@@ -285,22 +287,26 @@ def _read_image(values: dict[str, Any], origin: str) -> None:
     image = floor.get("image") if isinstance(floor, dict) else None
     if not isinstance(floor, dict) or not isinstance(image, dict) or not isinstance(image.get("file"), str):
         return  # what is wrong with it is said later
-    path = Path(origin).parent / image["file"]
-    gray = _gray(path, origin)
+    gray = _gray(image["file"], origin)
     width = image.get("width")
     if isinstance(width, int | float):
         made = FloorImage.of(0.0, 0.0, float(width), gray)
         floor["image"] = image | {"columns": made.columns, "rows": made.rows, "pixels": made.pixels}
 
 
-def _gray(path: Path, origin: str) -> NDArray[np.uint8]:
-    """Return the brightness of an image file."""
+def _gray(name: str, origin: str) -> NDArray[np.uint8]:
+    """Return the brightness of an image file in the folder of an arena file; white where it is transparent."""
     try:
-        with open_image(path, MOST_PIXELS) as picture:
-            return np.asarray(picture.convert("L"), dtype=np.uint8)
+        with (
+            open_named(Path(origin).parent, name, MOST_IMAGE_BYTES) as file,
+            open_image(file, MOST_PIXELS) as image,
+        ):
+            return np.asarray(on_white(plain(image)).convert("L"), dtype=np.uint8)
+    except NamedFileError as error:
+        raise DescriptionError(f"{origin}: floor.image.file: {error}") from None
     except (OSError, ValueError) as error:
         raise DescriptionError(
-            f"{origin}: floor.image.file: {path.name} is no image that can be read ({error})."
+            f"{origin}: floor.image.file: {name} is no image that can be read ({error})."
         ) from None
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from realitygap._limits import open_image
+from realitygap._image_file import eight_bits, open_image, plain
 from realitygap.errors import ProtocolError
 
 Pixels = NDArray[np.uint8]
@@ -39,7 +39,7 @@ def jpeg_pixels(header: bytes, scan: bytes, size: Size, *, gray: bool) -> Pixels
     """
     try:
         with open_image(io.BytesIO(header + scan[:-12]), 2 * max(size), ("JPEG",)) as file:
-            picture = file.convert("L" if gray else "RGB")
+            picture = eight_bits(plain(file)).convert("L" if gray else "RGB")
     except (OSError, ValueError) as error:
         raise ProtocolError(f"The picture cannot be read ({error}): a byte was lost or added") from error
     if picture.size != size:

@@ -94,6 +94,30 @@ _RUN_AXE = """async (options) => {
 }"""
 
 
+_DRAWN = """(wanted) => new Promise((done) => {
+  const values = new Set(), began = performance.now();
+  let most = 0;
+  const look = () => {
+    for (const bar of document.querySelectorAll("[role=progressbar][aria-valuenow]")) {
+      const drawn = bar.querySelector(".q-linear-progress__model").getBoundingClientRect().width;
+      const value = Number(bar.getAttribute("aria-valuenow"));
+      most = Math.max(most, Math.abs(drawn / bar.clientWidth - value));
+      values.add(value);
+    }
+    const isOver = values.size >= wanted || performance.now() - began > 60000;
+    isOver ? done([most, values.size]) : requestAnimationFrame(look);
+  };
+  look();
+})"""
+
+
+def wrong_bars(page: Any, wanted: int) -> list[str]:
+    """Return how far a bar is drawn from its value while the bars of a page take so many values, and if they don't."""
+    most, n_values = page.evaluate(_DRAWN, wanted)
+    wrong = [f"a bar is drawn {most:.3f} of its width from its value"] if most > 0.01 else []
+    return wrong + ([f"only {n_values} values in a minute"] if n_values < wanted else [])
+
+
 def settle(page: Any) -> None:
     """Wait until nothing fades in any more, and a page has its size."""
     is_still = page.evaluate("() => matchMedia('(prefers-reduced-motion: reduce)').matches")

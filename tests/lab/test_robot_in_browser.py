@@ -13,6 +13,7 @@ import pytest
 from realitygap.emulator import Emulator, serve_pty, serve_tcp, why_not
 
 from .conftest import NEW_PYTHONS, PHONE, expect, playwright
+from .page_checks import wrong_bars
 
 pytestmark = pytest.mark.slow
 
@@ -158,6 +159,14 @@ def test_robot_stops_within_half_a_second_of_a_key_release_and_sensors_have_name
     for name in ("Left obstacle", "Center light", "Right line"):
         page.get_by_role("progressbar", name=name).wait_for()
     page.get_by_text("Left obstacle (0 to 6400)").wait_for()
+
+
+def test_bars_of_sensors_are_as_wide_as_the_readings_while_the_robot_drives_into_a_wall(visit):
+    page = visit("robot")
+    connect(page)
+    hold_key(page)
+    assert wrong_bars(page, 12) == []
+    page.keyboard.up("ArrowUp")
 
 
 @pytest.mark.skipif(bool(why_not()), reason=why_not() or "-")

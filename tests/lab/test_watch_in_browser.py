@@ -10,6 +10,7 @@ import pytest
 from realitygap.study import parse_study, run_study
 
 from .conftest import DESKTOP, PHONE, expect
+from .page_checks import wrong_bars
 from .robot_study import SLOW, begin_sitting, make_study, start_trial
 
 pytestmark = pytest.mark.slow
@@ -140,6 +141,7 @@ def test_whoever_watches_sees_a_trial_while_it_is_driven(lab, visit):
     watcher.wait_for_function(
         "before => document.querySelector('.lab-line').getAttribute('points') !== before", arg=before
     )
+    assert wrong_bars(watcher, 6) == []
 
 
 def test_no_file_but_the_report_of_a_study_can_be_read(lab, visit):

@@ -32,6 +32,7 @@ FIGURES = HERE / "images" / "reproduced"
 INPUTS_STUDY = HERE.parent / "examples" / "constant-input.toml"
 WANTED_TABLES = (
     "table-results",
+    "table-fresh",
     "table-comparisons",
     "table-plateaus",
     "table-champions",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 
 import pytest
 
@@ -25,6 +26,7 @@ RECORD = """() => {
 """Keep each combination of states, progress, and the text of a study without runs, looked for every 50 ms."""
 
 LAST = "novelty-80"
+PENS = "lines => lines.map((line) => line.getAttribute('stroke') + line.getAttribute('stroke-dasharray'))"
 
 
 def test_papers_study_runs_with_one_click_and_its_figures_grow(lab, visit):
@@ -34,8 +36,14 @@ def test_papers_study_runs_with_one_click_and_its_figures_grow(lab, visit):
     page.get_by_role("button", name="Run the paper's study").click()
     page.wait_for_url("**/study/paper")
     page.locator(".lab-state", has_text="Complete").wait_for()
-    page.get_by_text("has the highest median best coverage: 0.4").wait_for()
     page.locator(".lab-figure img").first.wait_for()
+    finding = page.locator(".lab-finding", has_text="best coverage: 0.4")  # of all runs
+    expect(finding).to_contain_text(
+        re.compile("As recorded, novelty-.0 and novelty-.0 have the highest .* [(]SIM, 100 runs each[)]")
+    )
+    page.get_by_text("so luck is part of them").wait_for()
+    pens = page.locator(".lab-curves polyline").evaluate_all(PENS)
+    assert len(set(pens)) == len(pens) == 9
     seen = [json.loads(each) for each in json.loads(page.evaluate("sessionStorage.seen"))]
     for words, progress, waiting in seen:
         assert len(words) <= 1, seen

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from realitygap._wording import p_in_words, signed
 from realitygap.report import compare_conditions, holm, sign_flip_p
-from realitygap.report._comparisons import Samples, p_in_words, signed
+from realitygap.report._comparisons import Samples
 from tests.report.results import describe, random_runs, settings, write_results
 
 

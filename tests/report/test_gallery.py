@@ -11,7 +11,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from realitygap.drawing import PENS, Disc, Line, Text
+from realitygap.drawing import PENS, Disc, Line, Text, line_pen
 from realitygap.errors import RecordError
 from realitygap.evolution import network_picture
 from realitygap.platforms import JyroPlatform
@@ -107,6 +107,8 @@ def test_all_individuals_of_all_generations_are_drawn(tiny_study):
 
 def test_each_pen_has_dashes_of_its_own():
     assert len({dashes for _, dashes in PENS}) == len({color for color, _ in PENS}) == 8
+    assert tuple(line_pen(k) for k in range(8)) == PENS
+    assert len({line_pen(k) for k in range(64)}) == 64
 
 
 def test_best_of_each_generation_is_named(tiny_study):
@@ -289,11 +291,12 @@ def test_export_writes_every_figure_and_table(tiny_study, tmp_path):
         rows = list(csv.DictReader(file))
     assert [row["Condition"] for row in rows] == ["coverage", "novelty", "turn", "ends"]
     assert rows[0]["The paper: run 0"] == "0.154"
-    with (tmp_path / "figures" / "table-comparisons.csv").open(encoding="utf-8") as file:
-        shown = list(csv.DictReader(file))
-    compared = pl.read_csv(tmp_path / "figures" / "data-comparisons.csv")
-    conclusions = [row["Conclusion"] for row in shown if row["Conclusion"]]
-    assert sorted(conclusions) == sorted(compared["conclusion"])
+    for name, column in (("comparisons", "As recorded"), ("fresh", "Conclusion")):
+        with (tmp_path / "figures" / f"table-{name}.csv").open(encoding="utf-8") as file:
+            shown = list(csv.DictReader(file))
+        compared = pl.read_csv(tmp_path / "figures" / f"data-{name}.csv")
+        conclusions = [row[column] for row in shown if row[column]]
+        assert sorted(conclusions) == sorted(compared["conclusion"])
     files = sorted((tmp_path / "figures").glob("*.tex"))
     assert [file.stem for file in files] == sorted(n for n, _, _ in tables_of(page) if n.startswith("table-"))
     for file in files:

@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from realitygap.report import compare_conditions, retry_champions, write_report
+from realitygap.report import compare_champions, compare_conditions, retry_champions, write_report
 from realitygap.report._paper_audit import paper_audit_content
 from realitygap.report._statistics_section import statistics_content
 from realitygap.report._tally import read_tally
@@ -23,7 +23,10 @@ def paper(tmp_path_factory):
 
 def content_of(folder):
     tally = read_tally(folder)
-    return statistics_content(tally, compare_conditions(tally), retry_champions(tally))
+    champions = retry_champions(tally)
+    return statistics_content(
+        tally, compare_conditions(tally), champions, compare_champions(tally, champions)
+    )
 
 
 @pytest.fixture(scope="module")

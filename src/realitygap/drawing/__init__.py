@@ -7,7 +7,7 @@ and pictures.
 """
 
 from ._card import Bar, Card, Spark, Table
-from ._ink import PENS, Ink
+from ._ink import PENS, Ink, line_pen
 from ._picture import FONT, Disc, Line, Picture, Point, Shape, Text
 from ._pixels import to_image, to_png
 from ._shown import ShownAsCard, card_of, picture_of, widget_of
@@ -31,6 +31,7 @@ __all__ = [
     "Text",
     "card_of",
     "hex_of",
+    "line_pen",
     "picture_of",
     "rgb_of",
     "theme_rules",

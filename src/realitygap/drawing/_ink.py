@@ -46,3 +46,13 @@ PENS: tuple[tuple[str, tuple[float, ...]], ...] = (
     (Ink.PEN7, (9, 2.5)),
 )
 """Color and dashes [pt] of the paper's eight pens; a ninth individual takes the first pen again."""
+
+
+def line_pen(index: int) -> tuple[str, tuple[float, ...]]:
+    """Return the color and dashes [pt] of a line in a chart: those of a pen, then colors with dashes of other pens.
+
+    Args:
+        index: Number of the line, from 0. The first 64 lines all differ.
+    """
+    n = len(PENS)
+    return PENS[index % n][0], PENS[(index + index // n) % n][1]

@@ -41,7 +41,7 @@ from realitygap.report._closing import (
     write_closing_page,
 )
 from realitygap.report._closing_figures import draw_closing
-from realitygap.report._comparisons import Comparison, compare_conditions
+from realitygap.report._comparisons import Comparison, compare_champions, compare_conditions
 from realitygap.report._coverage_figure import draw_coverage
 from realitygap.report._distance_audit import (
     Confound,
@@ -127,6 +127,7 @@ __all__ = [
     "check_ending",
     "choose_moving",
     "choose_trial",
+    "compare_champions",
     "compare_choices",
     "compare_conditions",
     "compare_trials",

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import polars as pl
 
-from realitygap.drawing import PENS, Ink
+from realitygap.drawing import Ink, line_pen
 from realitygap.evolution import DISTANCES, Member, NoveltySettings, archive_members
 from realitygap.report._drawing import (
     Drawing,
@@ -207,7 +207,7 @@ def _draw_field(axes: Axes, paths: Sequence[TracedPath], arena: Arena, body: Bod
         )
     draw_visited(axes, (), arena, body)
     for k, path in enumerate(paths):
-        color, dashes = PENS[k % len(PENS)]
+        color, dashes = line_pen(k)
         style: Any = (0, tuple(dashes)) if dashes else "solid"
         for poses, _ in path.tracks:
             draw_points(axes, poses, color=color, linestyle=style, linewidth=1.0, zorder=5)
@@ -218,7 +218,7 @@ def _draw_curves(axes: Axes, novelty: dict[str, npt.NDArray[np.float64]], unit: 
 
     n = max(len(values) for values in novelty.values())
     for k, (name, values) in enumerate(novelty.items()):
-        color, dashes = PENS[k % len(PENS)]
+        color, dashes = line_pen(k)
         style: Any = (0, tuple(dashes)) if dashes else "solid"
         axes.plot(
             np.arange(len(values)),

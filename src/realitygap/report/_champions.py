@@ -34,6 +34,7 @@ class Champions:
         label: SIM, TWIN, EMULATED or REAL.
         reported: (n,) coverage of each champion in its run, the best of all its trials [0..1].
         fresh: (n, 20) coverage of the same networks on fresh noise.
+        replicates: (n,) replicate of each run.
         problem: Reason why there are none; empty if there are some.
     """
 
@@ -41,6 +42,7 @@ class Champions:
     label: str
     reported: npt.NDArray[np.float64]
     fresh: npt.NDArray[np.float64]
+    replicates: npt.NDArray[np.uint32]
     problem: str = ""
 
     @property
@@ -97,15 +99,13 @@ def _retry(tally: Tally, described: Mapping[str, Any]) -> Champions:
             raise RecordError("a robot drove it, and no program drives its champions again")
         rows = _champion_rows(tally, condition)
         reported, fresh = _try_again(condition, rows, f"coverage_{tally.measure}")
-    except RecordVersionError:
-        none = np.empty(0)
-        return Champions(
-            name, label, none, none.reshape(0, FRESH_TRIALS), "its settings are another version’s"
-        )
     except (RecordError, ValueError) as error:
+        problem = (
+            "its settings are another version’s" if isinstance(error, RecordVersionError) else str(error)
+        )
         none = np.empty(0)
-        return Champions(name, label, none, none.reshape(0, FRESH_TRIALS), str(error))
-    return Champions(name, label, reported, fresh)
+        return Champions(name, label, none, none.reshape(0, FRESH_TRIALS), none.astype(np.uint32), problem)
+    return Champions(name, label, reported, fresh, rows["replicate"].to_numpy())
 
 
 def _champion_rows(tally: Tally, condition: Condition) -> pl.DataFrame:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -14,6 +14,8 @@ import polars as pl
 
 from realitygap import _special as special
 from realitygap._medians import CONFIDENCE, Interval
+from realitygap._wording import p_in_words, signed, span
+from realitygap.report._champions import FRESH_TRIALS, Champions
 from realitygap.report._effects import (
     BCA_SMALLEST_N,
     RESAMPLES,
@@ -49,7 +51,7 @@ Reason = Literal["noise", "selection", "baseline"]
 
 @dataclass(frozen=True)
 class Comparison:
-    """Two conditions on the best coverage of a run.
+    """Two conditions on the best coverage of a run, as recorded or on fresh noise.
 
     Attributes:
         one: First condition.
@@ -104,6 +106,26 @@ class Comparison:
         """True if the difference is claimed."""
         return self.p_holm < ALPHA
 
+    def seen_from(self, condition: str) -> Comparison:
+        """Return the comparison with this one of its two conditions first.
+
+        The runs and A12 of both sides change places.
+        """
+        if condition == self.one:
+            return self
+        return dataclasses.replace(
+            self,
+            one=self.other,
+            other=self.one,
+            n=self.n_other,
+            n_other=self.n,
+            difference=-self.difference,
+            difference_interval=_mirrored(self.difference_interval, 0.0),
+            a12=1.0 - self.a12,
+            a12_interval=_mirrored(self.a12_interval, 1.0),
+            equivalence_interval=_mirrored(self.equivalence_interval, 0.0),
+        )
+
     @property
     def verdict(self) -> str:
         """The conclusion on the difference and, if none is shown, on equivalence, in words."""
@@ -145,6 +167,13 @@ class Comparison:
         return f"not shown; n finds {self.detectable:.3f} in 80 %, this difference takes {needed} runs"
 
 
+def _mirrored(interval: Interval | None, total: float) -> Interval | None:
+    """Return the interval of `total` minus the effect."""
+    return (
+        None if interval is None else Interval(total - interval.high, total - interval.low, interval.method)
+    )
+
+
 def is_within(interval: Interval | None) -> bool | None:
     """Return whether an interval of a difference lies within `MARGIN`; None without one."""
     return None if interval is None else interval.low > -MARGIN and interval.high < MARGIN
@@ -168,11 +197,37 @@ def compare_conditions(folder: Results) -> list[Comparison]:
         RecordError: there is no such folder, a file in it is damaged, or it holds no trials yet.
     """
     tally = read_tally(folder)
-    parts = []
-    for one, other, reason in _pairs(tally):
-        values = paired_values(tally, one["name"], other["name"])
-        if min(len(values.one), len(values.other)):
-            parts.append((one, other, reason, values))
+    return _compare((*pair, paired_values(tally, pair[0]["name"], pair[1]["name"])) for pair in _pairs(tally))
+
+
+def compare_champions(folder: Results, champions: Sequence[Champions]) -> list[Comparison]:
+    """Compare conditions as `compare_conditions` does, on the coverage of each run's best network on fresh noise.
+
+    The best coverage of a run selected its network, so luck is part of it. These values contain no luck of selection.
+
+    Args:
+        folder: Results of a study, or the path to them.
+        champions: Its best networks on fresh noise, from `retry_champions`.
+
+    Returns:
+        The comparisons, corrected over all of them; pairs without fresh trials of both are left out.
+
+    Raises:
+        RecordError: there is no such folder, a file in it is damaged, or it holds no trials yet.
+    """
+    tally = read_tally(folder)
+    by_name = {each.condition: each for each in champions if not each.problem}
+    return _compare(
+        (one, other, reason, _paired_champions(tally, by_name[one["name"]], by_name[other["name"]]))
+        for one, other, reason in _pairs(tally)
+        if {one["name"], other["name"]} <= set(by_name)
+    )
+
+
+def _compare(
+    pairs: Iterable[tuple[Mapping[str, Any], Mapping[str, Any], Reason, Samples]],
+) -> list[Comparison]:
+    parts = [pair for pair in pairs if min(len(pair[-1].one), len(pair[-1].other))]
     raw = np.array([values.p() for *_, values in parts])
     floors = np.array([values.smallest_p() for *_, values in parts])
     corrected, best = holm(raw), holm(floors)
@@ -184,15 +239,27 @@ def compare_conditions(folder: Results) -> list[Comparison]:
 
 @dataclass(frozen=True)
 class Samples:
-    """Best coverages of two conditions; in pairs, value by value, if `paired`."""
+    """Best coverages of two conditions.
+
+    Attributes:
+        one: (n,) values of the first condition.
+        other: (m,) values of the second condition; in pairs, value by value, if `paired`.
+        paired: True if runs draw the same random numbers.
+        trials: Number of trials of which each value is the mean, so that `trials` times a value is a share of cells.
+    """
 
     one: npt.NDArray[np.float64]
     other: npt.NDArray[np.float64]
     paired: bool
+    trials: int = 1
 
     def p(self) -> float:
         """Two-sided p of the difference of means, by permutation."""
-        return sign_flip_p(self.one - self.other) if self.paired else permutation_p(self.one, self.other)
+        if not self.paired:
+            return permutation_p(self.one, self.other)
+        return sign_flip_p(
+            (self.one - self.other) * self.trials
+        )  # p has no unit, and shares are counted exactly
 
     def smallest_p(self) -> float:
         """The smallest `p` possible with this number of runs."""
@@ -230,13 +297,27 @@ class Samples:
 
 def paired_values(tally: Tally, one: str, other: str) -> Samples:
     """Return the runs of two conditions; if they draw the same random numbers, the pairs that both have."""
-    values = [tally.run_bests(name, tally.measure) for name in (one, other)]
-    if not _is_paired(tally, one, other):
-        return Samples(values[0], values[1], paired=False)
-    _, in_one, in_other = np.intersect1d(
-        tally.replicates(one), tally.replicates(other), assume_unique=True, return_indices=True
+    return _in_pairs(
+        tally,
+        *((name, tally.replicates(name), tally.run_bests(name, tally.measure)) for name in (one, other)),
     )
-    return Samples(values[0][in_one], values[1][in_other], paired=True)
+
+
+def _paired_champions(tally: Tally, one: Champions, other: Champions) -> Samples:
+    """Return the means on fresh noise of two conditions, in pairs as `paired_values`."""
+    found = _in_pairs(tally, *((each.condition, each.replicates, each.expected) for each in (one, other)))
+    return dataclasses.replace(found, trials=FRESH_TRIALS)
+
+
+_Runs = tuple[str, npt.NDArray[np.uint32], npt.NDArray[np.float64]]
+"""Name of a condition, its replicates (n,), and a value of each (n,)."""
+
+
+def _in_pairs(tally: Tally, one: _Runs, other: _Runs) -> Samples:
+    if not _is_paired(tally, one[0], other[0]):
+        return Samples(one[2], other[2], paired=False)
+    _, in_one, in_other = np.intersect1d(one[1], other[1], assume_unique=True, return_indices=True)
+    return Samples(one[2][in_one], other[2][in_other], paired=True)
 
 
 def _is_paired(tally: Tally, one: str, other: str) -> bool:
@@ -441,28 +522,3 @@ def _notes(comparisons: Sequence[Comparison]) -> list[str]:
 
 
 INTERVAL_NAME = f"{100 * CONFIDENCE:.0f} % BCa interval from {RESAMPLES:,} resamples"
-
-
-def signed(value: float, digits: int = 3) -> str:
-    """A number with its sign, and a true minus."""
-    text = f"{value:+.{digits}f}".replace("-", "−")
-    return text.replace("−", "±").replace("+", "±") if float(f"{value:.{digits}f}") == 0 else text
-
-
-def span(interval: Interval | None, digits: int = 3, *, signs: bool = False) -> str:
-    """Return bounds in words; a dash without an interval."""
-    if interval is None:
-        return "–"
-    if signs:
-        return f"{signed(interval.low, digits)} to {signed(interval.high, digits)}"
-    return f"{interval.low:.{digits}f}–{interval.high:.{digits}f}"
-
-
-def p_in_words(p: float) -> str:
-    """A p value as it is printed: three decimals, or a power of ten; below 10⁻⁹ exactness is of no use."""
-    if p >= 0.001:
-        return f"{p:.3f}" if p < 0.9995 else "1"
-    if p < 1e-9:
-        return "< 10⁻⁹"
-    digits, exponent = f"{p:.0e}".split("e")
-    return f"{digits}·10" + str(int(exponent)).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))

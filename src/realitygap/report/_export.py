@@ -103,9 +103,13 @@ def _frames(tally: Tally, content: Mapping[str, Any]) -> Iterator[tuple[str, str
         tally.best,
     )
     yield "data-coverage-by-run", "The highest coverage of each run.", tally.runs
-    if content["compared"]:
-        frame = comparisons_frame(content["compared"])
-        yield "data-comparisons", "Differences between conditions, in full precision.", frame
+    for basis, name, of in (
+        ("recorded", "data-comparisons", "recorded best coverages"),
+        ("fresh", "data-fresh", "the best networks on fresh noise"),
+    ):
+        if content["compared"][basis]:
+            frame = comparisons_frame(content["compared"][basis])
+            yield name, f"Differences of {of} between conditions, in full precision.", frame
     gallery = content["gallery"]
     structures = structures_frame(gallery["structure_groups"])
     yield "data-structures", "All structures of the networks in the last generations.", structures

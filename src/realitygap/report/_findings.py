@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
-from realitygap._medians import Interval, median_interval, quartiles
+from realitygap._medians import median_interval, quartiles
+from realitygap._wording import Basis, highest, highest_median, joined, p_equation, with_interval
 from realitygap.report._champions import Champions
-from realitygap.report._comparisons import Comparison, p_in_words, same_but_for, signed
-from realitygap.report._effects import bca_interval, difference_of_means
+from realitygap.report._comparisons import Comparison, same_but_for
 from realitygap.report._tally import Tally, label_of, score_text, settings_of, task_of
 
 MOST_FINDINGS = 3
@@ -29,14 +29,21 @@ class Finding:
     """A result in words.
 
     Attributes:
-        claim: The result in one sentence.
+        basis: Scores that it rests on.
+        text: The result, without what it rests on, as `Basis.claim` takes it.
         evidence: The numbers behind it, in one or two sentences.
         tables: Keys of the tables that hold these numbers.
     """
 
-    claim: str
+    basis: Basis
+    text: str
     evidence: str
     tables: tuple[str, ...]
+
+    @property
+    def claim(self) -> str:
+        """The result in one sentence, with what it rests on."""
+        return self.basis.claim(self.text)
 
 
 @dataclass(frozen=True)
@@ -56,66 +63,113 @@ def find(
     tally: Tally,
     comparisons: Sequence[Comparison],
     champions: Sequence[Champions],
+    fresh: Sequence[Comparison],
     tasks: Sequence[Mapping[str, Any]] = (),
 ) -> Findings:
     """Return the findings of a study.
+
+    Coverage selected the best network of each run. So the findings rest on fresh noise; if some networks could not be
+    tried again, they say that they rest on recorded scores.
 
     Args:
         tally: The study.
         comparisons: Comparisons of its conditions, from `compare_conditions`.
         champions: Its best networks on fresh noise, from `retry_champions`.
+        fresh: Comparisons of these networks, from `compare_champions`.
         tasks: Scores of other tasks than coverage, the rows of `summarize_tasks`.
     """
     with_runs = [each for each in tally.conditions if len(tally.replicates(each["name"]))]
-    leaders = leading_conditions(tally)
-    possible: list[Finding | None] = [_best(tally, leaders, comparisons)]
-    if any(each.is_shown for each in comparisons):
-        possible += [
-            _of_search(tally, comparisons),
-            _of_noise(tally, comparisons, champions),
-            _of_changes(comparisons),
-        ]
-    elif comparisons:
-        possible.insert(0, _nothing(comparisons))
+    basis = basis_of(champions)
+    study = _Study(tally, basis, tuple(fresh if basis.is_fresh else comparisons), tuple(comparisons))
+    possible: list[Finding | None] = [_best(study, champions)]
+    if any(each.is_shown for each in study.compared):
+        possible += [_of_search(study), _of_noise(study), _of_changes(study)]
+    elif study.compared:
+        possible.insert(0, _nothing(study))
     if tasks:
         is_mixed = any(task_of(each) == "coverage" for each in with_runs)
         possible = [*_best_scores(tasks), *(possible if is_mixed else possible[:-1])]
     found = tuple(each for each in possible if each is not None)[:MOST_FINDINGS]
-    return Findings(found, _limits(tally, with_runs, comparisons))
+    caveats = [each.basis.caveat for each in found if each.basis.caveat]
+    return Findings(found, _limits(study, with_runs, caveats))
+
+
+@dataclass(frozen=True)
+class _Study:
+    """A study, and the comparisons that its findings rest on.
+
+    Attributes:
+        tally: The study.
+        basis: Scores of the comparisons.
+        compared: Comparisons of its conditions.
+        recorded: Comparisons of recorded scores.
+    """
+
+    tally: Tally
+    basis: Basis
+    compared: tuple[Comparison, ...]
+    recorded: tuple[Comparison, ...]
+
+    @property
+    def tables(self) -> tuple[str, ...]:
+        """Keys of the tables of the comparisons."""
+        return ("fresh", "champions") if self.basis.is_fresh else ("comparisons",)
+
+    def find(self, claim: str, evidence: str, tables: tuple[str, ...] | None = None) -> Finding:
+        """Return a finding on the comparisons."""
+        return Finding(self.basis, claim, evidence, self.tables if tables is None else tables)
+
+
+def basis_of(champions: Sequence[Champions]) -> Basis:
+    """Return what findings rest on: fresh noise if all best networks were tried again."""
+    problems = sorted({each.problem for each in champions if each.problem})
+    return Basis("; ".join(problems) if problems or champions else "there are no networks to try again")
 
 
 def leading_conditions(tally: Tally) -> list[str]:
     """Return the names of the conditions with the highest median, that with the highest mean first."""
     names = [str(each["name"]) for each in tally.conditions]
     values = {name: tally.run_bests(name, tally.measure) for name in names if len(tally.replicates(name))}
-    medians = {name: round(quartiles(each).median, 9) for name, each in values.items()}
-    highest = max(medians.values())
-    return sorted(
-        (name for name in values if medians[name] == highest), key=lambda name: -float(values[name].mean())
-    )
+    leaders = highest({name: quartiles(each).median for name, each in values.items()})
+    return sorted(leaders, key=lambda name: -float(values[name].mean()))
 
 
-def _best(tally: Tally, leaders: Sequence[str], comparisons: Sequence[Comparison]) -> Finding:
+def _best(study: _Study, champions: Sequence[Champions]) -> Finding:
+    leaders = leading_conditions(study.tally)
     medians = []
     for name in leaders[:2]:
-        values = tally.run_bests(name, tally.measure)
-        medians.append(_value(quartiles(values).median, median_interval(values)))
-    verb = "has" if len(leaders) == 1 else "have"
-    claim = f"{_joined(leaders)} {verb} the highest median coverage: {' and '.join(medians)}."
-    rivals = [_turned(each, leaders[0]) for each in comparisons if leaders[0] in (each.one, each.other)]
+        values = study.tally.run_bests(name, study.tally.measure)
+        medians.append(with_interval(quartiles(values).median, median_interval(values)))
+    recorded = highest_median(leaders, medians)
+    if not study.basis.is_fresh:
+        return study.find(recorded, _rank(study, leaders[0]), None if study.compared else ("results",))
+    by_name = {each.condition: each for each in champions}
+    best = highest({name: float(each.expected.mean()) for name, each in by_name.items()})
+    means = [
+        with_interval(float(each.expected.mean()), each.expected_interval)
+        for each in (by_name[name] for name in best[:2])
+    ]
+    claim = f"the best networks of {joined(best)} have the highest mean coverage: {' and '.join(means)}"
+    evidence = f"{_rank(study, best[0])} As recorded, {recorded}.".strip()
+    return study.find(claim, evidence, (*(study.tables if study.compared else ("champions",)), "results"))
+
+
+def _rank(study: _Study, leader: str) -> str:
+    """Return how a condition compares with the others, in words; empty if it is compared with none."""
+    rivals = [each.seen_from(leader) for each in study.compared if leader in (each.one, each.other)]
     if not rivals:
-        return Finding(claim, "", ("results",))
+        return ""
     lower = [each for each in rivals if each.is_shown and each.difference > 0]
     if not lower:
-        return Finding(
-            claim, f"No comparison shows that {leaders[0]} covers more than another.", ("results",)
-        )
+        return f"No comparison shows that {leader} covers more than another."
     nearest = min(lower, key=lambda each: each.difference)
-    return Finding(
-        claim,
-        f"{leaders[0]} covers more than {len(lower)} of the {_plural(len(rivals), 'condition')} compared with it. "
-        f"The nearest of them is {nearest.other}: {_difference([nearest])}.",
-        ("comparisons",),
+    n_others = len(rivals) - len(lower)
+    others = (
+        f"; no difference to the other {n_others if n_others > 1 else 'one'} is supported" if n_others else ""
+    )
+    return (
+        f"{leader} covers more than {len(lower)} of the {_plural(len(rivals), 'condition')} compared with it{others}. "
+        f"The nearest of them is {nearest.other}: {_difference([nearest])}."
     )
 
 
@@ -123,42 +177,44 @@ def _best_scores(tasks: Sequence[Mapping[str, Any]]) -> list[Finding]:
     """Return the condition with the highest median score for each task except coverage, without a comparison."""
     findings = []
     for task in dict.fromkeys(str(row["task"]) for row in tasks):
-        rows = [row for row in tasks if row["task"] == task and row["median"] is not None]
-        if rows:
-            best = max(rows, key=lambda row: float(row["median"]))
-            interval = (
-                "" if best["low"] is None else f" [{score_text(best['low'])}, {score_text(best['high'])}]"
-            )
-            median = score_text(best["median"])
-            claim = f"{best['condition']} has the highest median score of {task}: {median}{interval}."
-            findings.append(Finding(claim, "", ("scores",)))
+        rows = {row["condition"]: row for row in tasks if row["task"] == task and row["median"] is not None}
+        leaders = highest({name: float(row["median"]) for name, row in rows.items()})
+        medians = []
+        for row in (rows[name] for name in leaders[:2]):
+            ends = "" if row["low"] is None else f" [{score_text(row['low'])}, {score_text(row['high'])}]"
+            medians.append(f"{score_text(row['median'])}{ends}")
+        if leaders:
+            claim = highest_median(leaders, medians, f"score of {task}")
+            basis = Basis(f"the report tries no network again for its score of {task}")
+            findings.append(Finding(basis, claim, "", ("scores",)))
     return findings
 
 
-def _nothing(comparisons: Sequence[Comparison]) -> Finding:
-    runs = _runs(each.n for each in comparisons)
-    claim = f"No difference in coverage between conditions is supported by {runs} each."
-    if any(each.can_claim for each in comparisons):
-        largest = max(comparisons, key=lambda each: abs(each.difference))
+def _nothing(study: _Study) -> Finding:
+    compared = study.compared
+    runs = _runs(each.n for each in compared)
+    claim = f"no difference in coverage between conditions is supported by {runs} each"
+    if any(each.can_claim for each in compared):
+        largest = max(compared, key=lambda each: abs(each.difference))
         evidence = f"The largest is between {largest.one} and {largest.other}: {_difference([largest])}."
     else:
-        needed = max(each.runs_for_a_claim for each in comparisons)
+        needed = max(each.runs_for_a_claim for each in compared)
         evidence = f"A claim needs at least {_plural(needed, 'run')} of each condition."
-    return Finding(claim, evidence, ("comparisons",))
+    return study.find(claim, evidence)
 
 
 # search
 
 
-def _of_search(tally: Tally, comparisons: Sequence[Comparison]) -> Finding | None:
+def _of_search(study: _Study) -> Finding | None:
     """Return the effect of selection at each noise level."""
-    between = [each for each in comparisons if each.reason == "selection"]
+    between, tally = [each for each in study.compared if each.reason == "selection"], study.tally
     pairs = {}
     for first, second in _PAIRS:
         found = [
             turned
             for each in between
-            for turned in (each, _swapped(each))
+            for turned in (each, each.seen_from(each.other))
             if (_selection(tally, turned.one), _selection(tally, turned.other)) == (first, second)
         ]
         if found:
@@ -170,11 +226,11 @@ def _of_search(tally: Tally, comparisons: Sequence[Comparison]) -> Finding | Non
     if all(evolved) and all(_is_above(each) for found in evolved for each in found):
         both = [each for found in evolved for each in found]
         levels = _at_levels(len(evolved[0]), len(evolved[0]))
-        random = f"Objective and novelty search cover more than random networks{levels}.", _difference(both)
+        random = f"objective and novelty search cover more than random networks{levels}", _difference(both)
         sentences = [*sentences[: ("novelty", "coverage") in pairs], random]
     (claim, numbers), *others = sentences
-    evidence = [_capital(numbers), *(f"{text.removesuffix('.')}: {numbers}" for text, numbers in others)]
-    return Finding(claim, f"{'. '.join(evidence)}.", ("comparisons",))
+    evidence = [_capital(numbers), *(f"{_capital(text)}: {numbers}" for text, numbers in others)]
+    return study.find(claim, f"{'. '.join(evidence)}.")
 
 
 def _selection(tally: Tally, name: str) -> Any:
@@ -183,16 +239,16 @@ def _selection(tally: Tally, name: str) -> Any:
 
 def _search_sentences(first: str, second: str, found: Sequence[Comparison]) -> tuple[str, str]:
     """Return a claim on two kinds of search, and its numbers."""
-    words, n = (_capital(_SEARCHES[first]), _SEARCHES[second]), len(found)
+    words, n = (_SEARCHES[first], _SEARCHES[second]), len(found)
     above = [each for each in found if _is_above(each)]
     below = [each for each in found if each.is_shown and each.difference < 0]
     if above and below:
         levels = f"{_at_levels(len(above), n)} and less at {len(below)}"
-        return f"{words[0]} covers more than {words[1]}{levels}.", _difference(above)
+        return f"{words[0]} covers more than {words[1]}{levels}", _difference(above)
     if above or below:
         shown, word = (above, "more") if above else (below, "less")
-        return f"{words[0]} covers {word} than {words[1]}{_at_levels(len(shown), n)}.", _difference(shown)
-    return f"{words[0]} and {words[1]} are not shown to differ.", _difference(found)
+        return f"{words[0]} covers {word} than {words[1]}{_at_levels(len(shown), n)}", _difference(shown)
+    return f"{words[0]} and {words[1]} are not shown to differ", _difference(found)
 
 
 def _at_levels(k: int, n: int) -> str:
@@ -204,18 +260,17 @@ def _at_levels(k: int, n: int) -> str:
 # noise
 
 
-def _of_noise(
-    tally: Tally, comparisons: Sequence[Comparison], champions: Sequence[Champions]
-) -> Finding | None:
-    """Return the effect of the highest noise against the lowest, as recorded and on fresh noise."""
-    by_names = {frozenset((each.one, each.other)): each for each in comparisons if each.reason == "noise"}
+def _of_noise(study: _Study) -> Finding | None:
+    """Return the effect of the highest noise against the lowest, and the recorded one."""
+    tally = study.tally
+    by_names = {frozenset((each.one, each.other)): each for each in study.compared if each.reason == "noise"}
     extremes = []
     for group in same_but_for("noise", tally.conditions):
         usable = [each for each in group if isinstance(settings_of(each).get("noise"), int | float)]
         usable.sort(key=lambda each: float(settings_of(each)["noise"]))
         ends = [str(each["name"]) for each in (usable[0], usable[-1])] if len(usable) > 1 else []
         if ends and frozenset(ends) in by_names:
-            extremes.append((_turned(by_names[frozenset(ends)], ends[1]), usable))
+            extremes.append((by_names[frozenset(ends)].seen_from(ends[1]), usable))
     # random networks are a control: they count only where nothing evolves
     evolved = [each for each in extremes if _selection(tally, each[0].one) in ("coverage", "novelty")]
     extremes = evolved or extremes
@@ -228,16 +283,24 @@ def _of_noise(
         span = f" from {100 * low:g} % to {100 * high:g} %"
     shown = [each for each, _ in extremes if each.is_shown]
     quoted = max(shown or [each for each, _ in extremes], key=lambda each: abs(each.difference))
-    what = f"the best coverage{_with_searches(tally, shown or [each for each, _ in extremes])}"
+    score = "coverage" if study.basis.is_fresh else "best coverage"
+    what = f"the {score}{_with_searches(tally, shown or [each for each, _ in extremes])}"
     if not shown:
-        claim = f"No effect of noise{span} on {what} is supported."
+        claim = f"no effect of noise{span} on {what} is supported"
     elif all(each.difference > 0 for each in shown) or all(each.difference < 0 for each in shown):
-        claim = f"More noise{span} {'raises' if quoted.difference > 0 else 'lowers'} {what}."
+        claim = f"more noise{span} {'raises' if quoted.difference > 0 else 'lowers'} {what}"
     else:
-        claim = f"More noise{span} raises the best coverage in some conditions and lowers it in others."
+        claim = f"more noise{span} raises the {score} in some conditions and lowers it in others"
     evidence = f"{quoted.one} less {quoted.other}: {_difference([quoted])}."
-    fresh = _on_fresh_noise(quoted, champions)
-    return Finding(claim, evidence + fresh, ("comparisons", "champions") if fresh else ("comparisons",))
+    if not study.basis.is_fresh:
+        return study.find(claim, evidence)
+    pair = frozenset((quoted.one, quoted.other))
+    recorded = next(each for each in study.recorded if frozenset((each.one, each.other)) == pair)
+    recorded = recorded.seen_from(quoted.one)
+    value = with_interval(recorded.difference, recorded.difference_interval, signs=True)
+    return study.find(
+        claim, f"{evidence} As recorded, luck included: {value}.", (*study.tables, "comparisons")
+    )
 
 
 def _with_searches(tally: Tally, comparisons: Sequence[Comparison]) -> str:
@@ -245,52 +308,40 @@ def _with_searches(tally: Tally, comparisons: Sequence[Comparison]) -> str:
     return f" of {' and '.join(words)}" if all(words) else ""
 
 
-def _on_fresh_noise(quoted: Comparison, champions: Sequence[Champions]) -> str:
-    by_name = {each.condition: each for each in champions if not each.problem}
-    if not {quoted.one, quoted.other} <= set(by_name):
-        return ""
-    high, low = by_name[quoted.one].expected, by_name[quoted.other].expected
-    interval = bca_interval(difference_of_means, high, low, paired=False)
-    difference = _value(float(high.mean() - low.mean()), interval, signs=True)
-    return f" The best networks tried again on fresh noise: {difference}."
-
-
 # changes
 
 
-def _of_changes(comparisons: Sequence[Comparison]) -> Finding | None:
+def _of_changes(study: _Study) -> Finding | None:
     """Return the number of changes against a baseline that are supported, and the largest."""
-    changes = [each for each in comparisons if each.reason == "baseline"]
+    changes = [each for each in study.compared if each.reason == "baseline"]
     shown = sorted((each for each in changes if each.is_shown), key=lambda each: -abs(each.difference))
     if not changes:
         return None
     if not shown:
-        return Finding(
-            f"None of the {_plural(len(changes), 'change')} against a baseline is supported.",
-            "",
-            ("comparisons",),
+        return study.find(
+            f"none of the {_plural(len(changes), 'change')} against a baseline is supported", ""
         )
     named = "; ".join(f"{each.one} {_difference([each])}" for each in shown[:2])
-    return Finding(
+    return study.find(
         f"{len(shown)} of {_plural(len(changes), 'change')} against a baseline "
-        f"{'is' if len(shown) == 1 else 'are'} supported.",
+        f"{'is' if len(shown) == 1 else 'are'} supported",
         f"Largest: {named}.",
-        ("comparisons",),
     )
 
 
 # limits
 
 
-def _limits(tally: Tally, conditions: Sequence[Mapping[str, Any]], comparisons: Sequence[Comparison]) -> str:
+def _limits(study: _Study, conditions: Sequence[Mapping[str, Any]], caveats: Sequence[str]) -> str:
     origins = sorted({_ORIGINS.get(label_of(each), label_of(each)) for each in conditions})
-    runs = _runs(len(tally.replicates(each["name"])) for each in conditions)
+    runs = _runs(len(study.tally.replicates(each["name"])) for each in conditions)
     parts = [" and ".join(origins), f"{runs} per condition"]
-    if comparisons:
-        n_open = sum(not each.is_shown and not each.is_equivalent for each in comparisons)
-        parts.append(f"{n_open} of {_plural(len(comparisons), 'comparison')} inconclusive")
-    if len(comparisons) > 1:
+    if study.compared:
+        n_open = sum(not each.is_shown and not each.is_equivalent for each in study.compared)
+        parts.append(f"{n_open} of {_plural(len(study.compared), 'comparison')} inconclusive")
+    if len(study.compared) > 1:
         parts.append("p corrected for all of them")
+    parts += dict.fromkeys(caveats)
     return f"{'; '.join(parts)}; brackets hold 95 % intervals."
 
 
@@ -301,61 +352,28 @@ def _is_above(comparison: Comparison) -> bool:
     return comparison.is_shown and comparison.difference > 0
 
 
-def _swapped(comparison: Comparison) -> Comparison:
-    """Return the same comparison in the opposite direction."""
-    interval = comparison.difference_interval
-    return replace(
-        comparison,
-        one=comparison.other,
-        other=comparison.one,
-        difference=-comparison.difference,
-        difference_interval=None
-        if interval is None
-        else Interval(-interval.high, -interval.low, interval.method),
-    )
-
-
-def _turned(comparison: Comparison, first: str) -> Comparison:
-    return comparison if comparison.one == first else _swapped(comparison)
-
-
 def _difference(comparisons: Sequence[Comparison]) -> str:
     """Return the difference with its interval and corrected p; of several, the smallest and the largest p."""
     if len(comparisons) == 1:
         (each,) = comparisons
-        value = _value(each.difference, each.difference_interval, signs=True)
+        value = with_interval(each.difference, each.difference_interval, signs=True)
         return f"{value}, {_p(each.p_holm)}"
     if all(each.is_shown for each in comparisons):
         nearest = min(comparisons, key=lambda each: abs(each.difference))
-        value = _value(nearest.difference, nearest.difference_interval, signs=True)
+        value = with_interval(nearest.difference, nearest.difference_interval, signs=True)
         return f"smallest difference {value}, {_p(max(each.p_holm for each in comparisons), bound=True)}"
     largest = max(comparisons, key=lambda each: abs(each.difference))
-    value = _value(largest.difference, largest.difference_interval, signs=True)
+    value = with_interval(largest.difference, largest.difference_interval, signs=True)
     return f"largest difference {value}, {_p(largest.p_holm)}"
 
 
 def _p(p: float, *, bound: bool = False) -> str:
-    text = "< 0.001" if p < 0.001 else p_in_words(p)
-    text = f"p {text}" if text.startswith("<") else f"p {'≤' if bound else '='} {text}"
-    return text.replace(" ", "\N{NO-BREAK SPACE}")
-
-
-def _value(value: float, interval: Interval | None, *, signs: bool = False) -> str:
-    def form(number: float) -> str:
-        return signed(number) if signs else f"{number:.3f}"
-
-    return form(value) + ("" if interval is None else f" [{form(interval.low)}, {form(interval.high)}]")
+    return p_equation(p, bound=bound).replace(" ", "\N{NO-BREAK SPACE}")
 
 
 def _runs(counts: Iterable[int]) -> str:
     known = sorted(set(counts))
     return _plural(known[0], "run") if len(known) == 1 else f"{known[0]:,} to {_plural(known[-1], 'run')}"
-
-
-def _joined(names: Sequence[str]) -> str:
-    if len(names) > 2:
-        return f"{names[0]}, {names[1]}, and {len(names) - 2} more"
-    return " and ".join(names)
 
 
 def _plural(n: int, noun: str) -> str:

@@ -31,7 +31,7 @@ from realitygap.report._assumed import sim_assumptions
 from realitygap.report._bests_figure import draw_bests
 from realitygap.report._champions import Champions, retry_champions
 from realitygap.report._choices_figure import compare_choices, draw_choices
-from realitygap.report._comparisons import Comparison, compare_conditions
+from realitygap.report._comparisons import Comparison, compare_champions, compare_conditions
 from realitygap.report._coverage_figure import draw_coverage
 from realitygap.report._drawing import house_style
 from realitygap.report._driven import describe_driven
@@ -135,13 +135,13 @@ def _content(tally: Tally) -> dict[str, Any]:
         digest = beside.submit(tally.folder.digest)
         computed = beside.submit(_statistics, tally)
         content = _words_and_figures(tally)
-        statistics, comparisons, champions = computed.result()
-    findings = find(tally, comparisons, champions, content["tasks"])
+        statistics, comparisons, champions, fresh = computed.result()
+    findings = find(tally, comparisons, champions, fresh, content["tasks"])
     content |= {
         "digest": digest.result(),
         "statistics": statistics,
         "findings": findings,
-        "compared": comparisons,
+        "compared": {"recorded": comparisons, "fresh": fresh},
     }
     sections = _sections(content)
     number_figures(figure for _, _, figures in sections for figure in figures)
@@ -151,9 +151,12 @@ def _content(tally: Tally) -> dict[str, Any]:
     return content
 
 
-def _statistics(tally: Tally) -> tuple[dict[str, Any], list[Comparison], list[Champions]]:
+def _statistics(
+    tally: Tally,
+) -> tuple[dict[str, Any], list[Comparison], list[Champions], list[Comparison]]:
     comparisons, champions = compare_conditions(tally), retry_champions(tally)
-    return statistics_content(tally, comparisons, champions), comparisons, champions
+    fresh = compare_champions(tally, champions)
+    return statistics_content(tally, comparisons, champions, fresh), comparisons, champions, fresh
 
 
 def _sections(content: Mapping[str, Any]) -> list[tuple[str, str, list[Any]]]:
@@ -180,6 +183,7 @@ def _tables(content: Mapping[str, Any]) -> list[str]:
     there = {
         "results": True,
         "scores": content["tasks"],
+        "fresh": statistics["fresh"],
         "comparisons": statistics["comparisons"],
         "plateaus": statistics["deception"],
         "champions": not statistics["champions"]["problem"],

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import polars as pl
 
-from realitygap._medians import Interval
+from realitygap._wording import Basis, signed, span
 from realitygap.platforms import is_physical
 from realitygap.report._champions import FRESH_TRIALS, MOST_RUNS, Champions
 from realitygap.report._comparisons import (
@@ -19,10 +19,9 @@ from realitygap.report._comparisons import (
     Comparison,
     comparisons_content,
     same_but_for,
-    signed,
-    span,
 )
 from realitygap.report._effects import bca_interval, difference_of_means, mean_interval
+from realitygap.report._findings import basis_of
 from realitygap.report._questions import (
     MOST_BEHAVIORS,
     Share,
@@ -39,7 +38,10 @@ _SELECTIONS = {"coverage": "objective search", "novelty": "novelty search", "ran
 
 
 def statistics_content(
-    tally: Tally, comparisons: Sequence[Comparison], champions: Sequence[Champions]
+    tally: Tally,
+    comparisons: Sequence[Comparison],
+    champions: Sequence[Champions],
+    fresh: Sequence[Comparison],
 ) -> dict[str, Any]:
     """Return the content of the section's template.
 
@@ -47,14 +49,17 @@ def statistics_content(
         tally: The study.
         comparisons: Comparisons of its conditions, from `compare_conditions`.
         champions: Its best networks on fresh noise, from `retry_champions`.
+        fresh: Comparisons of these networks, from `compare_champions`.
     """
+    basis = basis_of(champions)
     with_runs = [each for each in tally.conditions if len(tally.replicates(each["name"]))]
     return {
         "interval": INTERVAL_NAME,
         "labels": ", ".join(sorted({label_of(each) for each in with_runs})),
         "comparisons": comparisons_content(comparisons),
-        "deception": _deception(tally, comparisons, with_runs),
-        "champions": _champions(tally, champions, with_runs),
+        "fresh": comparisons_content(fresh),
+        "deception": _deception(tally, fresh if basis.is_fresh else comparisons, with_runs, basis),
+        "champions": _champions(tally, comparisons, champions, fresh, with_runs),
         "spread": _spread(tally),
         "variety": _variety(tally, with_runs),
         "chance": _chance(tally),
@@ -65,7 +70,10 @@ def statistics_content(
 
 
 def _deception(
-    tally: Tally, comparisons: Sequence[Comparison], conditions: Sequence[Mapping[str, Any]]
+    tally: Tally,
+    comparisons: Sequence[Comparison],
+    conditions: Sequence[Mapping[str, Any]],
+    basis: Basis,
 ) -> dict[str, Any] | None:
     rows = []
     generations = 0
@@ -95,7 +103,7 @@ def _deception(
         "k": k,
         "generations": generations,
         "without_learning": f"{100 * (generations - k) / generations:.0f} %" if has_random else None,
-        "sentences": _selection_sentences(comparisons, conditions),
+        "sentences": [basis.claim(each) for each in _selection_sentences(comparisons, conditions)],
         "inputs_differ": _inputs_differ(conditions),
     }
 
@@ -115,18 +123,17 @@ def _selection_sentences(
 ) -> list[str]:
     """Return the order and the differences, in sentences, of each group of conditions that differ only in selection."""
     found = []
-    by_names = {(each.one, each.other): each for each in comparisons}
     for group in same_but_for("selection", conditions):
         names = {settings_of(each)["selection"]: str(each["name"]) for each in group}
         parts = []
         for one, other in (("coverage", "random"), ("novelty", "coverage"), ("novelty", "random")):
             if one in names and other in names:
-                parts.append(_apart(by_names, names, one, other))
+                parts.append(_apart(comparisons, names, one, other))
         if parts:
             noise = settings_of(group[0]).get("noise")
             level = f"{100 * noise:g} % noise" if isinstance(noise, int | float) else "this noise"
-            where = f"On the robot ({label_of(group[0])})" if _is_driven(group[0]) else f"At {level}"
-            found.append(f"{where}: {'; '.join(parts)}.")
+            where = f"on the robot ({label_of(group[0])})" if _is_driven(group[0]) else f"at {level}"
+            found.append(f"{where}: {'; '.join(parts)}")
     return found
 
 
@@ -134,30 +141,26 @@ def _is_driven(condition: Mapping[str, Any]) -> bool:
     return is_physical(settings_of(condition))
 
 
-def _apart(
-    by_names: Mapping[tuple[str, str], Comparison], names: Mapping[str, str], one: str, other: str
-) -> str:
-    pair = names[one], names[other]
-    turned = pair not in by_names
-    comparison = by_names.get((pair[1], pair[0]) if turned else pair)
+def _apart(comparisons: Sequence[Comparison], names: Mapping[str, str], one: str, other: str) -> str:
     words = _SELECTIONS[one], _SELECTIONS[other]
-    if comparison is None:
+    pair = names[one], names[other]
+    found = next(
+        (each.seen_from(pair[0]) for each in comparisons if {each.one, each.other} == set(pair)), None
+    )
+    if found is None:
         return f"{words[0]} and {words[1]} not compared"
-    difference = -comparison.difference if turned else comparison.difference
-    interval = comparison.difference_interval
-    if interval is not None and turned:
-        interval = Interval(-interval.high, -interval.low, interval.method)
+    interval = found.difference_interval
     within = f" ({span(interval, signs=True)})" if interval else ""
-    if comparison.is_shown:
-        where = "above" if difference > 0 else "below"
-        return f"{words[0]} {where} {words[1]} by {abs(difference):.3f}{within}"
-    if not comparison.can_claim:
+    if found.is_shown:
+        where = "above" if found.difference > 0 else "below"
+        return f"{words[0]} {where} {words[1]} by {abs(found.difference):.3f}{within}"
+    if not found.can_claim:
         why = "too few runs for a claim"
-    elif comparison.is_equivalent:
+    elif found.is_equivalent:
         why = f"not shown to differ, and equivalent within ±{MARGIN:g}"
     else:
         why = f"not shown to differ, nor to be equivalent within ±{MARGIN:g}"
-    return f"{words[0]} less {words[1]} {signed(difference)}{within}, {why}"
+    return f"{words[0]} less {words[1]} {signed(found.difference)}{within}, {why}"
 
 
 def _percent(share: Share) -> str:
@@ -173,19 +176,24 @@ def _percent_span(share: Share) -> str:
 
 
 def _champions(
-    tally: Tally, found: Sequence[Champions], conditions: Sequence[Mapping[str, Any]]
+    tally: Tally,
+    comparisons: Sequence[Comparison],
+    found: Sequence[Champions],
+    fresh: Sequence[Comparison],
+    conditions: Sequence[Mapping[str, Any]],
 ) -> dict[str, Any]:
     references = _references("noise", conditions)
-    by_name = {each.condition: each for each in found}
     problems = {each.problem for each in found if each.problem}
     return {
         "rows": [
-            _champion_row(each, by_name.get(references.get(each.condition, "")))
+            _champion_row(
+                each, _difference_between(fresh, each.condition, references.get(each.condition, ""))
+            )
             for each in found
             if not each.problem
         ],
         "has_reference": bool(references),
-        "sentences": _noise_sentences(by_name, conditions),
+        "sentences": _noise_sentences(comparisons, fresh, conditions),
         "problem": None if any(not each.problem for each in found) else "; ".join(sorted(problems)),
         "missing": [each.condition for each in found if each.problem],
         "fresh_trials": FRESH_TRIALS,
@@ -194,22 +202,35 @@ def _champions(
     }
 
 
-def _noise_sentences(by_name: Mapping[str, Champions], conditions: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Describe the effect of more noise on the reported best, and its effect on fresh noise."""
+def _noise_sentences(
+    recorded: Sequence[Comparison],
+    fresh: Sequence[Comparison],
+    conditions: Sequence[Mapping[str, Any]],
+) -> list[str]:
+    """Describe the recorded effect of the highest noise against the lowest, and the effect on fresh noise."""
     found = []
     for group in same_but_for("noise", conditions):
-        # settings that could be used for trials have a number here
-        usable = [each for each in group if not by_name[each["name"]].problem]
-        if len(usable) < 2:
-            continue
+        usable = [each for each in group if isinstance(settings_of(each).get("noise"), int | float)]
         ends = sorted(usable, key=lambda each: float(settings_of(each)["noise"]))
-        low, high = (by_name[each["name"]] for each in (ends[0], ends[-1]))
-        changes = _difference(high.reported, low.reported), _difference(high.expected, low.expected)
-        found.append(
-            f"{high.condition} less {low.condition}: {changes[0]} as reported, {changes[1]} on fresh noise "
-            f"(n = {high.n:,} and {low.n:,})."
-        )
+        if len(ends) < 2:
+            continue
+        high, low = str(ends[-1]["name"]), str(ends[0]["name"])
+        changes = [_difference_between(each, high, low) for each in (recorded, fresh)]
+        if "–" not in changes:
+            found.append(f"{high} less {low}: {changes[0]} as recorded, {changes[1]} on fresh noise.")
     return found
+
+
+def _difference_between(comparisons: Sequence[Comparison], one: str, other: str) -> str:
+    """Return the difference of two conditions that were compared, with its interval; a dash otherwise."""
+    for each in comparisons:
+        if {each.one, each.other} == {one, other}:
+            turned = each.seen_from(one)
+            within = (
+                f" ({span(turned.difference_interval, signs=True)})" if turned.difference_interval else ""
+            )
+            return f"{signed(turned.difference)}{within}"
+    return "–"
 
 
 def _trials_a_run(tally: Tally) -> str:
@@ -226,11 +247,7 @@ def _references(key: str, conditions: Sequence[Mapping[str, Any]]) -> dict[str, 
     }
 
 
-def _champion_row(champions: Champions, reference: Champions | None) -> dict[str, str]:
-    difference = "–"
-    if reference is not None and not reference.problem:
-        n = min(champions.n, reference.n)
-        difference = _difference(champions.expected[:n], reference.expected[:n])
+def _champion_row(champions: Champions, difference: str) -> dict[str, str]:
     return {
         "condition": champions.condition,
         "n": f"{champions.n:,}",

@@ -7,7 +7,7 @@ from typing import Any
 
 from nicegui.element import Element
 
-from realitygap.drawing import PENS, themed_color
+from realitygap.drawing import line_pen, themed_color
 
 
 class Curves(Element, component="curves.js"):
@@ -25,7 +25,7 @@ class Curves(Element, component="curves.js"):
 
     def put(self, curves: Sequence[dict[str, Any]]) -> None:
         """Show these curves."""
-        inks = [PENS[k % len(PENS)] for k in range(len(curves))]
+        inks = [line_pen(k) for k in range(len(curves))]
         self._props["curves"] = list(curves)
         self._props["inks"] = [
             {"color": themed_color(color), "dashes": list(dashes)} for color, dashes in inks

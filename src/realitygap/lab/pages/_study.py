@@ -10,6 +10,7 @@ from nicegui import app, events, run, ui
 from starlette.exceptions import HTTPException
 from starlette.responses import FileResponse, PlainTextResponse, Response
 
+from realitygap._wording import Basis, highest, highest_median
 from realitygap.drawing import themed_file
 from realitygap.errors import RealityGapError, StudyError
 from realitygap.lab._access import FOREIGN_HEADERS
@@ -39,6 +40,8 @@ MOST_FILES = 200
 """Number of files of the lab's folder that are proposed."""
 LOOK_S = 0.5
 """Time between two looks at the study's folder [s]."""
+
+_BASIS = Basis("the report tries the best networks again")
 
 _TITLES = {
     "scores": "Best score by generation",
@@ -378,17 +381,21 @@ class _Page:
 
     def _found(self) -> str:
         """The finding; empty as long as there is none."""
-        if not (rows := self._rows()):
+        rows = {row["condition"]: row for row in self._rows()}
+        leaders = highest({name: row["line_median"] for name, row in rows.items()})
+        if not leaders:
             return ""
-        best, n_missing = rows[0], self._standing.n_runs - self._standing.n_done
-        return (
-            f"{best['condition']} has the highest median best coverage{' so far' if n_missing else ''}: "
-            f"{_estimate(best)} ({best['label']}, {counted(best['n'], 'run')})."
-        )
+        of_leaders = [rows[name] for name in leaders]
+        score = "best coverage" + (" so far" if self._standing.n_runs > self._standing.n_done else "")
+        claim = highest_median(leaders, [_estimate(row) for row in of_leaders[:2]], score)
+        labels = " and ".join(dict.fromkeys(row["label"] for row in of_leaders))
+        n = max(row["n"] for row in of_leaders)
+        return _BASIS.claim(f"{claim} ({labels}, {counted(n, 'run')}{' each' if len(leaders) > 1 else ''})")
 
     def _show_finding(self, finding: str) -> None:
         if finding:
             ui.label(finding).classes("lab-finding")
+            hint(f"{_BASIS.caveat[:1].upper()}{_BASIS.caveat[1:]}.")
 
     def _waiting_for(self) -> str | None:
         """Why there are no figures; None once there are some."""

@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 import difflib
+import math
 import operator
+import reprlib
 from collections.abc import Iterable
 from importlib import import_module
 from importlib.util import find_spec
 from numbers import Real
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import ArrayLike, NDArray
 
 
 class RealityGapError(Exception):
@@ -155,21 +161,73 @@ def whole_number(name: str, value: object, least: int | None = None, most: int |
     return number
 
 
-def real_number(name: str, value: object, least: float, most: float) -> float:
-    """Return a real number as Python's own float; numpy's numbers are accepted too.
+def real_number(name: str, value: object, least: float | None = None, most: float | None = None) -> float:
+    """Return a finite real number as Python's own float; numpy's numbers are accepted too.
 
     Args:
         name: Name of the argument, for the message.
         value: Value of the argument.
-        least, most: Smallest and largest allowed value.
+        least, most: Smallest and largest allowed value. `most` counts only if `least` is given.
 
     Raises:
         TypeError: The value is not a number.
-        ValueError: The value is out of range, or NaN.
+        ValueError: The value is out of range, infinite, or NaN.
     """
+    expected = "a finite number"
+    if least is not None:
+        expected = f"at least {least}" if most is None else f"{least} to {most}"
     if not isinstance(value, Real) or isinstance(value, bool):
-        raise TypeError(f"{name} is {value!r}, expected a number from {least} to {most}.")
-    number = float(value)
-    if not least <= number <= most:
-        raise ValueError(f"{name} is {value}, expected {least} to {most}.")
+        raise TypeError(f"{name} is {value!r}, expected a number{'' if least is None else f', {expected}'}.")
+    try:
+        number = float(value)
+    except OverflowError:
+        number = math.inf
+    is_low = least is not None and number < least
+    if not math.isfinite(number) or is_low or (least is not None and most is not None and number > most):
+        raise ValueError(f"{name} is {value}, expected {expected}.")
     return number
+
+
+def finite_numbers(name: str, values: ArrayLike) -> NDArray[np.float64]:
+    """Return numbers of any shape as an array, after a check that each is finite.
+
+    Args:
+        name: Name of the argument, for the message.
+        values: Value of the argument.
+
+    Raises:
+        TypeError: They are not numbers.
+        ValueError: One is infinite or NaN; the message names the first.
+    """
+    import numpy as np  # here, because every command imports this module
+
+    try:
+        given = np.asarray(values)
+        if given.dtype.kind not in "biufO":  # of an object, such as a Fraction, its number is taken
+            raise TypeError
+        numbers = np.asarray(given, np.float64)
+    except (TypeError, ValueError, OverflowError):
+        raise TypeError(f"{name} is {reprlib.repr(values)}, expected real numbers.") from None
+    is_finite = np.isfinite(numbers)
+    if not is_finite.all():
+        index = np.argwhere(~is_finite)[0].tolist()
+        where = f"[{', '.join(map(str, index))}]" if index else ""
+        raise ValueError(f"{name}{where} is {numbers[tuple(index)]}, expected a finite number.")
+    return numbers
+
+
+def check_told_once(asked: int | None, generation: int) -> None:
+    """Raise an error if `tell` is called twice after one `ask`: the second fitness belongs to no genome.
+
+    Args:
+        asked: Generation for which `ask` was last called; None if it never was.
+        generation: Present generation.
+
+    Raises:
+        RuntimeError: They differ.
+    """
+    if asked is not None and asked != generation:
+        raise RuntimeError(
+            f"Generation {asked} has its fitness already, and nothing asked for generation {generation}. Call ask(), "
+            "and tell the fitness of these genomes."
+        )

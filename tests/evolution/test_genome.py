@@ -192,6 +192,7 @@ def test_an_asked_genome_stays_what_it_was_when_the_population_goes_on() -> None
     before = [genome.to_dict() for genome in genomes]
     for _ in range(3):
         population.tell([1.0] * 10)
+        population.ask()
     assert [genome.to_dict() for genome in genomes] == before
 
 

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from realitygap.evolution import Genome, NeatSettings, Population
 from realitygap.evolution import _population as population_module
+from realitygap.runs import Condition, Evolution
 from tests.evolution.xor import evaluations_to_solve
 from tests.reference.effort import COMPILED, cases
 from tests.reference.neat import has_cycle
@@ -191,6 +192,21 @@ def test_wrong_fitness_is_refused_and_changes_nothing(fitness: list[float], mess
     assert population.ask() == untouched.ask()
 
 
+def test_fitness_told_a_second_time_is_refused() -> None:
+    """The second fitness would breed genomes that it does not belong to."""
+    population = Population(2, 1, NeatSettings(population=5), seed=1)
+    evolution = Evolution(Condition(name="a", selection="random"), 0)
+    n = len(evolution.ask())
+    population.ask()
+    for tell in (lambda: population.tell([1.0] * 5), lambda: evolution.tell([1.0] * n, [[1]] * n)):
+        tell()
+        with pytest.raises(RuntimeError, match=r"Generation 0 has its fitness already.* Call ask\(\)"):
+            tell()
+    assert (population.generation, evolution.generation) == (1, 1)
+    population.ask()
+    population.tell([1.0] * 5)
+
+
 def test_a_population_needs_inputs_and_outputs() -> None:
     with pytest.raises(ValueError, match="n_inputs is 0"):
         Population(0, 1)
@@ -253,6 +269,6 @@ def test_numpy_s_whole_numbers_are_taken() -> None:
 @pytest.mark.parametrize("fitness", [["1", "2"], [1j, 2j], object(), {"a": 1.0}, "12", [[1.0], [1.0, 2.0]]])
 def test_fitness_that_is_not_made_of_numbers_is_refused(fitness: Any) -> None:
     population = Population(2, 1, NeatSettings(population=2))
-    with pytest.raises(TypeError, match="expected 2 real numbers, one for each genome asked"):
+    with pytest.raises(TypeError, match="expected real numbers"):
         population.tell(fitness)
     assert population.generation == 0

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 import pytest
 import serial
 
-from realitygap.emulator import Emulator, Server, serve_pty
+from realitygap.emulator import Emulator, Server, serve_pty, serve_tcp
 from realitygap.errors import RobotError
 from realitygap.robots.scribbler import Scribbler, label_of
 
@@ -139,7 +139,33 @@ def test_a_port_that_cannot_be_opened_is_one_message_with_advice(port, message):
         Scribbler(port)
 
 
-def test_a_program_that_does_not_know_the_emulator_is_told_what_to_import():
-    code = "from realitygap.robots.scribbler import Scribbler; Scribbler('emulator://s2')"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    assert "`import realitygap.emulator` makes such ports known" in done.stderr
+OPENINGS = {
+    "a driver": "from realitygap.robots.scribbler import Scribbler; robot = Scribbler(sys.argv[1])",
+    "a port": "from realitygap.robots import open_on; robot = open_on(sys.argv[1])[1]",
+    "a platform": "from realitygap.platforms import platform_of; from realitygap.world import paper_arena; "
+    "robot = platform_of(sys.argv[1]).open_robot(paper_arena())",
+    "Myro": "from realitygap.myro import *; initialize(sys.argv[1]); robot = None",
+}
+
+
+def test_fresh_process_opens_each_kind_of_port(server):
+    """A new process has imported nothing else, so no import by another part of the program can help."""
+    with serve_tcp(Emulator("s2", "2")) as tcp:
+        host = tcp.name.removeprefix("socket://")
+        ports = [
+            ("a driver", server.name),
+            ("a driver", "emulator://s2?fluke=2&speed=off"),
+            ("a driver", f"socket://{host}"),
+            ("a port", f"scribbler:socket://{host}"),
+            ("a port", "scribbler:emulator://s1?fluke=1&speed=off"),
+            ("a port", "thymio:emulator://playground?speed=8"),
+            ("a platform", "scribbler:emulator://s2?speed=off"),
+            ("Myro", "emulator://s2?fluke=2&speed=off"),
+            ("Myro", "sim"),
+        ]
+        for kind, port in ports:
+            code = f"import sys; {OPENINGS[kind]}; getattr(robot, 'close', print)()"
+            done = subprocess.run(
+                [sys.executable, "-c", code, port], capture_output=True, text=True, check=False
+            )
+            assert done.returncode == 0, f"{kind} {port}: {done.stderr}"

@@ -4,17 +4,9 @@ from __future__ import annotations
 
 import time
 
-import pytest
-
 from realitygap.robots import Command, RecordedRobot
 from realitygap.robots.scribbler import Scribbler
 from realitygap.testing import check_robot
-
-
-@pytest.fixture(autouse=True)
-def _emulated_ports(port):
-    if port.startswith("emulator:"):
-        import realitygap.emulator  # noqa: F401
 
 
 def test_the_robot_keeps_the_contract_and_its_recording_too(port, tmp_path):

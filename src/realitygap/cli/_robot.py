@@ -43,8 +43,6 @@ _NO_PORTS = ("sim", "jyro", "enki", "emulator", "scribbler", "thymio")
 @contextmanager
 def _opened(port: str, record: Path | None) -> Iterator[tuple[Any, Any]]:
     """Yield the functions of the robot's family and the robot on a port, stopped and let go of in the end."""
-    from realitygap.robots import is_in_this_program
-
     if port in _NO_PORTS:
         raise RobotError(
             f"{port} is no port. For an emulated robot, use emulator://s2. `realitygap robot list` lists the ports of "
@@ -52,8 +50,6 @@ def _opened(port: str, record: Path | None) -> Iterator[tuple[Any, Any]]:
         )
     if port.startswith("recording:"):
         raise RobotError(f"{port} is a recording: `realitygap robot show-recording` shows it.")
-    if is_in_this_program(port):
-        import realitygap.emulator  # noqa: F401  # its ports are known from then on
     from realitygap.robots import open_on
 
     try:

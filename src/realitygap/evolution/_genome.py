@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from realitygap.drawing import ShownAsCard, picture_of
-from realitygap.errors import ControllerError, RecordError
+from realitygap.errors import ControllerError, RecordError, finite_numbers
 from realitygap.kernels.neat.genome import Genomes, NeatRules, make_genomes
 from realitygap.kernels.neat.network import Networks, activate, decode_rows, make_networks
 from realitygap.records import write_whole
@@ -82,15 +82,16 @@ class Network(_json.Written[_json.NetworkForm]):
         """Return the outputs for one set of inputs.
 
         Args:
-            inputs: (n_inputs,) without the constant input.
+            inputs: (n_inputs,) finite, without the constant input.
 
         Returns:
             (n_outputs,) float64: -1..1 with tanh, 0..1 with sigmoid.
 
         Raises:
-            ValueError: Wrong number of inputs.
+            TypeError: Something other than numbers.
+            ValueError: Wrong number of inputs, or one that is infinite or NaN.
         """
-        given = np.asarray(inputs, np.float64)
+        given = finite_numbers("inputs", inputs)
         if given.shape != (self.n_inputs,):
             raise ValueError(f"inputs has shape {given.shape}, expected ({self.n_inputs},).")
         self._values[: self.n_inputs] = given

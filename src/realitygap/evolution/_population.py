@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import reprlib
 from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from realitygap.errors import RecordError, whole_number
+from realitygap.errors import RecordError, check_told_once, finite_numbers, whole_number
 from realitygap.kernels.neat.evolve import next_generation
 from realitygap.kernels.neat.genome import Genomes, first_genomes, make_genomes
 from realitygap.kernels.neat.mutation import Innovations, make_innovations
@@ -87,6 +86,7 @@ class Population:
         self._key = np.uint64(key)
         self._replicate = replicate
         self.generation = 0
+        self._asked: int | None = None
         n = self.settings.population
         room = self._rules.n_first_genes + FIRST_ROOM
         hidden_room = self._rules.start_hidden + FIRST_HIDDEN_ROOM
@@ -130,6 +130,7 @@ class Population:
 
     def ask(self) -> list[Genome]:
         """Return the genomes of this generation, in the order in which `tell` wants their fitness."""
+        self._asked = self.generation
         bias_value = float(self.settings.bias_value)
         return [Genome(self._genomes, row, self._rules, bias_value) for row in range(len(self))]
 
@@ -140,18 +141,17 @@ class Population:
             fitness: (n,) finite; more is fitter.
 
         Raises:
+            RuntimeError: The generation for which `ask` was last called has its fitness.
             TypeError: Something else than real numbers.
             ValueError: Another shape, or a value that is not finite. The population stays as it is.
         """
         n = len(self)
-        told = _as_numbers(fitness, n)
+        check_told_once(self._asked, self.generation)
+        told = np.ascontiguousarray(finite_numbers("fitness", fitness))
         if told.shape != (n,):
             raise ValueError(
                 f"fitness has shape {told.shape}, expected ({n},): one number for each genome asked."
             )
-        if not np.isfinite(told).all():
-            row = int(np.flatnonzero(~np.isfinite(told))[0])
-            raise ValueError(f"fitness[{row}] is {told[row]}, expected a finite number.")
         room = self._genomes.innovation.shape[1]
         hidden_room = self._genomes.hidden.shape[1]
         while True:
@@ -290,15 +290,3 @@ class Population:
         self._innovations = table(self._innovations, "innovations")
         self._species = table(self._species, "species")
         self._species_of, self._parents = arrays["species_of"], arrays["parents"]
-
-
-def _as_numbers(fitness: ArrayLike, n: int) -> NDArray[np.float64]:
-    try:
-        given = np.asarray(fitness)
-        if given.dtype.kind not in "biufO":  # of an object, such as a Fraction, its number is taken
-            raise TypeError
-        return np.ascontiguousarray(given, np.float64)
-    except (TypeError, ValueError):
-        raise TypeError(
-            f"fitness is {reprlib.repr(fitness)}, expected {n} real numbers, one for each genome asked."
-        ) from None

@@ -64,7 +64,7 @@ class _OneRobot(gymnasium.Env[Array, Array]):
 
         Raises:
             ResetNeeded: No trial is under way.
-            ValueError: Another shape.
+            ValueError: Another shape, or a number that is infinite or NaN. The robot does not move.
         """
         given = np.asarray(action, np.float64)
         if given.shape != (2,):
@@ -105,8 +105,8 @@ class RobotEnv(_OneRobot):
 
     Observations are the inputs of the task's networks without the constant one. On `jyro` and twins these are obstacle
     (largest noisy reading), stall and time for every task, unless `controller` names others. A trial is truncated after
-    `platform.steps` steps and never terminated. Actions beyond -1..1 are limited to it, and what is no number counts as
-    0, as in a trial.
+    `platform.steps` steps and never terminated. Actions beyond -1..1 are limited to it, as in a trial. An infinite or
+    NaN action is an error.
 
     `info` has `pose` (3,) x [m], y [m], heading [rad, counter-clockwise from +x], `readings` (s,) [m] without noise (on
     a twin, distances that noisy readings tell), `coverage_line` and `coverage_ends` [0..1].

@@ -11,11 +11,13 @@ from numpy.typing import NDArray
 from realitygap.evolution import NeatSettings
 from realitygap.kernels.math.lanes import LANES
 from realitygap.kernels.tasks import maze
-from realitygap.platforms import Array, Outline, limited_commands
+from realitygap.platforms import Array, Outline
 from realitygap.tasks import MazeAgent
 from realitygap.trials import NoiseKey, maze_rules, maze_scene
 from realitygap.world import Arena
 
+MAZE_ACTIONS = ("turn", "speed")
+"""Names of the agent's two outputs."""
 CORNERS = 24
 """Corners of the polygon that a picture shows for a disc."""
 
@@ -80,7 +82,7 @@ class MazeFleet:
 
     def step(self, commands: Array) -> None:
         """See `Fleet.step`. A robot at the exit stays there."""
-        commands = limited_commands(commands)
+        commands = np.clip(commands, -1.0, 1.0)
         for block, lanes in enumerate(self._blocks):
             part = commands[block * LANES : (block + 1) * LANES]
             lanes.values[self._neat.n_inputs : self._neat.n_inputs + 2, : len(part)] = part.T

@@ -18,7 +18,7 @@ from realitygap.tasks import MAZE_TASKS, PYTHON, TASKS, ControllerSettings
 from realitygap.trials import NoiseKey
 from realitygap.world import ArenaSettings
 
-from ._maze_fleet import MazeFleet
+from ._maze_fleet import MAZE_ACTIONS, MazeFleet
 from ._picture import draw_robot
 from ._rewards import ExitReward, Reward, reward_of
 
@@ -73,10 +73,16 @@ class Robots:
         self.n = n
         self._fleet, self._reward, self._interface = fleet, reward, interface
         self._dtype: Any = np.dtype(dtype)
+        self._actions = interface.outputs if interface is not None else MAZE_ACTIONS
         self._step: int | None = None
         self._paths: list[NDArray[np.float64]] | None = None
         self.noise_key = NoiseKey(0)
         self.step_s = fleet.step_s
+
+    @property
+    def n_driven(self) -> int:
+        """Number of steps of this trial that are done."""
+        return self._step or 0
 
     @property
     def is_over(self) -> bool:
@@ -131,20 +137,27 @@ class Robots:
         """Drive one command of each robot.
 
         Args:
-            actions: (n, 2) outputs of controllers. They are limited to -1..1, and nan counts as 0, as in a trial.
+            actions: (n, 2) outputs of controllers. They are limited to -1..1, as in a trial.
 
         Returns:
             (n, i) observations and (n,) rewards.
 
         Raises:
             ResetNeeded: No trial is under way.
-            ValueError: Another shape.
+            ValueError: Another shape, or a number that is infinite or NaN. No robot moves.
         """
         if self._step is None or self.is_over:
             raise ResetNeeded("No trial is under way: call reset() first, and again when all steps are done.")
         given = np.ascontiguousarray(actions, np.float64)
         if given.shape != (self.n, 2):
             raise ValueError(f"actions has shape {given.shape}, expected ({self.n}, 2).")
+        is_finite = np.isfinite(given)
+        if not is_finite.all():
+            k, part = np.argwhere(~is_finite)[0].tolist()
+            of_robot = "" if self.n == 1 else f" of robot {k}"
+            raise ValueError(
+                f"{self._actions[part]}{of_robot} is {given[k, part]}, expected a number from -1 to 1. No robot moved."
+            )
         if self._interface is not None and self._interface.drives_wheels:
             given = self._interface.commands(given)
         self._fleet.step(given)

@@ -7,7 +7,6 @@ import sys
 from typing import Any
 
 from realitygap.errors import RobotError
-from realitygap.robots import is_in_this_program
 from realitygap.robots.scribbler import Scribbler as Driver
 from realitygap.robots.scribbler import find_ports
 
@@ -44,8 +43,6 @@ def open_port(port: str | int | None, **options: Any) -> tuple[Driver, Simulatio
         raise MyroError(
             f'{", ".join(options)}: only a simulated robot has that, as initialize("sim", seed=3).'
         )
-    if is_in_this_program(name):
-        import realitygap.emulator  # noqa: F401  # makes pyserial know such ports
     try:
         return Driver(name), None
     except (RobotError, ValueError, OSError) as error:

@@ -69,8 +69,6 @@ class Simulation:
         arena: str = "paper",
         view: Any = None,
     ) -> None:
-        import realitygap.emulator  # noqa: F401  # makes pyserial know such ports
-
         self.seed = whole('initialize("sim"): the seed', _plain(seed), 0, 2**31 - 1)
         choice('initialize("sim"): the model', model, {"s1": "s1", "s2": "s2"})
         choice('initialize("sim"): the fluke', _plain(fluke), {"none": 0, 1: 1, 2: 2})

@@ -1,6 +1,6 @@
 """Platforms: named ways to run trials."""
 
-from ._fleet import Array, Fleet, Outline, Points, limited_commands
+from ._fleet import Array, Fleet, Outline, Points
 from ._platform import Opening, Platform
 from ._python import PYTHON, allow_code, load_platform
 from ._registry import (
@@ -101,7 +101,6 @@ __all__ = [
     "jyro_rules",
     "jyro_scene",
     "known_specs",
-    "limited_commands",
     "load_platform",
     "names_a_port",
     "open_target",

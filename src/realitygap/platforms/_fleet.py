@@ -83,7 +83,7 @@ class Fleet(Protocol):
         ...
 
     def step(self, commands: Array) -> None:
-        """Drive each robot by one command, (n, 2) each -1..1."""
+        """Drive each robot by one command, (n, 2) finite numbers; those beyond -1..1 are limited."""
         ...
 
     def observe(self) -> Array:
@@ -103,8 +103,3 @@ def is_signed(name: str) -> bool:
     """Return whether an input is within -1..1, and not within 0..1."""
     kind = name.partition(".")[0]
     return SENSORS[kind].is_signed if kind in SENSORS else kind in ("encoder", "last_move", "last_turn")
-
-
-def limited_commands(commands: Array) -> Array:
-    """Return commands within -1..1; what is no number becomes 0, as in a trial."""
-    return np.clip(np.where(np.isnan(commands), 0.0, commands), -1.0, 1.0)

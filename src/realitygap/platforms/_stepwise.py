@@ -34,7 +34,7 @@ from realitygap.trials import (
 )
 from realitygap.world import Arena, Pose, cells_along
 
-from ._fleet import Array, Outline, is_signed, limited_commands
+from ._fleet import Array, Outline, is_signed
 from ._settings import PlatformSettings
 
 if TYPE_CHECKING:
@@ -450,7 +450,7 @@ class StepwiseFleet:
 
     def step(self, commands: Array) -> None:
         """See `Fleet.step`."""
-        self._last = limited_commands(commands)
+        self._last = np.clip(commands, -1.0, 1.0)
         self._robots.drive(self._last)
         self._step += 1
         self._count()

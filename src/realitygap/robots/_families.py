@@ -50,7 +50,7 @@ def split_port(port: str) -> tuple[str, str]:
 
 
 def is_in_this_program(port: str) -> bool:
-    """Return whether a port belongs to an emulator in this program, which pyserial can open once it was imported."""
+    """Return whether a port belongs to an emulator in this program."""
     return split_port(port)[1].startswith("emulator:")
 
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from realitygap.errors import check_told_once, finite_numbers
 from realitygap.evolution import ControllerInterface, Genome, NoveltyArchive, Population, genome_record
 from realitygap.kernels.neat.genome import first_genomes, make_genomes
 
@@ -73,6 +74,7 @@ class Evolution:
         self._condition = condition
         self._replicate = replicate
         self.generation = 0
+        self._asked: int | None = None
         self._population = population_of(condition, replicate)
         self._grid = condition.arena.arena().grid
         grid = self._grid
@@ -83,6 +85,7 @@ class Evolution:
 
     def ask(self) -> list[Asked]:
         """Return this generation, in the order in which `tell` wants their scores."""
+        self._asked = self.generation
         condition = self._condition
         if condition.selection == "random":
             return [Asked(named(genome, condition), 0, ()) for genome in self._unrelated()]
@@ -105,8 +108,11 @@ class Evolution:
             cells: n lists of visited cells, by which novelty selects; their order within a list does not matter.
 
         Raises:
-            ValueError: Another number of individuals, or a cell outside the grid.
+            RuntimeError: The generation for which `ask` was last called has its scores.
+            ValueError: Another number of individuals, a score that is not finite, or a cell outside the grid.
         """
+        check_told_once(self._asked, self.generation)
+        finite_numbers("scores", scores)
         n = self._condition.neat.population
         for what, given in (("scores", scores), ("cells", cells)):
             if len(given) != n:

@@ -209,6 +209,7 @@ class PhysicalStudy:
         return (generation, True) in self._ledger.generations(condition.name, replicate)
 
     def _close(self, condition: Condition, replicate: int, generation: int) -> None:
+        self._check_planned(condition, replicate, generation)
         evolution = self._evolution(condition, replicate)
         trials = [
             each

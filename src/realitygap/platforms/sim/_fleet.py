@@ -16,7 +16,7 @@ from realitygap.kernels.sim.trial import observe, start_sim, step_sim
 from realitygap.trials import REAL, Draws, NoiseKey, counters_of, poses_of
 from realitygap.world import Arena, check_drawn_starts
 
-from .._fleet import Array, Outline, is_signed, limited_commands
+from .._fleet import Array, Outline, is_signed
 from ._scene import sim_scene
 from ._settings import SimSettings
 from ._trials import sim_rules
@@ -99,7 +99,7 @@ class SimFleet:
 
     def step(self, commands: Array) -> None:
         """See `Fleet.step`."""
-        commands = limited_commands(commands)
+        commands = np.clip(commands, -1.0, 1.0)
         for block, room in zip(self._blocks, self._rooms, strict=True):
             n = block.stop - block.start
             self._commands[:, :n] = commands[block].T

@@ -1,4 +1,4 @@
-"""The link to a robot over its port. This is the only code that uses pyserial.
+"""The link to a robot over its port.
 
 A frame has no mark and no checksum, so a lost or added byte shifts all following bytes. Several rules keep the two
 sides synchronized. There is one command at a time. Echoes are compared. Values that no robot sends are refused. After
@@ -21,7 +21,7 @@ from typing import Any, NamedTuple, TypeVar
 
 from realitygap.errors import ProtocolError, RobotError
 from realitygap.robots._clock import Clock, SystemClock
-from realitygap.robots._open_error import reason_of
+from realitygap.robots._serial_port import reason_of, serial_port
 
 from . import _codec as codec
 from ._codec import Request
@@ -157,8 +157,6 @@ def open_port(name: str) -> Any:
 
 
 def _open_once(name: str) -> Any:
-    import serial
-
     if name.startswith("rfc2217://"):
         raise RobotError(
             f"{name} cannot be opened: RFC 2217 is not supported, as its ports cannot be handed to the process that "
@@ -166,7 +164,7 @@ def _open_once(name: str) -> Any:
         )
     port: Any = None
     try:
-        port = serial.serial_for_url(name, do_not_open=True, baudrate=BAUD, timeout=GAP_S)
+        port = serial_port(name, BAUD, GAP_S)
         port.write_timeout = WRITE_S
         port.dtr = False
         with contextlib.suppress(AttributeError, NotImplementedError, ValueError):
@@ -197,8 +195,6 @@ def _advice(name: str, error: Exception) -> str:
     text = str(error).lower()
     if "permission" in text or "denied" in text:
         return "May this account use it? On Linux: sudo usermod -aG dialout $USER, then log in again."
-    if name.startswith("emulator://") and "not known" in text:
-        return "`import realitygap.emulator` makes such ports known."
     if "://" in name:
         return "Is the address right, and does something listen there?"
     return "Is the robot on, paired and connected? `realitygap robot list` lists the existing ports."

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from realitygap.errors import ProtocolError, RobotError, RobotTimeout
-from realitygap.robots._open_error import reason_of
+from realitygap.robots._serial_port import reason_of, serial_port
 from realitygap.robots.scribbler._guardian import Guardian, descriptor_of
 from realitygap.robots.scribbler._guardian_process import SILENT_S as FROZEN_S
 
@@ -61,10 +61,8 @@ def open_port(name: str) -> Any:
     Raises:
         RobotError: It cannot be opened; the message says what to do.
     """
-    import serial
-
     try:
-        port = serial.serial_for_url(name, do_not_open=True, baudrate=BAUD, timeout=POLL_S)
+        port = serial_port(name, BAUD, POLL_S)
         port.write_timeout = WRITE_S
         with contextlib.suppress(AttributeError, NotImplementedError, ValueError):
             port.exclusive = True

@@ -61,6 +61,54 @@ def test_good_logs_have_no_mistakes_whatever_their_seed():
         assert kinds(commands, poses) == [], seed
 
 
+@pytest.mark.filterwarnings("error")
+def test_motion_without_variety_shows_nothing_and_divides_by_nothing():
+    """A heading that never changes made a division by zero. Each column stands still here, in turn and together."""
+    n = 100
+    straight = np.column_stack([0.01 * np.arange(n + 1), np.zeros(n + 1), np.zeros(n + 1)])
+    arc = drive(n, held=n, noise=0)[1]
+    told = {
+        "straight": np.full((n, 2), 0.3),
+        "arc": np.tile([0.2, 0.4], (n, 1)),
+        "in place": np.tile([-0.3, 0.3], (n, 1)),
+        "one wheel": np.tile([0.0, 0.3], (n, 1)),
+        "still": np.zeros((n, 2)),
+        "driven": drive(n)[0],
+    }
+    seen = {
+        "straight": straight,
+        "still": 0 * straight,
+        "arc": arc,
+        "no heading": arc * [1, 1, 0],
+        "turning": arc * [0, 0, 1],
+        "one axis": arc * [0, 1, 1],
+    }
+    for commands in told.values():
+        for poses in seen.values():
+            for rows in (n, 24, 9, 2):
+                diagnose(
+                    Log(
+                        "",
+                        0.0,
+                        STEP_S,
+                        commands[:rows],
+                        poses[: rows + 1],
+                        NOTHING,
+                        NOTHING,
+                        poses[: rows + 1, 2],
+                    ),
+                    SPEED,
+                    TRACK,
+                )
+
+
+def test_heading_that_never_changes_is_a_mistake_if_the_path_turns():
+    commands, poses = drive(400)
+    assert kinds(commands, poses * [1, 1, 0]) == ["constant heading"]
+    straight = np.column_stack([0.01 * np.arange(401), np.zeros(401), np.zeros(401)])
+    assert kinds(np.full((400, 2), 0.1 / SPEED), straight) == []
+
+
 def test_a_robot_that_stands_shows_nothing():
     commands, poses = drive(100)
     assert kinds(0 * commands, poses) == []

@@ -7,7 +7,7 @@ import polars as pl
 import pytest
 
 from realitygap.errors import LogError
-from realitygap.logs import LogMap, guess_log_map, import_log, load_log_map, read_logs, trials_of
+from realitygap.logs import LogMap, guess_log_map, import_log, load_log_map, read_logs, trial_of
 from realitygap.world import load_robot
 from tests.logs.made import SPEED, STEP_S, TRACK, drive, rows, write
 
@@ -131,16 +131,43 @@ def test_poses_with_another_clock_are_interpolated(tmp_path):
         read(tmp_path, commands={**COMMANDS, "file": "odom.csv"}, poses={**pose_map, "offset_s": 100.0})
 
 
-def test_poses_that_were_not_seen_are_nan_and_cut_trials(made):
-    path, _, _ = made
+def test_poses_that_were_not_seen_end_trials(made):
+    path, _, poses = made
     table = np.genfromtxt(path, delimiter=",", skip_header=1)
     table[20:30, 3:] = np.nan
-    log = read(write(path, table))
-    assert np.flatnonzero(np.isnan(log.poses[:, 0])).tolist() == list(range(20, 30))
-    trials = list(trials_of(log, log_map()))
-    assert [len(trial.commands) for trial in trials] == [19, 30]
-    assert trials[1].start == pytest.approx(tuple(log.poses[30]))
-    assert any("10 of 61 rows have no numbers" in note for note in log.notes)
+    logs = list(read_logs(write(path, table), log_map(), ROBOT))
+    assert [len(log.commands) for log in logs] == [19, 30]
+    assert [log.start_s for log in logs] == pytest.approx([0, 30 * STEP_S])
+    assert trial_of(logs[1], log_map()).start == pytest.approx(tuple(poses[30]))
+    assert any("10 of 61 rows have no numbers" in note for note in logs[0].notes)
+
+
+def test_a_robot_that_a_person_carried_begins_another_trial(tmp_path):
+    """The carrying takes 2 s, or one step. Poses in millimeters, noisy ones, and a late clock are no carrying."""
+    commands, poses = drive(400, noise=0.002)
+    path = tmp_path / "log.csv"
+    for steps, moved in ((20, [0.9, 0.6, 2.0]), (1, [0.3, 0.0, 0.0])):
+        share = np.clip((np.arange(401) - 150) / steps, 0, 1)[:, None]
+        logs = list(read_logs(write(path, rows(commands, poses + share * moved)), log_map(), ROBOT))
+        assert len(logs) == 2
+        first, second = (log.start_s / STEP_S for log in logs)
+        assert first == 0
+        assert 150 + steps <= second <= 150 + 2 * steps + 12
+        assert 130 <= len(logs[0].commands) <= 150
+        assert "a person carried the robot" in logs[0].notes[-1]
+    turns = poses + np.where(np.arange(401) > 150, 2.5, 0)[:, None] * [0, 0, 1]
+    assert len(list(read_logs(write(path, rows(commands, turns)), log_map(), ROBOT))) == 2
+    whole = {
+        "millimeters": rows(commands, poses * [1000, 1000, 1]),
+        "noise": rows(commands, poses + np.random.default_rng(1).normal(0, 0.02, poses.shape)),
+        "late": rows(*drive(400, late=25)),
+        "a robot file that is too slow": rows(commands / 2, poses),
+        "a robot that is blocked": rows(
+            np.concatenate([commands, commands]), np.repeat(poses, [1] * 400 + [401], 0)
+        ),
+    }
+    for name, table in whole.items():
+        assert len(list(read_logs(write(path, table), log_map(), ROBOT))) == 1, name
 
 
 def test_counters_of_wheels_are_ways_since_the_start(tmp_path):
@@ -213,7 +240,7 @@ def test_log_of_encoders_and_poses_has_no_commands(tmp_path):
     assert log.wheels == pytest.approx(ways)
     assert log.poses == pytest.approx(poses)
     assert log.commands == pytest.approx(commands)  # as shares of full speed
-    (trial,) = trials_of(log, mapped)
+    trial = trial_of(log, mapped)
     assert trial.wheels == pytest.approx(ways)
     assert trial.poses == pytest.approx(poses)
     report = import_log(path, tmp_path / "trials.jsonl", mapped.model_copy(update={"robot": "pioneer"}))

@@ -109,7 +109,8 @@ def _print(log: Path, out: Path, log_map: LogMap, origin: str, report: ImportRep
         typer.echo(note)
     offset = report.offset
     if offset is not None:
-        typer.echo(f"Poses follow commands by {offset}, a robot's lag and delay included.")
+        wheels = "commands" if "commands" in report.observe else "encoders"
+        typer.echo(f"Poses follow {wheels} by {offset}, a robot's lag and delay included.")
     for mistake in report.mistakes:
         typer.echo(f"Check ({mistake.kind}): {mistake.message}")
     typer.echo(

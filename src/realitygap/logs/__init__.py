@@ -1,20 +1,21 @@
 """Logs and tables of real robots, as other programs wrote them: read, checked, and turned into trials.
 
 A log is a file of any size with commands, poses, encoders, and readings, each by its own clock. `LogMap` says which
-column is what. `read_logs` yields its trials on one regular grid, `diagnose` names the usual mistakes, and `trials_of`
-makes observed trials of them. `write_bag` writes a trial for programs of ROS. This package fits nothing.
+column is what. `read_logs` yields its trials on one regular grid, `diagnose` names the usual mistakes, and `trial_of`
+makes an observed trial of one. `write_bag` writes a trial for programs of ROS. This package fits nothing.
 """
 
-from ._as_trials import NO_HEADING, arena_of, head_of, path_headings, trials_of
+from ._as_trials import NO_HEADING, arena_of, head_of, path_headings, trial_of
 from ._clock_offset import ClockOffset, clock_offset
 from ._end_poses import EndPoses, read_end_poses
 from ._guess import guess_log_map
 from ._import import ImportReport, import_log, map_beside, mapping_of, robot_of
+from ._log import Log
 from ._log_map import Commands, LogMap, Poses, Readings, TextFormat, Wheels, load_log_map
 from ._mistakes import Diagnosis, Mistake, diagnose
 from ._open import KINDS, open_source
 from ._range_table import RangeTable, read_range_table
-from ._read import Log, read_logs
+from ._read import read_logs
 from ._round_robot import round_robot
 from ._source import Batch, Source
 from ._table_map import MeasuredFrom, TableColumns, TableMap, load_table_map
@@ -60,6 +61,6 @@ __all__ = [
     "read_range_table",
     "robot_of",
     "round_robot",
-    "trials_of",
+    "trial_of",
     "write_bag",
 ]

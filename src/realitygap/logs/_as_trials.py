@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -12,16 +11,14 @@ from realitygap.evolution import Genome
 from realitygap.records import ObservationsHead, Observe, TrialRecord
 from realitygap.world import Arena, Grid, Pose, load_arena
 
+from ._log import Log
 from ._log_map import LogMap
-from ._read import FEWEST_STEPS, Log
 from ._source import Floats
 
 FAR_M = 100.0
 """Distance of the walls of an open plane."""
 SLOW = 0.2
 """Share of the typical distance of a step below which the path shows no direction."""
-MOST_TRIAL_STEPS = 20_000
-"""Steps of one trial in a file; a longer stretch becomes several."""
 MOST_COMMAND = 1.0005
 """A command may be beyond full speed by the rounding of its unit."""
 NO_HEADING = "The log has no headings: those of these trials are the directions of the path."
@@ -57,78 +54,51 @@ def _observe_of(log: Log) -> Observe:
     return "encoders" if len(log.wheels) else "readings"
 
 
-def trials_of(log: Log, log_map: LogMap, first: int = 0) -> Iterator[TrialRecord]:
-    """Yield the stretches of a log in which everything is known, as trials.
+def trial_of(log: Log, log_map: LogMap, number: int = 0) -> TrialRecord:
+    """Return a trial of a log as an observed trial.
 
-    If the log has no commands, those of the trials are the speeds of the encoders.
+    If the log has no commands, those of the trial are the speeds of the encoders.
 
     Args:
-        log: One trial of a log.
+        log: One trial of a log, as `read_logs` yields it.
         log_map: Mapping of the log.
-        first: Number of the first stretch.
+        number: Number of the trial.
 
     Raises:
-        LogError: A command exceeds the robot's speed, or no part of the log has observations.
+        LogError: A command exceeds the robot's speed.
     """
     left, right = log.commands.T
-    wheel = np.nan_to_num(np.abs(log.commands)).max(1)
+    wheel = np.abs(log.commands).max(1)
     k = int(np.argmax(wheel))
-    fastest = float(wheel[k])
-    if fastest > MOST_COMMAND:
+    if wheel[k] > MOST_COMMAND:
         verb = "is told" if log.has_commands else "has by its encoder"
         raise LogError(
-            f"At {log.time_s[k]:.4g} s a wheel {verb} {fastest:.3g} times the robot's full speed. Set speed in the "
+            f"At {log.time_s[k]:.4g} s a wheel {verb} {wheel[k]:.3g} times the robot's full speed. Set speed in the "
             "mapping to its full speed [m/s], or name the robot that drove with --base."
         )
     poses = log.poses
     if len(poses) and not log.has_heading:
         poses = np.column_stack([poses[:, :2], path_headings(poses[:, :2], left + right)])
+    x, y, heading = poses[0] if len(poses) else np.zeros(3)
+    n = len(log.commands)
     genome = _controller(log_map)
-    number = first
-    for begin, end in _known(log, poses):
-        rows = slice(begin, end + 1)
-        start = poses[begin] if len(poses) else np.zeros(3)
-        wheels = log.wheels[rows] - log.wheels[begin] if len(log.wheels) else log.wheels
-        commands = np.clip(np.stack([(left + right) / 2, (right - left) / 2], 1)[begin:end], -1, 1)
-        yield TrialRecord(
-            start=(float(start[0]), float(start[1]), float(start[2])),
-            step_s=log.step_s,
-            commands=commands,
-            readings=log.readings[begin:end] if len(log.readings) else np.empty((end - begin, 0)),
-            stalled=np.zeros(end - begin, np.bool_),
-            cells=(),
-            wheels=wheels,
-            poses=poses[rows] if len(poses) else poses,
-            genome=genome,
-            number=number,
-            purpose="controller" if genome else "motion",
-        )
-        number += 1
+    return TrialRecord(
+        start=(float(x), float(y), float(heading)),
+        step_s=log.step_s,
+        commands=np.clip(np.stack([(left + right) / 2, (right - left) / 2], 1), -1, 1),
+        readings=log.readings[:n] if len(log.readings) else np.empty((n, 0)),
+        stalled=np.zeros(n, np.bool_),
+        cells=(),
+        wheels=log.wheels,
+        poses=poses,
+        genome=genome,
+        number=number,
+        purpose="controller" if genome else "motion",
+    )
 
 
 def _controller(log_map: LogMap) -> str:
     return Genome.load(log_map.controller).to_json() if log_map.controller else ""
-
-
-def _known(log: Log, poses: Floats) -> list[tuple[int, int]]:
-    """Return the first step and end of each stretch in which everything is known."""
-    known = np.ones(len(log.commands) + 1, bool)
-    known[:-1] &= np.isfinite(log.commands).all(1)
-    for rows in (poses, log.wheels, log.readings):
-        if len(rows):
-            known &= np.isfinite(rows).all(1)
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], known.astype(int), [0]])))
-    found = [
-        (first, min(first + MOST_TRIAL_STEPS, int(end) - 1))
-        for begin, end in zip(edges[::2], edges[1::2], strict=True)
-        for first in range(int(begin), int(end) - FEWEST_STEPS, MOST_TRIAL_STEPS)
-    ]
-    if not found:
-        raise LogError(
-            f"No stretch of {FEWEST_STEPS} steps has commands and all that was seen. Choose a longer step_s, or leave "
-            "out a part of the mapping."
-        )
-    return found
 
 
 def path_headings(xy: Floats, forward: Floats) -> Floats:

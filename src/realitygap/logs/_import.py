@@ -10,12 +10,13 @@ from realitygap.errors import LogError
 from realitygap.records import TrialRecord, write_observations
 from realitygap.world import RobotModel, load_robot, robot_names
 
-from ._as_trials import NO_HEADING, head_of, trials_of
+from ._as_trials import NO_HEADING, head_of, trial_of
 from ._clock_offset import ClockOffset
 from ._guess import guess_log_map
+from ._log import Log
 from ._log_map import LogMap, load_log_map
 from ._mistakes import Mistake, diagnose
-from ._read import Log, read_logs
+from ._read import read_logs
 
 MOST_DIAGNOSED = 20
 """Trials of a log that are searched for mistakes; those after them have the same."""
@@ -30,7 +31,7 @@ class ImportReport:
         n_steps: Their steps.
         step_s: Length of a step [s].
         observe: Observation level of the trials.
-        notes: Notes on changes to the rows of the first trial.
+        notes: Notes on changes to the rows.
         mistakes: Mistakes that contradict the mapping, one of each kind.
         offset: Delay of poses after commands in the longest trial; None if the log does not show it.
     """
@@ -124,10 +125,8 @@ class _Found:
         seen = [
             name for name in parts if len(getattr(first, name)) and (name != "commands" or first.has_commands)
         ]
-        notes = list(first.notes)
-        if len(first.poses) and not first.has_heading:
-            notes.append(NO_HEADING)
-        self.report = ImportReport(step_s=first.step_s, observe=", ".join(seen), notes=tuple(notes))
+        notes = (NO_HEADING,) if len(first.poses) and not first.has_heading else ()
+        self.report = ImportReport(step_s=first.step_s, observe=", ".join(seen), notes=notes)
         self._n, self._longest = 0, 0
 
     def look(self, log: Log) -> None:
@@ -135,6 +134,7 @@ class _Found:
         self._n += 1
         if self._n > MOST_DIAGNOSED:
             return
+        self.report = replace(self.report, notes=tuple(dict.fromkeys(self.report.notes + log.notes)))
         diagnosis = diagnose(log, self._speed, self._track)
         known = {mistake.kind for mistake in self.report.mistakes}
         more = tuple(mistake for mistake in diagnosis.mistakes if mistake.kind not in known)
@@ -156,8 +156,8 @@ def _trials(first: Log, rest: Iterator[Log], log_map: LogMap, found: _Found) -> 
     log: Log | None = first
     while log is not None:
         found.look(log)
-        for trial in trials_of(log, log_map, number):
-            found.count(trial)
-            number += 1
-            yield trial
+        trial = trial_of(log, log_map, number)
+        found.count(trial)
+        number += 1
+        yield trial
         log = next(rest, None)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ._clock_offset import ClockOffset, clock_offset
-from ._read import Log
+from ._log import Log
 from ._source import Floats
 
 WINDOW_S = 1.0
@@ -28,6 +28,8 @@ MOST_LATE_S = 0.5
 """A robot's own lag and delay: what follows later is a clock."""
 SCALES = {1000.0: ("millimeters", "mm"), 100.0: ("centimeters", "cm"), 1 / 0.0254: ("inches", "in")}
 LEAST_WAY = 1e-9
+STANDS = 1e-6
+"""Range of headings that do not change [rad or deg]."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +38,7 @@ class Mistake:
 
     Attributes:
         kind: swapped, reversed, left reversed, right reversed, degrees, millimeters, centimeters, inches, unit,
-            half track, double track, clockwise, heading offset, or clock.
+            half track, double track, clockwise, constant heading, heading offset, or clock.
         message: Observation, and the next step.
     """
 
@@ -87,7 +89,7 @@ def diagnose(log: Log, speed: float, track: float) -> Diagnosis:
     found, gain, measured = _compare_wheels(xy, headings, _shifted(ways, shift), log.step_s, track)
     mistakes += found
     if offset is not None and (offset.high < -log.step_s / 4 or offset.low > MOST_LATE_S):
-        mistakes.append(_clock(offset))
+        mistakes.append(_clock(offset, log.wheel_part))
     return Diagnosis(tuple(mistakes), offset, measured, gain)
 
 
@@ -106,11 +108,11 @@ def _begin(log: Log) -> Log:
     )
 
 
-def _clock(offset: ClockOffset) -> Mistake:
+def _clock(offset: ClockOffset, wheels: str) -> Mistake:
     when = "before" if offset.seconds < 0 else "after"
     return Mistake(
         "clock",
-        f"Poses come {abs(offset.seconds):.2f} s ({abs(offset.low):.2f} to {abs(offset.high):.2f}) {when} the commands "
+        f"Poses come {abs(offset.seconds):.2f} s ({abs(offset.low):.2f} to {abs(offset.high):.2f}) {when} the {wheels} "
         f"that they follow: the clocks differ. Set poses.offset_s = {-offset.seconds:.2f}.",
     )
 
@@ -156,6 +158,14 @@ def _checked_headings(
     path = np.arctan2(steps[moves, 1], steps[moves, 0])
     if np.abs(np.exp(1j * path).mean()) > CLEAR:
         return headings, []  # one direction all along: any heading that stays agrees
+    if np.ptp(raw[:-1][moves]) < STANDS:
+        return headings * math.nan, [
+            Mistake(
+                "constant heading",
+                "Headings never change, but the path turns: the column is no heading. Leave poses.heading out of the "
+                "mapping, or name another column.",
+            )
+        ]
     fits = {}
     for unit, factor in (("rad", 1.0), ("deg", math.pi / 180)):
         for sign in (1, -1):
@@ -232,7 +242,7 @@ def _compare_wheels(
         mistakes += [kind] if kind is not None else []
     gain = float(np.abs(forward).sum())
     spin = float(np.abs(round_).sum() / 2)
-    measured = 1 / spin if gain > GAINS else gain / spin
+    measured = math.nan if spin == 0 else (1 if gain > GAINS else gain) / spin
     if sure_forward:
         mistakes += _scale(gain)
     if (
@@ -256,7 +266,7 @@ def _slopes(wheels: Floats, values: Floats) -> tuple[Floats | None, bool]:
     weight = 1 / np.maximum(1, np.abs(off) / (3 * np.median(np.abs(off)) + 1e-12))
     slopes = np.linalg.lstsq(x * weight[:, None], y * weight, rcond=None)[0]
     off = (y - x @ slopes) * weight
-    errors = np.sqrt(np.diag(np.linalg.inv(x.T @ x)) * (off @ off) / max(len(y) - 2, 1))
+    errors = np.linalg.norm(np.linalg.pinv(x), axis=1) * math.sqrt(off @ off / max(len(y) - 2, 1))
     return slopes, bool((np.abs(slopes) > SURE * errors).all())
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
@@ -13,66 +12,28 @@ from realitygap.errors import LogError
 from realitygap.world import RobotModel
 
 from ._convert import Convert, converter
+from ._log import Log
 from ._log_map import LogMap, Part, WheelPart
 from ._open import open_source
 from ._resample import Grid, Held, HeldMean, Interpolated
 from ._rows import ADVICE, OF_INCREMENTS, RowChecker
 from ._source import RECORDED, Floats, Source, check_columns
+from ._stretches import FEWEST_STEPS, stretches_of
 from ._units import TIMES, unit_factor
 
 REGULAR = 0.25
 """Share by which most intervals may differ from their median if the step is estimated from them."""
 SAME_STEP = 0.01
 """Share by which the mean of intervals may differ from their median if no row is missing."""
-FEWEST_STEPS = 2
-
-
-@dataclass(frozen=True)
-class Log:
-    """One trial of n steps from a log.
-
-    Attributes:
-        name: Name within its file; empty if it is the only trial.
-        start_s: Time of its start, by the log's clock [s].
-        step_s: Length of a step [s].
-        commands: (n, 2) left and right wheel during each step, as shares of full speed. If the log has no commands,
-            the speeds of the encoders, which are no commands: see `has_commands`.
-        poses: (n + 1, 3) x [m], y [m], heading [rad] at the start of each step and at the end; nan if unknown, and in
-            the third column if the log has no headings. No rows if it has no poses.
-        wheels: (n + 1, 2) distance of the left and the right wheel since the start [m]; nan if unknown. No rows if the
-            log has none.
-        readings: (n + 1, s) reading of each range sensor, 0 to 1; nan if unknown. No rows if the log has none.
-        raw_headings: (n + 1,) headings before full turns were counted [rad]; as many rows as poses.
-        notes: Notes on changes to the rows.
-        has_commands: False if the log has encoders and no commands.
-    """
-
-    name: str
-    start_s: float
-    step_s: float
-    commands: Floats
-    poses: Floats
-    wheels: Floats
-    readings: Floats
-    raw_headings: Floats
-    notes: tuple[str, ...] = ()
-    has_commands: bool = True
-
-    @property
-    def time_s(self) -> Floats:
-        """Times of the steps, from 0, (n + 1,) [s]."""
-        return np.arange(len(self.commands) + 1, dtype=np.float64) * self.step_s
-
-    @property
-    def has_heading(self) -> bool:
-        """True if headings were measured."""
-        return bool(len(self.poses)) and bool(np.isfinite(self.poses[:, 2]).any())
 
 
 def read_logs(
     path: str | Path, log_map: LogMap, robot: RobotModel, *, drop_bad_rows: bool = False
 ) -> Iterator[Log]:
     """Yield the trials of a log, one at a time.
+
+    A trial is a stretch of the log, or of the rows with one value in the mapping's `trial`. It ends where something is
+    unknown for longer, and where a person carried the robot.
 
     The file is read in parts: memory holds one trial, not the file.
 
@@ -88,18 +49,34 @@ def read_logs(
     """
     path = Path(path)
     streams = _streams(path, log_map, robot, drop=drop_bad_rows)
-    if log_map.trial:
-        yield from _read_table(streams, log_map)
-    else:
-        assembler = _Assembler(streams, log_map)
-        for group in _groups(streams):
-            assembler.read(group)
-        log = assembler.finish("")
-        if log is None:
-            raise LogError(
-                f"{path} has fewer than {FEWEST_STEPS} steps. Expected a robot that drives for longer."
-            )
-        yield log
+    speed, track = _speed_and_track(log_map, robot)
+    has_trial = False
+    for log in _read_table(streams, log_map) if log_map.trial else _read_whole(path, streams, log_map):
+        for stretch in stretches_of(log, speed, track):
+            has_trial = True
+            yield stretch
+    if not has_trial:
+        raise LogError(
+            f"{path}: no stretch of {FEWEST_STEPS} steps has commands and all that was seen. Choose a longer step_s, "
+            "or leave out a part of the mapping."
+        )
+
+
+def _read_whole(path: Path, streams: list[_Stream], log_map: LogMap) -> Iterator[Log]:
+    """Yield all rows of a log."""
+    assembler = _Assembler(streams, log_map)
+    for group in _groups(streams):
+        assembler.read(group)
+    log = assembler.finish("")
+    if log is None:
+        raise LogError(
+            f"{path} has fewer than {FEWEST_STEPS} steps. Expected a robot that drives for longer."
+        )
+    yield log
+
+
+def _speed_and_track(log_map: LogMap, robot: RobotModel) -> tuple[float, float]:
+    return log_map.speed or robot.drive.speed, log_map.track or robot.drive.track
 
 
 class _Stream:
@@ -280,7 +257,7 @@ def _step_of(stream: _Stream, times: Floats) -> float:
 
 def _streams(path: Path, log_map: LogMap, robot: RobotModel, *, drop: bool) -> list[_Stream]:
     """Return the parts of the mapping with their sources; the one that lays the grid first."""
-    speed, track = log_map.speed or robot.drive.speed, log_map.track or robot.drive.track
+    speed, track = _speed_and_track(log_map, robot)
     sources: dict[Path, Source] = {}
     streams = []
     for name, part in log_map.parts.items():

@@ -11,7 +11,7 @@ import numpy as np
 
 from realitygap.errors import RecordError
 from realitygap.evolution import Genome
-from realitygap.logs import head_of, mapping_of, read_logs, robot_of, trials_of
+from realitygap.logs import head_of, mapping_of, read_logs, robot_of, trial_of
 from realitygap.records import (
     OBSERVATIONS,
     Observations,
@@ -116,7 +116,5 @@ def _imported(path: str | Path) -> Observations:
     log_map, _ = mapping_of(path)
     name, robot = robot_of(log_map)
     logs = list(read_logs(path, log_map, robot))
-    trials: list[TrialRecord] = []
-    for log in logs:
-        trials += trials_of(log, log_map, len(trials))
-    return Observations(head_of(path, log_map, name, logs[0]), tuple(trials))
+    trials = tuple(trial_of(log, log_map, number) for number, log in enumerate(logs))
+    return Observations(head_of(path, log_map, name, logs[0]), trials)

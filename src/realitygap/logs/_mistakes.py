@@ -28,6 +28,10 @@ MOST_LATE_S = 0.5
 """A robot's own lag and delay: what follows later is a clock."""
 SCALES = {1000.0: ("millimeters", "mm"), 100.0: ("centimeters", "cm"), 1 / 0.0254: ("inches", "in")}
 LEAST_WAY = 1e-9
+LEAST_BEND = 0.1
+"""Change of direction below which a path counts as straight [rad]."""
+CLEAR_BEND = 5.0
+"""Factor by which a change of direction has to exceed the noise of one."""
 STANDS = 1e-6
 """Range of headings that do not change [rad or deg]."""
 
@@ -156,9 +160,7 @@ def _checked_headings(
     if moves.sum() < FEWEST_WINDOWS:
         return headings, []
     path = np.arctan2(steps[moves, 1], steps[moves, 0])
-    if np.abs(np.exp(1j * path).mean()) > CLEAR:
-        return headings, []  # one direction all along: any heading that stays agrees
-    if np.ptp(raw[:-1][moves]) < STANDS:
+    if np.ptp(raw[:-1][moves]) < STANDS and _bends(steps[moves]):
         return headings * math.nan, [
             Mistake(
                 "constant heading",
@@ -166,6 +168,8 @@ def _checked_headings(
                 "mapping, or name another column.",
             )
         ]
+    if np.abs(np.exp(1j * path).mean()) > CLEAR:
+        return headings, []  # one direction all along: any heading that stays agrees
     fits = {}
     for unit, factor in (("rad", 1.0), ("deg", math.pi / 180)):
         for sign in (1, -1):
@@ -204,6 +208,17 @@ def _checked_headings(
             )
         )
     return headings, mistakes
+
+
+def _bends(steps: Floats) -> bool:
+    """Return whether the direction of a path changes by more than its noise, in `FEWEST_WINDOWS` parts of it."""
+    chords = np.stack([part.sum(0) for part in np.array_split(steps, FEWEST_WINDOWS)])
+    direction = np.unwrap(np.arctan2(chords[:, 1], chords[:, 0]))
+    # the noise of a position is in two steps, with opposite signs
+    noise = float(np.median(np.hypot(*np.diff(steps, axis=0).T))) / float(
+        np.median(np.hypot(*chords.T)) or 1.0
+    )
+    return float(np.ptp(direction)) > max(LEAST_BEND, CLEAR_BEND * noise)
 
 
 def _compare_wheels(

@@ -32,7 +32,7 @@ Bools = NDArray[np.bool_]
 
 
 def stretches_of(log: Log, speed: float, track: float) -> Iterator[Log]:
-    """Yield the stretches of a log that are trials, the times of which begin anew.
+    """Yield the trials of a log: its stretches in which everything is known.
 
     A stretch ends if a command, pose, encoder, or reading is unknown, and if the poses move faster than the wheels
     could: a person carried the robot.
@@ -78,7 +78,7 @@ def _cut(log: Log, first: int, last: int, number: int) -> Log:
 
 
 def _runs(is_in: Bools, least: int) -> list[tuple[int, int]]:
-    """Return the first row and the end of each run of at least so many rows."""
+    """Return the first row and the end of each run of at least `least` rows."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], is_in.astype(int), [0]])))
     pairs = zip(edges[::2], edges[1::2], strict=True)
     return [(int(begin), int(end)) for begin, end in pairs if end - begin >= least]
@@ -126,7 +126,7 @@ def _is_too_far(moved: Floats, reach: Floats, noise: float) -> Bools:
 
 
 def _widest(values: Floats, reach: int, width: int) -> Floats:
-    """Return the largest value in each window and so many rows before and after it."""
+    """Return the largest value in each window and in `reach` rows before and after it."""
     padded = np.concatenate([np.zeros(reach), values, np.zeros(reach)])
     return np.asarray(np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + width).max(1))
 

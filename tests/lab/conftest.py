@@ -65,18 +65,22 @@ class RunningLab:
     Args:
         root: The folder.
         is_forking: Whether its child processes are forked instead of new Pythons.
+        limits: Limits of its process, such as `resource.RLIMIT_NOFILE`, and their values.
     """
 
-    def __init__(self, root: Path, *, is_forking: bool = True) -> None:
+    def __init__(self, root: Path, *, is_forking: bool = True, limits: dict[int, int] | None = None) -> None:
         self.root = root
         self._is_forking = is_forking
+        self._limits = limits
         self.address = ""
         self.token = ""
         self._port = 0
         self._process: BaseProcess | None = None
 
     def start(self) -> None:
-        self._process, printed = begin(self.root, self._port, is_forking=self._is_forking)
+        self._process, printed = begin(
+            self.root, self._port, is_forking=self._is_forking, limits=self._limits
+        )
         self.address, _, self.token = printed.partition("?token=")
         self._port = int(self.address.rstrip("/").rpartition(":")[2])
 
@@ -101,9 +105,14 @@ class RunningLab:
         """Have its pages change before whoever enters a count hears of it."""
         self._get("slow-counts")
 
-    def _get(self, path: str) -> bytes:
+    def post(self, path: str) -> bytes:
+        """Send a request without a body; the answer."""
+        return self._get(path, method="POST")
+
+    def _get(self, path: str, method: str = "GET") -> bytes:
         cookie = f"{self.cookie['name']}={self.token}"
-        with urlopen(Request(self.address + path, headers={"Cookie": cookie})) as answer:
+        request = Request(self.address + path, headers={"Cookie": cookie}, method=method)
+        with urlopen(request, timeout=PATIENCE_MS / 1000) as answer:
             content: bytes = answer.read()
             return content
 

@@ -6,7 +6,9 @@ import asyncio
 import contextlib
 import faulthandler
 import os
+import resource
 import sys
+import threading
 import time
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
@@ -30,24 +32,39 @@ LOG = "lab.log"
 """What a lab says to its terminal, beside its folder."""
 
 BEAT_S = 0.01
-_lags = [0.0]
+
+
+class _Beats:
+    """Measures how late the event loop is, by beats of another thread: they stop when the whole process pauses."""
+
+    n = 0
+    """Beats of the thread."""
+    most_late = 0
+    """The most beats between two of the event loop."""
+
+    def count(self) -> None:
+        while True:
+            time.sleep(BEAT_S)
+            self.n += 1
+
+
+_beats = _Beats()
 
 
 @app.on_startup
 async def _beat() -> None:
-    """Measure how late the event loop is."""
+    threading.Thread(target=_beats.count, daemon=True).start()
     while True:
-        began = time.monotonic()
+        began = _beats.n
         await asyncio.sleep(BEAT_S)
-        _lags.append(time.monotonic() - began - BEAT_S)
+        _beats.most_late = max(_beats.most_late, _beats.n - began - 1)
 
 
 @app.get("/lag")
 async def lag() -> float:
     """The most that the event loop was late since this was asked last [s]."""
-    most = max(_lags)
-    _lags[:] = [0.0]
-    return most
+    late, _beats.most_late = _beats.most_late, 0
+    return late * BEAT_S
 
 
 @ui.page("/broken")
@@ -74,8 +91,10 @@ async def slow_counts() -> None:
     Counts.score = score_slowly  # type: ignore[method-assign]
 
 
-def serve(root: Path, port: int, told: Connection, is_forking: bool) -> None:
+def serve(root: Path, port: int, told: Connection, is_forking: bool, limits: dict[int, int]) -> None:
     """Serve the lab of a folder; say its address."""
+    for limit, value in limits.items():
+        resource.setrlimit(limit, (value, value))
     os.environ.pop("PYTEST_CURRENT_TEST", None)  # of which NiceGUI thinks that it is under test itself
     sys.stdout = sys.stderr = (root.parent / LOG).open("a", buffering=1, encoding="utf-8")
     os.dup2(sys.stderr.fileno(), 2)
@@ -92,17 +111,20 @@ def serve(root: Path, port: int, told: Connection, is_forking: bool) -> None:
         open_lab(root, port=port, show=False, tell=tell)
 
 
-def begin(root: Path, port: int, *, is_forking: bool = True) -> tuple[BaseProcess, str]:
+def begin(
+    root: Path, port: int, *, is_forking: bool = True, limits: dict[int, int] | None = None
+) -> tuple[BaseProcess, str]:
     """Begin to serve; the process, and its address.
 
     Args:
         root: The lab's folder.
         port: Of the lab.
         is_forking: Whether the lab's child processes are forked; a new Python takes seconds of a processor.
+        limits: Limits of the process, such as `resource.RLIMIT_NOFILE`, and their values.
     """
     context = fork_context()
     here, there = context.Pipe(duplex=False)
-    process = context.Process(target=serve, args=(root, port, there, is_forking))
+    process = context.Process(target=serve, args=(root, port, there, is_forking, limits or {}))
     process.start()
     there.close()
     try:

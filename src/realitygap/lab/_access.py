@@ -10,6 +10,7 @@ from typing import Any
 from urllib.parse import parse_qsl, quote, urlencode, urlsplit
 
 from ._frames import checked
+from ._strangers import SHOWN
 
 Scope = MutableMapping[str, Any]
 Receive = Callable[[], Awaitable[MutableMapping[str, Any]]]
@@ -93,6 +94,7 @@ class Access:
             await self._http(scope, receive, send)
         elif scope["type"] == "websocket":
             if self._is_known_host(scope) and self._has_token(scope) and self._is_own(scope):
+                _note_shown(scope)
                 await self.app(scope, checked(receive, send), send)
             else:
                 await receive()
@@ -108,10 +110,16 @@ class Access:
             return
         given = self._given_token(scope)
         if given is not None and _same(given, self._token):
+            _note_shown(scope)
             await self._let_in(scope, send)
         elif not self._has_token(scope):
             await self._stop(scope, send, is_wrong=given is not None)
-        elif scope["method"] not in ("GET", "HEAD", "OPTIONS") and not self._is_own(scope):
+        else:
+            _note_shown(scope)
+            await self._act(scope, receive, send)
+
+    async def _act(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["method"] not in ("GET", "HEAD", "OPTIONS") and not self._is_own(scope):
             await _refuse(send, 403, "A page from elsewhere cannot act here.")
         elif scope["path"].startswith(_TALK):
             await _refuse(send, 400, "Pages talk to the lab over a websocket.")
@@ -160,6 +168,13 @@ class Access:
             "The token is not the one of this lab." if is_wrong else "This browser does not have it yet."
         )
         await _answer(send, 403, _WALL.format(message=message, path=html.escape(_path(scope))))
+
+
+def _note_shown(scope: Scope) -> None:
+    """Report that the connection of a request has shown the token."""
+    shown = scope.get("state", {}).get(SHOWN)
+    if shown is not None:
+        shown()
 
 
 def _same(one: str, other: str) -> bool:

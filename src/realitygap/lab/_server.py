@@ -160,6 +160,7 @@ def _prepare(root: Path, token: str, port: int, *, is_local: bool, allow_code: b
     from nicegui import run, ui
 
     from ._lab import Lab
+    from ._strangers import Strangers, guarded_protocol, most_strangers
     from .pages import add_pages
 
     lab = Lab(root, allow_code=allow_code)
@@ -182,8 +183,11 @@ def _prepare(root: Path, token: str, port: int, *, is_local: bool, allow_code: b
     logging.getLogger("uvicorn.error").addFilter(_is_news)
     for name in ("nicegui", "asyncio", "uvicorn.error", "engineio.server", "socketio.server"):
         logging.getLogger(name).addFilter(_in_one_line)
+    most = most_strangers()
     config = uvicorn.Config(
         Access(app, token, port=port, is_local=is_local),
+        http=guarded_protocol(Strangers(most)),
+        backlog=most,  # so many are accepted together, before the first of them can be closed
         log_level="warning",
         access_log=False,
         ws_max_size=2**20,

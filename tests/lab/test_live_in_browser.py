@@ -1,4 +1,4 @@
-"""A network of a study drives a robot that whoever watches sees, 20 times a second; in a real browser."""
+"""A network of a study drives a robot that each visitor sees move smoothly; in a real browser."""
 
 from __future__ import annotations
 
@@ -23,19 +23,20 @@ steps = 400
 name = "coverage-10"
 """
 
-FRAMES = """seconds => new Promise((done) => {
-  const robot = document.querySelector('.rg-robot');
-  const seen = new Set(), began = performance.now();
+WATCH_FRAMES = """() => {
+  const moves = [];
+  let before = null;
   const look = () => {
-    seen.add(robot.getAttribute('transform'));
-    performance.now() - began < 1000 * seconds ? requestAnimationFrame(look) : done(seen.size / seconds);
+    const place = document.querySelector('.rg-robot')?.getAttribute('transform') ?? null;
+    moves.push(place !== before);
+    before = place;
+    if (moves.length > 60) moves.shift();
+    window.isSmooth = moves.filter((moved) => moved).length >= 30;
+    if (!window.isSmooth) requestAnimationFrame(look);
   };
   look();
-})"""
-"""Places a second at which the robot is drawn."""
-
-MOST_LOOKS = 8
-"""Looks of 2 s, of which one must see all places: other tests on the machine make a browser skip some."""
+}"""
+"""Sets `isSmooth` when the robot was drawn at another place in half of 60 frames. A slow browser has fewer frames."""
 
 PLATFORMS = {"": "SIM", "sim": "SIM", "twin:worn.toml": "TWIN", "scribbler:emulator://s2?fluke=2": "EMULATED"}
 """What a network drives on, and the label of each."""
@@ -48,16 +49,14 @@ def test_a_network_drives_live_and_can_be_played_when_it_is_stopped(lab, visit):
         page = visit("study/seen", size=PHONE)
         page.get_by_role("tab", name="Replay").click()
         page.get_by_label("Platform", exact=True).fill(platform)
+        page.evaluate(WATCH_FRAMES)
         page.get_by_role("button", name="Drive live").click()
         live = page.locator(".rg-live")
         live.wait_for()
         assert live.locator(".rg-label").text_content() == label
         page.wait_for_function("() => /step [2-9]/.test(document.querySelector('.rg-clock').textContent)")
         expect(live.locator(".rg-ray")).to_have_count(3)
-        rates = []
-        while not rates or (rates[-1] < 20 and len(rates) < MOST_LOOKS):
-            rates.append(page.evaluate(FRAMES, 2))
-        assert rates[-1] >= 20, f"{rates} places a second on {platform!r}"
+        page.wait_for_function("() => window.isSmooth")
         if not platform:  # who comes later sees the line from its beginning
             later = visit("study/seen")
             later.get_by_role("tab", name="Replay").click()

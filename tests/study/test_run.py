@@ -1,12 +1,9 @@
 """Carrying out a study: the same results whatever happens on the way."""
 
-import os
 import random
-import signal
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import polars as pl
 import pytest
@@ -73,9 +70,17 @@ def test_a_study_interrupted_by_ctrl_c_goes_on(study, undisturbed, tmp_path):
     assert result.folder.digest() == undisturbed.digest()
 
 
-def run_command(study_file: Path, out: Path, *more: str, **options) -> subprocess.Popen:
-    command = [sys.executable, "-m", "realitygap", "run", str(study_file), "--out", str(out), *more]
-    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options)
+ASKING = """
+import sys
+from realitygap.study import load_study, run_study
+
+def ask(progress):
+    print("chunk", flush=True)
+    sys.stdin.readline()
+
+run_study(load_study(sys.argv[1]), sys.argv[2], chunk=1, threads=2, tell=ask)
+"""
+"""A study that waits for an answer after each chunk, so that it cannot end before it is killed."""
 
 
 @pytest.mark.slow
@@ -84,20 +89,17 @@ def test_a_study_killed_at_any_moment_goes_on(study, undisturbed, tmp_path):
     path.write_text(SMALL)
     out = tmp_path / "r"
     rng = random.Random(5)
-    kills = 0
     for _ in range(4):
-        process = run_command(path, out, "--chunk", "1", "--threads", "2")
-        until = time.monotonic() + 60
-        wanted = len(list(out.glob("trials/*.parquet"))) + rng.randint(1, 3)
-        while process.poll() is None and time.monotonic() < until:
-            if len(list(out.glob("trials/*.parquet"))) >= wanted:
-                os.kill(process.pid, signal.SIGKILL)
-                kills += 1
-                break
-            time.sleep(0.0005)
-        process.communicate()
-    assert kills >= 2  # the others may have ended before they were killed
+        command = [sys.executable, "-c", ASKING, str(path), str(out)]
+        with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
+            for _ in range(rng.randint(1, 3)):
+                assert process.stdout.readline() == "chunk\n"
+                process.stdin.write("go on\n")
+                process.stdin.flush()
+            time.sleep(rng.uniform(0.0, 0.01))
+            process.kill()
     result = run_study(study, out)
+    assert 0 < result.n_computed < result.n_runs
     assert result.folder.digest() == undisturbed.digest()
     assert not list(out.glob("trials/*.tmp")), "what the killed runs left half written is removed"
 

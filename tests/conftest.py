@@ -48,19 +48,23 @@ def pytest_xdist_auto_num_workers() -> int | None:
 
 
 def pytest_sessionstart(session: pytest.Session) -> None:
-    """Compile the most used kernels before several processes start, each of which would compile them."""
+    """Compile once what several processes would each compile: the most used kernels, and the byte code of the tests."""
     config = session.config
     is_controller = config.getoption("numprocesses", None) and not hasattr(config, "workerinput")
     if not is_controller or config.option.collectonly:
         return
     began = time.monotonic()
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
     command = [sys.executable, "-m", "tests.warm"]
+    collect = [sys.executable, "-m", "pytest", "--collect-only", "-q", "-p", "no:cacheprovider", *config.args]
+    collecting = subprocess.Popen(collect, cwd=config.invocation_params.dir, stdout=subprocess.DEVNULL)
     parts = [subprocess.Popen([*command, part], cwd=config.rootpath) for part in PARTS]
     failed = [name for name, part in zip(PARTS, parts, strict=True) if part.wait()]
     if failed:
         raise pytest.UsageError(f"Kernels could not be compiled: run {' '.join(command)} {failed[0]}")
+    collecting.wait()  # its errors are those of the tests themselves
     if (seconds := time.monotonic() - began) > 10:
-        session.config.get_terminal_writer().line(f"kernels ready after {seconds:.0f} s")
+        session.config.get_terminal_writer().line(f"kernels and tests compiled after {seconds:.0f} s")
 
 
 @pytest.fixture(autouse=True)

@@ -171,6 +171,7 @@ def test_fewer_independent_readings_widen_intervals():
     assert width(rows) > 0.8 * width(read)
 
 
+@pytest.mark.slow
 def test_a_battery_that_varied_is_told_from_distance():
     truth = {"amplitude": 1.0, "decay": 0.2, "noise_gain": 0.03, "drop_most": 0.0, "outlier_most": 0.0}
     read = placements(

@@ -34,6 +34,7 @@ def files(tmp_path):
     return tmp_path
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("on", ["sim", "twin", "scribbler:emulator://s2?fluke=2&speed=off"])
 def test_controller_of_single_sensors_drives_wherever_they_are(files, on):
     on = f"twin:{files / 'same.toml'}" if on == "twin" else on
@@ -41,6 +42,7 @@ def test_controller_of_single_sensors_drives_wherever_they_are(files, on):
     assert len(json.loads(out)["coverage"]) == 1
 
 
+@pytest.mark.slow
 def test_controller_that_sees_light_drives_where_light_is_and_is_refused_elsewhere(files):
     for on in ("sim", "scribbler:emulator://s2?fluke=2&arena=light&speed=off"):
         assert "mean coverage" in tried(files / "lights.json", "--on", on, "--arena", "light", "--steps", 5)

@@ -24,6 +24,7 @@ THEMES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("system", "body", "is_dark"), THEMES.values(), ids=THEMES)
 def test_a_card_follows_the_theme_and_can_be_read_in_a_notebook(browser, system, body, is_dark):  # noqa: F811
     card = Card("title", ["SIM"], "lead", "warning", [Table(["a", "b"], [["1", "2"], ["3", "4"]])], ["code"])

@@ -185,7 +185,9 @@ def test_a_pickle_in_a_checkpoint_is_never_opened(tmp_path):
         Population.load(path)
 
 
-@pytest.mark.parametrize("kind", ["threads-1", "threads-3", "processes-1", "processes-2"])
+@pytest.mark.parametrize(
+    "kind", ["threads-1", "threads-3", "processes-1", pytest.param("processes-2", marks=pytest.mark.slow)]
+)
 def test_any_number_of_workers_finds_the_same(kind):
     alone, shared = new_population(), new_population()
     name, n_workers = kind.split("-")

@@ -109,6 +109,7 @@ def test_module_in_the_labs_folder_is_not_run(root):
     assert not (root / "marker").exists()
 
 
+@pytest.mark.slow
 def test_child_processes_do_not_look_for_modules_in_the_current_folder():
     sources = Path(realitygap.__file__).parent.rglob("*.py")
     launches = [

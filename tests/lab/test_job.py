@@ -70,6 +70,7 @@ raise SystemExit(_work.main())
 """
 
 
+@pytest.mark.slow
 def test_process_interrupted_while_it_reports_a_failure_prints_no_traceback(tmp_path):
     order = json.dumps({"work": "robot", "port": str(tmp_path / "no-such-port")})
     with subprocess.Popen(

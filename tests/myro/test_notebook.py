@@ -4,6 +4,8 @@ import nbclient
 import nbformat
 import pytest
 
+pytestmark = pytest.mark.slow
+
 CELLS = {
     "open": "from realitygap.myro import *\ninitialize('sim', speed=5, start='center')",
     "drive": "forward(0.3, 5)",

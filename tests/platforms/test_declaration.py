@@ -128,6 +128,7 @@ def test_commands_of_wheels_are_within_their_limits_and_turn_back_into_them(outp
     np.testing.assert_allclose([move - turn, move + turn], [left, right], atol=1e-15)
 
 
+@pytest.mark.slow
 def test_environment_of_wheels_takes_wheel_speeds():
     wheels = gymnasium.make(
         "realitygap.gym:realitygap/Avoid-v0", controller={"outputs": ["left", "right"]}, dtype="float64"
@@ -361,7 +362,10 @@ SEES = ControllerInterface(("range.0", "range.2", "encoder.0", "time"), ("left",
 SEES_WEIGHTS = np.array([[-0.5, 0.25, 0.125, 0.25], [0.25, -0.5, 0.25, 0.25]])
 
 
-@pytest.mark.parametrize("platform", ["jyro", "sim", "close.toml", "seeing.toml"])
+@pytest.mark.parametrize(
+    "platform",
+    ["jyro", "sim", *(pytest.param(twin, marks=pytest.mark.slow) for twin in ("close.toml", "seeing.toml"))],
+)
 def test_networks_driven_through_the_environment_are_their_trials(platform, files):
     names = [name for name in SEES.inputs if platform != "jyro" or name != "encoder.0"]
     if platform == "seeing.toml":
@@ -520,6 +524,7 @@ def test_page_lists_the_inputs_of_each_platform():
         assert (on_sim == "arena") == name.startswith("goal_")
 
 
+@pytest.mark.slow
 def test_example_of_wheels_is_a_study():
     study = load_study(PAGE.parents[2] / "examples" / "wheels.toml")
     assert [condition.output_names for condition in study.conditions] == [("left", "right")] * 3

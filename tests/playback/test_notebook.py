@@ -4,6 +4,8 @@ import nbclient
 import nbformat
 import pytest
 
+pytestmark = pytest.mark.slow
+
 CELLS = {
     "trials": "import realitygap\nfrom tests.playback.trials import straight\nrealitygap.watch(straight())",
     "robot": "from realitygap.platforms import JyroRobot\nrobot = realitygap.watch(JyroRobot(), speed=4)\nrobot",

@@ -19,6 +19,8 @@ from .page import PANEL, page_of
 from .test_panel import Driven
 from .test_player_in_browser import PATIENCE_MS, browser, pytestmark  # noqa: F401
 
+pytestmark = [pytestmark, pytest.mark.slow]
+
 PAD = {
     "axes": [0, 0], "buttons": [{"pressed": False}], "connected": True, "id": "Test pad", "index": 0, "mapping": "",
 }  # fmt: skip

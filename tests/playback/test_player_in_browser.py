@@ -83,6 +83,7 @@ def visited(page) -> int:
     )
 
 
+@pytest.mark.slow
 def test_the_slider_goes_through_the_trial(show):
     trial = straight(10)
     page = show(play(trial))

@@ -272,6 +272,7 @@ def test_a_drawing_is_saved_by_its_ending_and_always_alike(tiny_study, tmp_path,
     assert len(list(tmp_path.iterdir())) == 2
 
 
+@pytest.mark.slow
 def test_export_writes_every_figure_and_table(tiny_study, tmp_path):
     page = write_report(tiny_study, tmp_path / "page.html", figures=tmp_path / "figures").read_text("utf-8")
     names = {each.name for each in (tmp_path / "figures").iterdir()}
@@ -316,6 +317,7 @@ def test_a_table_for_latex_escapes_its_texts_and_aligns_numbers():
     ]  # fmt: skip
 
 
+@pytest.mark.slow
 def test_a_page_without_export_names_no_files(tiny_html):
     assert "figures.txt" not in tiny_html
 
@@ -360,6 +362,7 @@ def ancestors_of(rows: pl.DataFrame, generation: int, individual: int) -> set[tu
     return found
 
 
+@pytest.mark.slow
 def test_numbers_of_species_keep_apart_in_a_long_run(tmp_path):
     """Each species had its number at its largest share: hundreds of them lay over each other, and beyond the axes."""
     text = """

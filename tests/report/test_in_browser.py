@@ -240,6 +240,7 @@ def test_letters_do_not_overlap(show):
                 assert max(apart) > -2, (step, one, other)
 
 
+@pytest.mark.slow
 def test_play_moves_the_robot_and_pause_stops_it(show, trials):
     name, _ = trials("coverage", 2, 0)
     page = show(f"#replay={name}@0")

@@ -123,6 +123,7 @@ def test_json_cannot_end_its_element():
     assert json.loads(text) == {evil: evil}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("most", "generations", "each"), [(24, 3, 8), (23, 3, 7), (5, 3, 1), (2, 2, 1), (1, 1, 1), (0, 0, 0)]
 )
@@ -137,6 +138,7 @@ def test_a_large_run_embeds_the_best_of_each_generation(tiny, most, generations,
         assert sorted(chosen.filter(of)["coverage_line"], reverse=True) == best
 
 
+@pytest.mark.slow
 def test_page_says_what_is_left_out(tiny_study, monkeypatch, tmp_path):
     monkeypatch.setattr(_replay, "MOST_STEPS", 4 * 31 * 6)
     html = write_report(tiny_study, tmp_path / "page.html").read_text("utf-8")

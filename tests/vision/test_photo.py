@@ -175,6 +175,7 @@ def test_a_gray_photo_is_read_with_one_pen_and_refused_with_several():
     assert len(score_sheet(read_photo(gray), LAYOUT, [0]).traces[0].cells) > 5
 
 
+@pytest.mark.slow
 def test_a_sheet_upside_down_is_found():
     image = read_photo(photo(1, SCAN).jpeg)
     turned = find_sheet(np.ascontiguousarray(image[::-1, ::-1]), LAYOUT)

@@ -65,6 +65,7 @@ def test_colors_of_untried_pens_come_from_names_and_that_is_reported():
     assert min(_ious(score)) > 0.9
 
 
+@pytest.mark.slow
 def test_a_pen_whose_name_is_no_color_must_be_tried():
     layout = SheetLayout.of(ARENA, ("mine", "red", "blue"))
     image = read_photo(photo(4, SCAN, n=3, has_key=False).jpeg)

@@ -57,6 +57,7 @@ def _errors(track, film):
     return 1e3 * np.hypot(off[:, 0], off[:, 1]), np.degrees(turned)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("is_lens_known", [True, False])
 def test_poses_are_right_with_the_true_lens_and_with_one_fitted_to_the_tags(film, pictures, is_lens_known):
     marks = Marks(film.arena, RobotTag(), film.camera.lens if is_lens_known else None)

@@ -74,7 +74,7 @@ def guarded_protocol(strangers: Strangers) -> type[asyncio.Protocol]:
         def connection_made(self, transport: asyncio.Transport) -> None:
             super().connection_made(transport)
             strangers.meet(transport)
-            self.app_state = {**self.app_state, SHOWN: partial(strangers.forget, transport)}
+            self.app_state: dict[str, Any] = {**self.app_state, SHOWN: partial(strangers.forget, transport)}
 
         def data_received(self, data: bytes) -> None:
             self.n_heard += len(data)

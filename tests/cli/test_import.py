@@ -91,6 +91,46 @@ def test_import_writes_trials_and_reports_what_it_did(log, tmp_path):
     assert (report["n_steps"], report["step_s"]) == (40, 0.2)
 
 
+def test_several_logs_of_one_robot_are_its_trials(log, tmp_path):
+    """The last one of several counted, in silence."""
+    folder = tmp_path / "runs"
+    folder.mkdir()
+    for number in range(3):
+        write(folder / f"{number}.csv", rows(*drive(60 + number, seed=number)))
+    shared = log.with_name("drive.map.toml")
+    (folder / "notes.md").write_text("no log", "utf-8")
+    out = tmp_path / "trials.jsonl"
+    files = [folder / f"{number}.csv" for number in range(3)]
+    for names in ([folder], [folder / "*.csv"], [folder / "?.csv"], files, [files[0], folder / "[12].csv"]):
+        assert "3 trials, 183 steps" in run("import", *names, "--map", shared, "-o", out)
+        assert [trial.number for trial in read_observations(out).trials] == [0, 1, 2]
+    fit = tmp_path / "fit.toml"
+    data = [word for file in files for word in ("--from", file)]
+    for file in files:  # each with its own mapping
+        file.with_name(f"{file.stem}.map.toml").write_text(MAP, "utf-8")
+    printed = run("calibrate", "motion", *data, "-o", fit, "--step", 0.2)
+    assert load_calibration(fit).trials == 3
+    assert "Steps of 0.2 s." in printed
+    assert "named twice" in refused("import", files[0], folder, "-o", out)
+    assert "No file fits the pattern" in refused("import", folder / "*.parquet", "-o", out)
+    files[1].with_name("1.map.toml").write_text(MAP.replace("pioneer", "thymio"), "utf-8")
+    assert "robot is 'pioneer' in the mapping of" in refused(
+        "calibrate", "motion", "--from", folder, "-o", fit
+    )
+    assert "Expected one, unless" in refused("calibrate", "sensors", *data, "-o", fit)
+    (tmp_path / "empty").mkdir()
+    assert "is a folder without a log" in refused("import", tmp_path / "empty", "-o", out)
+
+
+def test_import_and_calibrate_count_the_same_trials(log, tmp_path):
+    commands, poses = drive(300)
+    poses[60:70] = poses[180:190] = np.nan
+    write(log, rows(commands, poses))
+    assert "3 trials" in run("import", log, "-o", tmp_path / "trials.jsonl")
+    run("calibrate", "motion", "--from", log, "-o", tmp_path / "fit.toml")
+    assert load_calibration(tmp_path / "fit.toml").trials == 3
+
+
 def test_import_reports_likely_mistakes(log, tmp_path):
     commands, poses = drive(300)
     write(log, rows(commands[:, ::-1], poses))

@@ -64,7 +64,9 @@ def _example_of(command: Any) -> str:
 
 
 class _GroupedCommand(TyperCommand):
-    """A command that refuses empty names of files, and whose help lists the options of each mode together.
+    """A command that refuses empty names of files, and two values of an option that takes one.
+
+    Its help lists the options of each mode together.
 
     Options of a mode have the same `rich_help_panel`.
     """
@@ -83,7 +85,21 @@ class _GroupedCommand(TyperCommand):
                 raise typer.BadParameter(
                     f"{option} is empty. Name a file or folder, or leave {option} out.", ctx
                 )
+        self._refuse_second_values(ctx, args)
         return super().parse_args(ctx, args)
+
+    def _refuse_second_values(self, ctx: Any, args: list[str]) -> None:
+        """Raise an error if an option that takes one value has two. Typer takes the last one, and says nothing."""
+        order: list[Any] = self.make_parser(ctx).parse_args(args=list(args))[2]
+        for parameter in order:
+            is_option = parameter.param_type_name == "option"
+            takes_one = is_option and not (parameter.multiple or parameter.is_flag or parameter.count)
+            if takes_one and order.count(parameter) > 1:
+                raise typer.BadParameter(
+                    f"{parameter.opts[0]} is given {order.count(parameter)} times, expected one value. Leave out all "
+                    "but one.",
+                    ctx,
+                )
 
     def format_options(self, ctx: Any, formatter: Any) -> None:
         groups: dict[str, list[tuple[str, str]]] = {"Arguments": [], "Options": []}

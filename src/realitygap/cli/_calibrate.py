@@ -55,11 +55,12 @@ def calibrate(
         ),
     ] = False,
     data: Annotated[
-        Path | None,
+        list[Path] | None,
         typer.Option(
             "--from",
             metavar="DATA",
-            help="Trials, a log of a real robot (motion), or a table of readings (sensors), to fit without driving.",
+            help="Trials, a log of a real robot (motion), or a table of readings (sensors), to fit without driving. "
+            "Several logs of one robot, folders, and patterns such as 'runs/*.csv' are possible.",
         ),
     ] = None,
     map_file: Annotated[
@@ -86,6 +87,14 @@ def calibrate(
             min=1.0,
             metavar="MM",
             help="Radius of a round robot without a file: a table of readings places its sensors.",
+        ),
+    ] = None,
+    step: Annotated[
+        float | None,
+        typer.Option(
+            min=0.001,
+            metavar="SECONDS",
+            help="Length of a step of a log. [default: interval of the commands]",
         ),
     ] = None,
     drop_bad_rows: Annotated[
@@ -153,6 +162,8 @@ def calibrate(
 
     Example: realitygap calibrate motion --from drive.csv --base pioneer -o drive.toml
 
+    Example: realitygap calibrate motion --from run-1.csv --from run-2.csv --map runs.toml -o drive.toml
+
     Example: realitygap calibrate sensors --from wall.sample --base khepera -o wall.toml
 
     Example: realitygap calibrate sensors --from wall.sample --radius-mm 27.5 -o wall.toml
@@ -167,19 +178,19 @@ def calibrate(
 
     out = _checked(what, robot, out, observe, data, witness, camera, figure, choose=choose)
     foreign = _is_foreign(data)
-    if not foreign and any((map_file, hold_out, radius_mm, drop_bad_rows)):
+    if not foreign and any((map_file, hold_out, radius_mm, step, drop_bad_rows)):
         raise StudyError(
-            "--map, --hold-out, --radius-mm and --drop-bad-rows are only for --from with a log or a table of another "
-            "program. Leave them out."
+            "--map, --hold-out, --radius-mm, --step and --drop-bad-rows are only for --from with a log or a table of "
+            "another program. Leave them out."
         )
-    if foreign and data is not None:
+    if foreign and data:
         if figure is not None:
             raise StudyError("--figure draws the readings of trials, but the data are a table. Leave it out.")
         made = _from_foreign(
-            what, data, out, map_file, base, hold_out, seed, radius_mm, drop_bad_rows=drop_bad_rows
+            what, data, out, map_file, base, hold_out, seed, radius_mm, step, drop_bad_rows=drop_bad_rows
         )
-    elif data is not None:
-        made = calibrate_from(what, data, robot=base, observe=_seen(observe), seed=seed)
+    elif data:
+        made = calibrate_from(what, _only_one(data), robot=base, observe=_seen(observe), seed=seed)
     else:
         made = _measured(
             *(what, robot or "", out, observe, budget, base, seed, arena, witness, camera),
@@ -199,7 +210,7 @@ def _checked(
     robot: str | None,
     out: Path | None,
     observe: str | None,
-    data: Path | None,
+    data: list[Path] | None,
     witness: str | None,
     camera: str | None,
     figure: Path | None,
@@ -209,7 +220,7 @@ def _checked(
     """Refuse wrong options before a trial is lost, and return the file for the calibration."""
     from realitygap.records import refuse_links
 
-    if (robot is None) == (data is None):
+    if (robot is None) == (not data):
         raise StudyError(
             "Expected either the robot to measure (--robot PLATFORM) or recorded trials (--from DATA)."
         )
@@ -231,7 +242,7 @@ def _checked(
         raise StudyError(f"--observe is {observe!r}, expected cells, encoders or track.")
     if figure is not None and (what != "sensors" or figure.suffix not in (".svg", ".pdf", ".png")):
         raise StudyError("--figure draws the readings of `calibrate sensors` into a .svg, .pdf or .png.")
-    if data is not None and (witness is not None or camera is not None or choose):
+    if data and (witness is not None or camera is not None or choose):
         raise StudyError("--witness, --camera and --choose are only for --robot. Leave them out with --from.")
     return out
 
@@ -253,22 +264,33 @@ def _refuse_other_files(out: Path) -> None:
         raise StudyError(f"{out} exists and is not a calibration: {stays}")
 
 
-def _is_foreign(data: Path | None) -> bool:
+def _is_foreign(data: list[Path] | None) -> bool:
     """Return whether the data is of another program, or a recording, and not a file of observed trials."""
     from realitygap.records import is_observations
 
-    return data is not None and data.exists() and not is_observations(data)
+    return any(not path.exists() or not is_observations(path) for path in data or ())
+
+
+def _only_one(data: list[Path]) -> Path:
+    """Return the data, of which there has to be one."""
+    if len(data) > 1:
+        raise StudyError(
+            f"--from names {len(data)} files, {data[0]} and others. Expected one, unless motion is fitted to logs of "
+            "another program."
+        )
+    return data[0]
 
 
 def _from_foreign(
     what: str,
-    data: Path,
+    data: list[Path],
     out: Path,
     map_file: Path | None,
     base: str | None,
     hold_out: str | None,
     seed: int,
     radius_mm: float | None,
+    step: float | None,
     *,
     drop_bad_rows: bool,
 ) -> Calibration:
@@ -280,11 +302,19 @@ def _from_foreign(
     if what == "motion":
         share = hold_out_of(hold_out or "0.5")
         return calibrate_from_log(
-            data, map_file=map_file, base=base, hold_out=share, seed=seed, drop_bad_rows=drop_bad_rows
+            data,
+            map_file=map_file,
+            base=base,
+            hold_out=share,
+            seed=seed,
+            step_s=step,
+            drop_bad_rows=drop_bad_rows,
         )
+    if step is not None or drop_bad_rows:
+        raise StudyError("--step and --drop-bad-rows are only for motion. Leave them out.")
     if what == "sensors":
         return calibrate_from_table(
-            data,
+            _only_one(data),
             map_file=map_file,
             base=base,
             hold_out=hold_out_of(hold_out or "blocks"),
@@ -293,7 +323,7 @@ def _from_foreign(
             robot_file=out.with_suffix(".robot.toml"),
         )
     raise StudyError(
-        f"{data} is not a file of observed trials. You can fit motion to a log, and sensors to a table of "
+        f"{data[0]} is not a file of observed trials. You can fit motion to a log, and sensors to a table of "
         f"readings. To fit {what}, import the log first: realitygap import."
     )
 

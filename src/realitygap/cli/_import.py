@@ -13,15 +13,18 @@ import typer
 from realitygap.errors import LogError
 
 if TYPE_CHECKING:
-    from realitygap.logs import ImportReport, LogMap
+    from collections.abc import Sequence
+
+    from realitygap.logs import ImportReport, MappedLog
 
 
 def import_log(
     log: Annotated[
-        Path,
+        list[Path],
         typer.Argument(
-            metavar="LOG",
-            help="Text table, Parquet, MCAP, bag of ROS, LeRobot dataset, or recording; or the folder of its files.",
+            metavar="LOG...",
+            help="Text table, Parquet, MCAP, bag of ROS, LeRobot dataset, or recording; or the folder of its files. "
+            "Several logs of one robot, folders, and patterns such as 'runs/*.csv' are possible.",
         ),
     ],
     out: Annotated[
@@ -71,15 +74,15 @@ def import_log(
 
     Example: realitygap import drive.csv -o trials.jsonl
 
+    Example: realitygap import "runs/*.csv" --map runs.toml -o trials.jsonl
+
     In Python: realitygap.logs.import_log("drive.csv", "trials.jsonl", log_map)
     """
     from realitygap import logs
 
-    log_map, origin = logs.mapping_of(log, map_file)
-    if step is not None:
-        log_map = log_map.model_copy(update={"step_s": step})
+    mapped = logs.mapped_logs(log, map_file, step_s=step)
     if show_map:
-        typer.echo(log_map.to_toml(), nl=False)
+        typer.echo(mapped[0].log_map.to_toml(), nl=False)
         return
     if out is None:
         raise LogError("No file for the trials. Name one: -o trials.jsonl. Or print the mapping: --show-map.")
@@ -87,23 +90,28 @@ def import_log(
         raise LogError(
             f"{out} does not end in .jsonl. Expected the name of a file of trials, such as trials.jsonl."
         )
-    if out.resolve() == log.resolve():
+    if any(out.resolve() == each.path.resolve() for each in mapped):
         raise LogError(f"{out} is the log itself. Name another file.")
-    report = logs.import_log(log, out, log_map, base=base, drop_bad_rows=drop_bad_rows)
+    report = logs.import_logs(mapped, out, base=base, drop_bad_rows=drop_bad_rows)
     if as_json:
         typer.echo(json.dumps({"file": str(out), **dataclasses.asdict(report)}, indent=2))
         return
-    _print(log, out, log_map, origin, report)
+    _print(mapped, out, report)
 
 
-def _print(log: Path, out: Path, log_map: LogMap, origin: str, report: ImportReport) -> None:
+def _print(mapped: Sequence[MappedLog], out: Path, report: ImportReport) -> None:
+    from realitygap.logs import target_of
+
+    log_map = mapped[0].log_map
+    origins = dict.fromkeys(log.origin for log in mapped)
     trials = "1 trial" if report.n_trials == 1 else f"{report.n_trials:,} trials"
     seconds = report.n_steps * report.step_s
+    name = target_of([log.path for log in mapped])
     typer.echo(
-        f"{log} ({log_map.label}): {trials}, {report.n_steps:,} steps, {seconds:.4g} s; {report.observe}"
+        f"{name} ({log_map.label}): {trials}, {report.n_steps:,} steps, {seconds:.4g} s; {report.observe}"
     )
-    typer.echo(f"Mapping: {origin}.")
-    if "guessed" in origin:
+    typer.echo(f"Mapping: {', '.join(origins)}.")
+    if any("guessed" in origin for origin in origins):
         typer.echo("".join(f"  {line}\n" for line in log_map.to_toml().splitlines()), nl=False)
     for note in report.notes:
         typer.echo(note)
@@ -113,6 +121,5 @@ def _print(log: Path, out: Path, log_map: LogMap, origin: str, report: ImportRep
         typer.echo(f"Poses follow {wheels} by {offset}, a robot's lag and delay included.")
     for mistake in report.mistakes:
         typer.echo(f"Check ({mistake.kind}): {mistake.message}")
-    typer.echo(
-        f"Written: {out}. Fit a robot to it: realitygap calibrate motion --from {shlex.quote(str(log))}"
-    )
+    data = " ".join(f"--from {shlex.quote(str(log.path))}" for log in mapped)
+    typer.echo(f"Written: {out}. Fit a robot to it: realitygap calibrate motion {data}")

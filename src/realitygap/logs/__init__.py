@@ -8,12 +8,13 @@ makes an observed trial of one. `write_bag` writes a trial for programs of ROS. 
 from ._as_trials import NO_HEADING, arena_of, head_of, path_headings, trial_of
 from ._clock_offset import ClockOffset, clock_offset
 from ._end_poses import EndPoses, read_end_poses
+from ._files import MappedLog, log_files, mapped_logs, mapping_of
 from ._guess import guess_log_map
-from ._import import ImportReport, import_log, map_beside, mapping_of, robot_of
+from ._import import ImportReport, import_log, import_logs, robot_of, target_of
 from ._log import Log
 from ._log_map import Commands, LogMap, Poses, Readings, TextFormat, Wheels, load_log_map
 from ._mistakes import Diagnosis, Mistake, diagnose
-from ._open import KINDS, open_source
+from ._open import KINDS, map_beside, open_source
 from ._range_table import RangeTable, read_range_table
 from ._read import read_logs
 from ._round_robot import round_robot
@@ -34,6 +35,7 @@ __all__ = [
     "ImportReport",
     "Log",
     "LogMap",
+    "MappedLog",
     "MeasuredFrom",
     "Mistake",
     "Poses",
@@ -50,9 +52,12 @@ __all__ = [
     "guess_log_map",
     "head_of",
     "import_log",
+    "import_logs",
     "load_log_map",
     "load_table_map",
+    "log_files",
     "map_beside",
+    "mapped_logs",
     "mapping_of",
     "open_source",
     "path_headings",
@@ -61,6 +66,7 @@ __all__ = [
     "read_range_table",
     "robot_of",
     "round_robot",
+    "target_of",
     "trial_of",
     "write_bag",
 ]

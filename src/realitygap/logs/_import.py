@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 from pathlib import Path
 
 from realitygap.errors import LogError
@@ -12,9 +13,9 @@ from realitygap.world import RobotModel, load_robot, robot_names
 
 from ._as_trials import NO_HEADING, head_of, trial_of
 from ._clock_offset import ClockOffset
-from ._guess import guess_log_map
+from ._files import MappedLog
 from ._log import Log
-from ._log_map import LogMap, load_log_map
+from ._log_map import LogMap
 from ._mistakes import Mistake, diagnose
 from ._read import read_logs
 
@@ -43,28 +44,6 @@ class ImportReport:
     notes: tuple[str, ...] = ()
     mistakes: tuple[Mistake, ...] = ()
     offset: ClockOffset | None = None
-
-
-def map_beside(path: str | Path) -> Path:
-    """Return the default mapping of a log: LOG.map.toml, or map.toml in a folder."""
-    path = Path(path)
-    return path / "map.toml" if path.is_dir() else path.with_name(f"{path.name.split('.')[0]}.map.toml")
-
-
-def mapping_of(path: str | Path, map_file: str | Path | None = None) -> tuple[LogMap, str]:
-    """Return the mapping of a log, and its origin in words.
-
-    Args:
-        path: The log.
-        map_file: The mapping; that next to the log, or a guess by the names of its columns, if not given.
-
-    Raises:
-        LogError: The mapping has mistakes, or the names of the columns do not say enough.
-    """
-    file = map_beside(path) if map_file is None else Path(map_file)
-    if map_file is not None or file.is_file():
-        return load_log_map(file), str(file)
-    return guess_log_map(path), "guessed by the names of the columns"
 
 
 def robot_of(log_map: LogMap, base: str | None = None) -> tuple[str, RobotModel]:
@@ -108,12 +87,36 @@ def import_log(
         LogError: The log and the mapping do not go together, or a row has a mistake; nothing is written.
         RecordError: The file cannot be written.
     """
-    name, robot = robot_of(log_map, base)
-    logs = read_logs(path, log_map, robot, drop_bad_rows=drop_bad_rows)
-    first = next(logs)
+    return import_logs([MappedLog(Path(path), log_map, "")], out, base=base, drop_bad_rows=drop_bad_rows)
+
+
+def import_logs(
+    logs: Sequence[MappedLog], out: str | Path, *, base: str | None = None, drop_bad_rows: bool = False
+) -> ImportReport:
+    """Write the trials of several logs of one robot into a file of observed trials; see `import_log`.
+
+    Args:
+        logs: The logs, as `mapped_logs` returns them.
+        out: The file to write.
+        base: The robot that drove, by name or file.
+        drop_bad_rows: True to leave out rows with mistakes.
+    """
+    name, robot = robot_of(logs[0].log_map, base)
+    trials = (
+        (trial, log.log_map)
+        for log in logs
+        for trial in read_logs(log.path, log.log_map, robot, drop_bad_rows=drop_bad_rows)
+    )
+    first, log_map = next(trials)
     found = _Found(first, robot)
-    write_observations(out, head_of(path, log_map, name, first), _trials(first, logs, log_map, found))
+    head = head_of(target_of([log.path for log in logs]), log_map, name, first)
+    write_observations(out, head, _trials(chain([(first, log_map)], trials), found))
     return found.report
+
+
+def target_of(paths: Sequence[str | Path]) -> str:
+    """Return the name of logs for reports: that of the log, or of the first one and the number of the others."""
+    return str(paths[0]) if len(paths) == 1 else f"{paths[0]} and {len(paths) - 1} more"
 
 
 class _Found:
@@ -151,13 +154,9 @@ class _Found:
         )
 
 
-def _trials(first: Log, rest: Iterator[Log], log_map: LogMap, found: _Found) -> Iterator[TrialRecord]:
-    number = 0
-    log: Log | None = first
-    while log is not None:
+def _trials(trials: Iterable[tuple[Log, LogMap]], found: _Found) -> Iterator[TrialRecord]:
+    for number, (log, log_map) in enumerate(trials):
         found.look(log)
         trial = trial_of(log, log_map, number)
         found.count(trial)
-        number += 1
         yield trial
-        log = next(rest, None)

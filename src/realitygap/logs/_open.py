@@ -20,6 +20,17 @@ KINDS = (
 )
 
 
+def map_beside(path: str | Path) -> Path:
+    """Return the default mapping of a log: LOG.map.toml, or map.toml in a folder."""
+    path = Path(path)
+    return path / "map.toml" if path.is_dir() else path.with_name(f"{path.name.split('.')[0]}.map.toml")
+
+
+def is_log_folder(path: Path) -> bool:
+    """Return whether a folder is one log: a bag, or a dataset."""
+    return (path / "meta" / "info.json").is_file() or (path / "metadata.yaml").is_file()
+
+
 def open_source(path: Path, text: TextFormat | None = None) -> Source:
     """Return the source of a log.
 

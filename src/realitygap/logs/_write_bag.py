@@ -17,8 +17,8 @@ from realitygap.evolution import Genome
 from realitygap.records import ObservationsHead, TrialRecord, refuse_results, write_whole
 from realitygap.world import Arena, RobotModel, arena_names, load_arena, load_robot
 
-from ._import import map_beside
 from ._log_map import Commands, LogMap, Poses, Readings, Wheels
+from ._open import map_beside
 from ._source import Floats
 
 WHEEL_DIAMETER_MM = 65.0

@@ -20,7 +20,7 @@ from realitygap.calibration import (
     motion_log,
 )
 from realitygap.errors import StudyError
-from realitygap.logs import Diagnosis, Log, LogMap, diagnose, mapping_of, read_logs, robot_of
+from realitygap.logs import Diagnosis, Log, MappedLog, diagnose, mapped_logs, read_logs, robot_of, target_of
 from realitygap.platforms import JyroPlatform
 from realitygap.records import Observe
 from realitygap.world import Calibration, RobotModel
@@ -43,7 +43,7 @@ Floats = NDArray[np.float64]
 
 
 def calibrate_from_log(
-    path: str | Path,
+    path: str | Path | Sequence[str | Path],
     *,
     map_file: str | Path | None = None,
     base: str | Path | None = None,
@@ -52,11 +52,11 @@ def calibrate_from_log(
     step_s: float | None = None,
     drop_bad_rows: bool = False,
 ) -> Calibration:
-    """Fit the drive of a robot to a log of commands, with poses or encoders.
+    """Fit the drive of a robot to logs of commands, with poses or encoders.
 
     Args:
-        path: The log.
-        map_file: Mapping of the log. Default: that next to the log, or a guess by the names of its columns.
+        path: The log; or several logs of one robot, folders of logs, and patterns, the trials of which count alike.
+        map_file: Mapping of all logs. Default: that next to each log, or a guess by the names of its columns.
         base: The robot that drove, by name or file; as the mapping says if not given.
         hold_out: The part that the fit does not see. A share: the end of each trial; a trial that is too short is seen
             wholly. blocks: each trial is cut into four, each is fitted in its first half and predicted in its second,
@@ -69,17 +69,18 @@ def calibrate_from_log(
         StudyError: The log shows too little, or wheels and poses do not go together.
         LogError: The log cannot be read.
     """
-    log_map, origin = mapping_of(path, map_file)
-    if step_s is not None:
-        log_map = log_map.model_copy(update={"step_s": step_s})
+    mapped = mapped_logs(path, map_file, step_s=step_s)
+    path = target_of([each.path for each in mapped])
+    log_map = mapped[0].log_map
     name, robot = robot_of(log_map, None if base is None else str(base))
-    logs, n_logs = _usable(path, log_map, robot, drop_bad_rows=drop_bad_rows)
+    logs, n_logs = _usable(path, mapped, robot, drop_bad_rows=drop_bad_rows)
     longest = max(logs, key=lambda log: len(log.commands))
     diagnosis = diagnose(longest, robot.drive.speed, robot.drive.track)
     _refuse_mistakes(path, diagnosis)
     fit, compared = _fit(path, logs, robot, hold_out, seed)
     rows = dict.fromkeys(note for log in logs for note in log.notes)
-    notes = [f"Mapping: {origin}.", *rows, *_notes(diagnosis), *fit.notes]
+    origins = ", ".join(dict.fromkeys(each.origin for each in mapped))
+    notes = [f"Mapping: {origins}.", *rows, *_notes(diagnosis), *fit.notes]
     if n_logs > 1:
         notes.append(f"The fit uses {len(logs)} of {n_logs} trials.{LEFT_OUT if len(logs) < n_logs else ''}")
     given = {"drive.speed": log_map.speed, "drive.track": log_map.track}
@@ -87,20 +88,24 @@ def calibrate_from_log(
     parts = chosen_parts(parts, compared, {key: value for key, value in given.items() if value})
     observe: Observe = "track" if len(longest.poses) else "encoders"
     arena = log_map.arena or "open"
-    made = calibration_of("motion", parts, name, str(path), log_map.label, observe, (), arena, seed)
-    more = {"trials": len(logs), "step_s": round(longest.step_s, 4), "measured": measured_at(Path(path))}
+    made = calibration_of("motion", parts, name, path, log_map.label, observe, (), arena, seed)
+    more = {"trials": len(logs), "step_s": round(longest.step_s, 4), "measured": measured_at(mapped[0].path)}
     return made.model_copy(update=more)
 
 
 def _usable(
-    path: str | Path, log_map: LogMap, robot: RobotModel, *, drop_bad_rows: bool
+    path: str, mapped: Sequence[MappedLog], robot: RobotModel, *, drop_bad_rows: bool
 ) -> tuple[list[Log], int]:
-    """Return the trials of a log that a fit can use, and the number of all.
+    """Return the trials of logs that a fit can use, and the number of all.
 
     Raises:
         StudyError: None can be used; the message names what the longest lacks.
     """
-    every = list(read_logs(path, log_map, robot, drop_bad_rows=drop_bad_rows))
+    every = [
+        log
+        for each in mapped
+        for log in read_logs(each.path, each.log_map, robot, drop_bad_rows=drop_bad_rows)
+    ]
     longest = max(every, key=lambda log: len(log.commands), default=None)
     if longest is None or not any(len(log.poses) or len(log.wheels) for log in every):
         raise StudyError(
@@ -126,7 +131,7 @@ def _usable(
     return usable, len(every)
 
 
-def _refuse_mistakes(path: str | Path, diagnosis: Diagnosis) -> None:
+def _refuse_mistakes(path: str, diagnosis: Diagnosis) -> None:
     """Raise an error if wheels and poses contradict each other.
 
     Raises:
@@ -146,7 +151,7 @@ def _notes(diagnosis: Diagnosis) -> list[str]:
 
 
 def _fit(
-    path: str | Path, logs: Sequence[Log], robot: RobotModel, hold_out: HoldOut, seed: int
+    path: str, logs: Sequence[Log], robot: RobotModel, hold_out: HoldOut, seed: int
 ) -> tuple[MotionLogFit, Compared | None]:
     """Return the fit to all trials, and the errors on the parts that a fit did not see."""
     try:

@@ -28,7 +28,9 @@ def test_json_is_what_python_gives():
     done = CliRunner().invoke(
         app, ["audit-distance", "jaccard", "--json", "--seed", "7", "--straight", "0.5"]
     )
-    assert json.loads(done.stdout) == audit_distance("jaccard", seed=7, straight=0.5).to_dict()
+    assert (
+        json.loads(done.stdout).items() >= audit_distance("jaccard", seed=7, straight=0.5).to_dict().items()
+    )
 
 
 def test_an_unknown_distance_gets_one_message(tmp_path):

@@ -38,7 +38,7 @@ def test_without_a_denominator_values_are_not_judged():
 
 def test_json_is_what_python_gives():
     done = realitygap("audit-results", str(EXAMPLE), "--denominator", "72", "--json")
-    assert json.loads(done.stdout) == audit_results(EXAMPLE, denominator=72).to_dict()
+    assert json.loads(done.stdout).items() >= audit_results(EXAMPLE, denominator=72).to_dict().items()
 
 
 @pytest.mark.parametrize(

@@ -79,8 +79,11 @@ def test_a_photo_is_entered_once_somebody_has_looked(driven, photo, lines, comma
     assert (driven / "sheet-1.png").read_bytes().startswith(b"\x89PNG")
     with Ledger.open(driven / LEDGER_NAME) as ledger:
         assert [trial.state for trial in ledger.trials()] == ["driven", "driven"]
-    entered = command("score", photo, "--study", driven, "--generation", "0", "--who", "anna", "--yes")
-    assert "2 trials entered." in entered.stdout
+    words = ("score", photo, "--study", driven, "--generation", "0", "--who", "anna", "--json")
+    values = json.loads(command(*words).stdout)
+    assert (values["entered"], values["overlay"]) == (0, str(driven / "sheet-1.png"))
+    values = json.loads(command(*words, "--yes").stdout)
+    assert (values["entered"], len(values["trials"])) == (2, 2)
     with Ledger.open(driven / LEDGER_NAME) as ledger:
         for trial, line in zip(ledger.trials(), lines, strict=True):
             assert trial.state == "scored"

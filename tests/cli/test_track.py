@@ -126,6 +126,7 @@ def test_a_video_gives_a_table_an_overlay_and_the_lens(driven, command):
     assert found["corner_tags"] == [0, 1, 2, 3]
     assert found["camera_m"][2] == pytest.approx(1.2, abs=0.05)
     assert found["warnings"] == []
+    assert found["written"] == ["t.csv", "l.toml", "o.mp4"]
     table = np.genfromtxt(folder / "t.csv", delimiter=",", names=True)
     assert len(table) == pytest.approx(found["pictures"], abs=2)
     assert (table["seen"] == 0).any()

@@ -41,7 +41,12 @@ def test_json_is_the_result_in_the_folder(folder):
         "--json",
     ]
     found = json.loads(run(*arguments).stdout)
-    assert found == json.loads((folder / "result.json").read_text())
+    written = json.loads((folder / "result.json").read_text())
+    assert found == written | {
+        "score": "coverage",
+        "folder": str(folder),
+        "champions_folder": str(folder / "champions"),
+    }
     (row,) = found["strategies"]
     assert set(row["quality"]) == set(row["regret"]) == {"estimate", "low", "high", "n"}
 

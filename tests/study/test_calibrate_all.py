@@ -132,16 +132,16 @@ def test_held_out_trials_are_spread_and_recommend_what_predicts_them():
         right.evidence["held_out"]["errors"]["fitted"]
         < right.evidence["held_out"]["errors"]["nominal numbers"]
     )
-    assert right.notes[0].startswith("1 of 5 trials were held out.")
+    assert right.reasons[0].startswith("1 of 5 trials were held out.")
     assert wrong.evidence["held_out"]["recommended"] == "nominal numbers"
-    assert "use them instead" in wrong.notes[0]
+    assert "use them instead" in wrong.verdict
     assert wrong.numbers == dict.fromkeys(truth, 0.4)  # a recommendation changes no number
     unseen = [replace(trial, poses=np.empty((0, 3)), wheels=np.empty((0, 2))) for trial in trials]
     blind = judged(0.4, unseen)  # of which no motion was seen
     errors = blind.evidence["held_out"]["errors"]
     assert errors["nominal numbers"] < errors["fitted"]
     assert blind.evidence["held_out"]["recommended"] == "fitted"
-    assert blind.notes[0].endswith("trials cannot show that the numbers that it started from are better.")
+    assert blind.verdict.endswith("trials cannot show that the numbers that it started from are better.")
     few = compare_on_trials(right, trials[:4], lambda _: 1 / 0, SimEnsemble(SimPlatform(), ARENA, threads=1))
     assert few is right
     assert np.flatnonzero(is_held_out(20)).tolist() == [4, 9, 14, 19]  # of both kinds of trials

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+from ._json import print_json
 
 if TYPE_CHECKING:
     from realitygap.report import Audit, AuditProgress
@@ -36,11 +37,12 @@ def audit_results(
 
     In Python: realitygap.report.audit_results("examples/table-2.csv", denominator=72)
     """
+    from realitygap.report import audit_notes
     from realitygap.report import audit_results as audit_table
 
     audit = audit_table(table, denominator=denominator, tell=_tell)
     if as_json:
-        typer.echo(json.dumps(audit.to_dict(), indent=2))
+        print_json(audit.to_dict() | {"file": table, "notes": audit_notes(audit)})
         return
     _print(audit, table)
 

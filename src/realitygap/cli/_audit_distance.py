@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 import textwrap
 from pathlib import Path
@@ -11,6 +10,8 @@ from typing import Annotated, Literal
 import typer
 
 from realitygap.errors import RealityGapError
+
+from ._json import print_json
 
 WIDEST = 110
 """Letters of a line of prose, on a terminal that has more."""
@@ -72,10 +73,10 @@ def audit_distance(
     except ValueError as error:
         raise RealityGapError(str(error)) from error
     if as_json:
-        typer.echo(json.dumps(audit.to_dict(), indent=2))
+        print_json(audit.to_dict() | {"notes": distance_notes(audit), "file": path})
     else:
         width = min(shutil.get_terminal_size().columns, WIDEST)
         for note in distance_notes(audit):
             typer.echo(textwrap.fill(note, width, subsequent_indent="  ", break_on_hyphens=False))
-    if path is not None:
-        typer.echo(f"Written: {path}", err=as_json)
+        if path is not None:
+            typer.echo(f"Written: {path}")

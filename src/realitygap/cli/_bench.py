@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import json
 from typing import Annotated, Any
 
 import typer
 
 from realitygap._limits import parse_toml
 from realitygap.errors import StudyError, did_you_mean
+
+from ._json import print_json
 
 DEFAULT_SEEDS = 100
 _ONLY_TASKS = "Only with a task"
@@ -165,7 +166,7 @@ def _bench_task(
     with RunsBar(quiet=as_json) as bar:
         figures = measure_task(task, settings, seeds=seeds, seed=seed, changes=changes, tell=bar.show)
     if as_json:
-        typer.echo(json.dumps(figures, indent=2))
+        print_json(figures | {"seed": seed})
         return
     published = figures["published"]
     names = {
@@ -206,7 +207,7 @@ def _bench_maze(
             tell=bar.show,
         )
     if as_json:
-        typer.echo(json.dumps(figures, indent=2))
+        print_json(figures | {"seed": seed})
         return
     columns = [figures["novelty"], figures["novelty"]["published"]]
     columns += [figures["objective"], figures["objective"]["published"]]
@@ -237,7 +238,7 @@ def _bench_realism(seconds: float, *, as_json: bool) -> None:
 
     figures = measure_realism(seconds)
     if as_json:
-        typer.echo(json.dumps(figures, indent=2))
+        print_json(figures)
         return
     names = {
         "avoiding": "avoiding walls",
@@ -256,7 +257,7 @@ def _bench_speed(seconds: float, *, as_json: bool) -> None:
 
     figures = measure_speed(seconds)
     if as_json:
-        typer.echo(json.dumps(figures, indent=2))
+        print_json(figures)
         return
     names = {
         "robot_steps_per_second": "robot-steps/s",

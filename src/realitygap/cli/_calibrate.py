@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shlex
 import sys
 from pathlib import Path
@@ -14,6 +13,7 @@ from realitygap.errors import DescriptionError, StudyError
 
 from ._camera import CAMERA_HELP, under_camera
 from ._code import AllowPlatforms
+from ._json import print_json
 
 if TYPE_CHECKING:
     from realitygap.trials import OnLost
@@ -404,16 +404,17 @@ def _tell(done: int, n: int) -> None:
 
 def _print(made: Calibration, out: Path, figure: Path | None, *, as_json: bool) -> None:
     if as_json:
-        found = made.model_dump(exclude={"draws", "evidence"})
-        typer.echo(json.dumps({"file": str(out), **found}, indent=2))
+        values = {"file": str(out), "figure": None if figure is None else str(figure)}
+        values |= made.model_dump(exclude={"draws", "evidence"}) | {"held_out": made.held_out or None}
+        print_json(values)
         return
     from ._tables import calibration_table, held_out_table, wide_console
 
     console = wide_console()
     console.print(calibration_table(made))
-    if "held_out" in made.evidence:
-        console.print(held_out_table(made.evidence["held_out"], made.label))
-    for note in made.notes:
+    if made.held_out:
+        console.print(held_out_table(made.held_out, made.label))
+    for note in made.remarks:
         console.print(note, highlight=False, markup=False)
     if made.misspecified:
         p = f" (p {made.misspecification_p:.3f})" if made.misspecification_p < 1 else ""

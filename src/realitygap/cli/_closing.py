@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from realitygap.errors import StudyError, did_you_mean
+
+from ._json import print_json
 
 if TYPE_CHECKING:
     from realitygap.study import ClosingPlan, ClosingProgress
@@ -151,7 +152,7 @@ def _run(plan: ClosingPlan, folder: Path, processes: int | None, *, as_json: boo
         raise typer.Exit(130) from None
     page = write_closing_page(summary, folder / "report.html")
     if as_json:
-        typer.echo(json.dumps({**summary, "folder": str(folder)}, indent=2))
+        print_json({**summary, "folder": folder, "report": page})
     else:
         _print(summary)
         typer.echo(f"Results: {folder}   report: {page}")

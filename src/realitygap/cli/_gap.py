@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from enum import StrEnum
 from pathlib import Path
@@ -14,6 +13,7 @@ from realitygap.errors import StudyError
 
 from ._camera import CAMERA_HELP, under_camera
 from ._code import AllowPlatforms
+from ._json import print_json
 
 if TYPE_CHECKING:
     from realitygap.gap import Estimate, GapResult, ReplayError, Why
@@ -215,10 +215,10 @@ def gap(
         write_gap_report(found, report)
         typer.echo(f"Written: {report}", err=True)
     if as_json:
-        values: dict[str, Any] = result.to_dict()
+        values: dict[str, Any] = result.to_dict() | {"report": report}
         for name, part in (("replay", found.study.replay), ("why", found.why)):
             values |= {} if part is None else {name: part.to_dict()}
-        typer.echo(json.dumps(values, indent=2))
+        print_json(values)
         return
     _print(result, found.study.replay)
     if found.why is not None:
@@ -358,7 +358,9 @@ def plan(
         seed=seed,
     )
     if as_json:
-        typer.echo(json.dumps(_plan_json(found), indent=2))
+        asked_for = {"power": power, "score": scored_by.score_name}
+        asked_for |= {"least": least} if question == "correlation" else {}
+        print_json(_plan_json(found) | asked_for)
     else:
         _print_plan(found, scored_by.score_name, least, power)
 
@@ -371,8 +373,13 @@ def _plan_json(found: GapPlan) -> dict[str, Any]:
         "noise": found.spreads.noise,
         "controllers_spread": found.spreads.controllers,
         "from": found.spreads.origin,
-        "rows": [{**vars(row), "trials_on_target": row.on_target} for row in found.needed],
+        "rows": [_needed_json(row) for row in found.needed],
+        "best": None if found.best is None else _needed_json(found.best),
     }
+
+
+def _needed_json(row: Any) -> dict[str, Any]:
+    return {**vars(row), "trials_on_target": row.on_target}
 
 
 def _print_plan(found: GapPlan, score: str, least: float, power: float) -> None:

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 import shlex
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from realitygap.errors import LogError
+
+from ._json import print_json
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -94,7 +95,10 @@ def import_log(
         raise LogError(f"{out} is the log itself. Name another file.")
     report = logs.import_logs(mapped, out, base=base, drop_bad_rows=drop_bad_rows)
     if as_json:
-        typer.echo(json.dumps({"file": str(out), **dataclasses.asdict(report)}, indent=2))
+        about: dict[str, Any] = {"file": out, "log": log, "label": log_map.label}
+        about |= {"mapping_origin": origin, "mapping": log_map.model_dump(exclude_defaults=True)}
+        about["seconds"] = report.n_steps * report.step_s
+        print_json(about | dataclasses.asdict(report))
         return
     _print(mapped, out, report)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from typing import Annotated
 
 import typer
@@ -10,6 +9,7 @@ import typer
 from realitygap.errors import StudyError
 
 from ._code import AllowPlatforms
+from ._json import print_json
 
 
 def platforms(
@@ -41,6 +41,9 @@ def platforms(
 
         platform = platform_of(check)
         check_platform(platform, load_arena(arena))
+        if as_json:
+            print_json({"platform": check, "keeps_contract": True, "robot_driven": not platform.is_physical})
+            return
         only = (
             " Its robot was not driven: realitygap.testing.check_robot does that."
             if platform.is_physical
@@ -56,10 +59,10 @@ def platforms(
             problems.append(str(error))
     if as_json:
         listed = [{"name": each.name, "specs": each.specs(), "summary": each.summary} for each in models]
-        typer.echo(json.dumps(listed, indent=2))
-        return
-    width = max(len(" or ".join(each.specs())) for each in models)
-    for each in models:
-        typer.echo(f"{' or '.join(each.specs()):{width}}  {each.summary.partition(':')[0]}")
+        print_json(listed)
+    else:
+        width = max(len(" or ".join(each.specs())) for each in models)
+        for each in models:
+            typer.echo(f"{' or '.join(each.specs()):{width}}  {each.summary.partition(':')[0]}")
     for problem in problems:
         typer.echo(f"realitygap: {problem}", err=True)

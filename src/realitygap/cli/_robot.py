@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -11,6 +10,8 @@ from typing import Annotated, Any
 import typer
 
 from realitygap.errors import RobotError
+
+from ._json import print_json
 
 robot = typer.Typer(
     name="robot",
@@ -81,7 +82,7 @@ def list_ports(as_json: Json = False) -> None:
 
     found = ports()
     if as_json:
-        typer.echo(json.dumps([guess._asdict() for guess in found], indent=2))
+        print_json([guess._asdict() for guess in found])
     elif found:
         _print_table(("port", "seems to be", "the system says"), found)
     else:
@@ -177,8 +178,10 @@ def battery(port: Port, as_json: Json = False, record: Record = None) -> None:
     """
     with _opened(port, record) as (terminal, opened):
         name, value = terminal.battery(opened)
-    text = f"{value:.2f} V" if name.endswith("_v") else f"{value:g}, without a unit"
-    typer.echo(json.dumps({name: round(value, 3)}) if as_json else text)
+    if as_json:
+        print_json({name: round(value, 3)})
+        return
+    typer.echo(f"{value:.2f} V" if name.endswith("_v") else f"{value:g}, without a unit")
 
 
 @robot.command("picture")
@@ -248,7 +251,7 @@ def show_recording(
     recording = read_recording(file)
     lines = [line for line in recording.lines if wire or line["kind"] != "wire"]
     if as_json:
-        typer.echo(json.dumps({"header": recording.header, "lines": lines}, indent=2))
+        print_json({"header": recording.header, "lines": lines, "is_whole": recording.is_whole})
         return
     header = recording.header
     who = header.get("robot", {})
@@ -300,7 +303,7 @@ def _value(value: Any) -> str:
 
 def _print(found: dict[str, Any], as_json: bool) -> None:
     if as_json:
-        typer.echo(json.dumps(found, indent=2))
+        print_json(found)
         return
     shown = {name: "-" if value in (None, "") else _value(value) for name, value in found.items()}
     _print_table(None, [(name.replace("_", " "), value) for name, value in shown.items()])

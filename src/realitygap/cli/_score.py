@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import getpass
-import json
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,6 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from realitygap.errors import StudyError
+
+from ._json import print_json
 
 if TYPE_CHECKING:
     from realitygap.records import Ledger, Score, ScoreRole, Trial
@@ -162,7 +163,7 @@ def _only_show(photo: Path, arena: str, pens: str | None, overlay: Path | None, 
         write_whole(overlay, overlay_png(found))
     if as_json:
         rows = [_as_json(trace) for trace in found.traces]
-        typer.echo(json.dumps({"photo": photo_hash(data), "traces": rows}, indent=2))
+        print_json({"photo": photo_hash(data), "traces": rows, "overlay": overlay})
         return
     for trace in found.traces:
         typer.echo(f"{trace.pen + 1} {trace.name}: {_told(trace)}")
@@ -173,7 +174,7 @@ def _only_show(photo: Path, arena: str, pens: str | None, overlay: Path | None, 
 
 def _as_json(trace: TraceScore) -> dict[str, Any]:
     return {
-        "pen": trace.name, "cells": list(trace.cells), "doubtful": list(trace.doubtful),
+        "pen": trace.name, "is_tried": trace.is_tried, "cells": list(trace.cells), "doubtful": list(trace.doubtful),
         "confidence": [round(float(trace.confidence[cell]), 4) for cell in trace.cells],
     }  # fmt: skip
 
@@ -222,10 +223,7 @@ def _score_trials(
     }
     place = overlay or folder / f"sheet-{on_sheet.sheet}.png"
     write_whole(place, overlay_png(found, names), within=folder if overlay is None else None)
-    if as_json:
-        rows = [{"trial": trial.trial, **_as_json(traces[trial.pen])} for trial in on_sheet.waiting]
-        typer.echo(json.dumps({"sheet": on_sheet.sheet, "overlay": str(place), "trials": rows}, indent=2))
-    else:
+    if not as_json:
         for trial in on_sheet.waiting:
             typer.echo(f"{names[trial.pen]}: {_told(traces[trial.pen])}")
         _say_what_was_guessed(found)
@@ -243,7 +241,18 @@ def _score_trials(
     for scores in entries:
         ledger.score_all(scores, role)
         n_entered += len(scores)
-    if not as_json:
+    if as_json:
+        rows = [
+            {
+                "trial": trial.trial,
+                "name": trial.code if titles.blind else trial.name,
+                **_as_json(traces[trial.pen]),
+            }
+            | {"spoiled_by": on_sheet.spoiled[trial.pen].trial if trial.pen in on_sheet.spoiled else None}
+            for trial in on_sheet.waiting
+        ]
+        print_json({"sheet": on_sheet.sheet, "overlay": place, "entered": n_entered, "trials": rows})
+    else:
         typer.echo(
             f"{n_entered} trials entered."
             if n_entered

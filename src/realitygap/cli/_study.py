@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -16,6 +15,7 @@ from realitygap.errors import StudyError
 from ._browser import show_page
 from ._closing import CLOSING
 from ._code import ALLOW_CODE_HELP, code_permission
+from ._json import print_json
 from ._results import written_report
 
 if TYPE_CHECKING:
@@ -190,13 +190,15 @@ def print_result(result: StudyResult, *, as_json: bool) -> None:
     there = result.n_runs or (result.physical is not None and result.physical.n_complete)
     if not there:  # nothing to summarize yet
         if as_json:
-            typer.echo(json.dumps({"folder": str(result.folder.path), **_physical_json(result)}, indent=2))
+            print_json({"folder": str(result.folder.path), **_physical_json(result)})
         _print_physical(result, to_stderr=as_json)
         return
     summary, tasks = summarize(result.folder), summarize_tasks(result.folder)
     if as_json:
         found = {
             "folder": str(result.folder.path),
+            "title": result.folder.description["title"],
+            "note": result.folder.description.get("note"),
             "runs": result.n_runs,
             "computed": result.n_computed,
             "seconds": result.seconds,
@@ -204,7 +206,7 @@ def print_result(result: StudyResult, *, as_json: bool) -> None:
             "conditions": summary.to_dicts(),
             **({"tasks": tasks.to_dicts()} if len(tasks) else {}),
         }
-        typer.echo(json.dumps(found, indent=2))
+        print_json(found)
         _print_physical(result, to_stderr=True)
         return
     from ._tables import summary_table, task_table, wide_console

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -13,6 +12,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from realitygap.errors import StudyError
+
+from ._json import print_json
 
 if TYPE_CHECKING:
     from realitygap.records import ScoreRole
@@ -414,6 +415,10 @@ class _Written:
     into: Path | None
     study: Path | None
 
+    @property
+    def files(self) -> list[Path]:
+        return [path for path in (self.out, self.lens, self.overlay, self.into) if path is not None]
+
 
 def _print(found: Tracked, placed: TrackedTrial | None, written: _Written, *, as_json: bool) -> None:
     track, camera = found.track, found.camera
@@ -432,6 +437,8 @@ def _print(found: Tracked, placed: TrackedTrial | None, written: _Written, *, as
             "corner_rms_px": camera.rms,
             "tag_size_error": track.size_error,
             "warnings": list(found.warnings),
+            "study": written.study,
+            "written": written.files,
         }
         if placed is not None:
             begun = placed.beginning
@@ -440,7 +447,7 @@ def _print(found: Tracked, placed: TrackedTrial | None, written: _Written, *, as
                 "agreement": None if math.isnan(begun.agreement) else begun.agreement,
                 "cells": list(placed.score.cells),
             }
-        typer.echo(json.dumps(values, indent=2))
+        print_json(values)
         return
     typer.echo(
         f"Tag {found.tag.family}:{found.tag.number} seen in {n_seen} of {n} pictures; longest gap "
@@ -459,6 +466,5 @@ def _print(found: Tracked, placed: TrackedTrial | None, written: _Written, *, as
         typer.echo(f"Note: {said}")
     if written.study is not None:
         typer.echo(f"Entered into the ledger of {written.study}.")
-    for path in (written.out, written.lens, written.overlay, written.into):
-        if path is not None:
-            typer.echo(f"Written: {path}")
+    for path in written.files:
+        typer.echo(f"Written: {path}")

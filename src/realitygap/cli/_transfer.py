@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from ._code import AllowPlatforms
+from ._json import print_json
 
 if TYPE_CHECKING:
     from realitygap.gap import Estimate
@@ -142,7 +142,8 @@ def transfer(
         typer.echo("Interrupted. All trials are saved. Run the same command to resume.", err=True)
         raise typer.Exit(130) from None
     if as_json:
-        typer.echo(json.dumps(result.to_dict(), indent=2))
+        about = {"score": result.score, "folder": folder, "champions_folder": folder / "champions"}
+        print_json(result.to_dict() | about)
         return
     _print(result)
     typer.echo(f"Results: {folder}   champions: {folder / 'champions'}")

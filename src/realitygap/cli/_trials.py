@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import getpass
-import json
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -13,10 +12,14 @@ import typer
 from realitygap._limits import MOST_TABLE_BYTES, read_file
 from realitygap.errors import LedgerError, StudyError, did_you_mean
 
+from ._json import print_json
+
 if TYPE_CHECKING:
     from realitygap.records import Ledger, ScoreRole, Trial
 
 _WHAT = ("list", "score", "undo", "void", "note", "agreement")
+_READING = ("list", "agreement")
+"""What changes no ledger."""
 
 
 _ONLY_SCORE = "Only for score"
@@ -106,8 +109,10 @@ def trials(
         raise StudyError(f"--cells, --file, --second and --correct go with score, not with {what}.")
     if file is not None and trial is not None:
         raise StudyError("--file names its trials itself. Leave the trial out.")
+    if as_json and what not in _READING:
+        raise StudyError(f"--json is only for {' and '.join(_READING)}, not for {what}. Leave it out.")
     name = who or getpass.getuser()
-    with Ledger.open(folder / LEDGER_NAME, writable=what not in ("list", "agreement")) as ledger:
+    with Ledger.open(folder / LEDGER_NAME, writable=what not in _READING) as ledger:
         if what == "list":
             _list(ledger, as_json=as_json)
         elif what == "agreement":
@@ -264,7 +269,7 @@ def _list(ledger: Ledger, *, as_json: bool) -> None:
             | {"notes": [note["text"] for note in ledger.notes(each.trial)]}
             for each in found
         ]
-        typer.echo(json.dumps(rows, indent=2))
+        print_json(rows)
         return
     from rich.table import Table
 
@@ -301,6 +306,6 @@ def _agreement(folder: Path, *, as_json: bool) -> None:
 
     found = measure_agreement(folder)
     if as_json:
-        typer.echo(json.dumps(vars(found), indent=2))
+        print_json(vars(found))
         return
     typer.echo(found.sentence)

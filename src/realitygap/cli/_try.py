@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shlex
 import statistics
 from pathlib import Path
@@ -13,6 +12,7 @@ import typer
 from realitygap.errors import StudyError
 
 from ._code import AllowPlatforms
+from ._json import print_json
 
 
 def try_genome(
@@ -94,10 +94,11 @@ def try_genome(
         tried = try_on(target, controller, trials=trials, steps=steps, observe=observe, out=out)
         n_cells = target.arena.grid.n_cells
         coverage = [len(trial.cells) / n_cells for trial in tried]
-        if as_json:
-            typer.echo(json.dumps({"target": target.name, "label": target.label, "coverage": coverage}))
-            return
         mean = statistics.fmean(coverage)
+        if as_json:
+            about = {"target": target.name, "label": target.label, "n_cells": n_cells}
+            print_json(about | {"mean": mean, "coverage": coverage})
+            return
         typer.echo(
             f"{target.name} ({target.label}): {len(coverage)} trial{'s' if len(coverage) > 1 else ''}, mean coverage "
             f"{mean:.3f} of {n_cells} cells: {' '.join(f'{value:.3f}' for value in coverage)}"

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from realitygap.errors import RealityGapError
+
+from ._json import print_json
 
 twin = typer.Typer(
     name="twin",
@@ -51,7 +52,7 @@ def families(
         except ValueError as error:
             raise RealityGapError(str(error)) from error
     if as_json:
-        typer.echo(json.dumps(rows, indent=2))
+        print_json(rows)
     elif not rows:
         typer.echo(f"{name} draws what every twin does: realitygap twin families every")
     else:

@@ -86,7 +86,7 @@ def _tell_made(channel: Channel, made: Calibration, out: Path) -> None:
     channel.say(
         "made",
         fitted=fitted,
-        notes=list(made.notes),
+        notes=list(made.remarks),
         misspecified=bool(made.misspecified),
         p=made.misspecification_p,
         figure=figure,

@@ -147,6 +147,11 @@ class Calibration(Settings, ShownAsCard):
     misspecification_p: float = Field(
         1.0, description="P value of the posterior predictive check; 1 without one (path, motion, contact)."
     )
+    verdict: str = Field(
+        "",
+        description="The numbers to use, by the errors on what the fit did not see; empty without such errors.",
+    )
+    reasons: tuple[str, ...] = Field((), description="Reasons for the verdict, each a sentence.")
     notes: tuple[str, ...] = Field((), description="Notes on the fit, each a sentence.")
     evidence: dict[str, Any] = Field({}, description="Data of the figures.")
 
@@ -169,12 +174,22 @@ class Calibration(Settings, ShownAsCard):
         return f"{type(self).__name__}({self.kind!r}, {counts}, {state})"
 
     @property
+    def held_out(self) -> dict[str, Any]:
+        """The errors of the fit and of simpler predictions on what the fit did not see; empty if it saw everything."""
+        return dict(self.evidence.get("held_out", {}))
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """The verdict if there is one, its reasons, and the notes."""
+        return (*filter(None, [self.verdict]), *self.reasons, *self.notes)
+
+    @property
     def recommended(self) -> str:
         """The numbers that predict held-out data best: fitted, draws of the posterior, or nominal numbers.
 
         Empty if nothing was held out.
         """
-        return str(self.evidence.get("held_out", {}).get("recommended", ""))
+        return str(self.held_out.get("recommended", ""))
 
     @property
     def step(self) -> dict[str, float]:

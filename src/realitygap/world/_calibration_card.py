@@ -18,9 +18,7 @@ def calibration_card(calibration: Calibration) -> Card:
             "use this calibration for conclusions."
         )
     elif calibration.recommended == "nominal numbers":
-        warning = (
-            "The numbers that this calibration started from predict held-out trials better. See the notes."
-        )
+        warning = "The numbers that this calibration started from predict held-out trials better."
     rows: list[list[str | Bar]] = [
         [
             f"{each.name} [{each.unit}]" if each.unit else each.name,
@@ -52,7 +50,7 @@ def calibration_card(calibration: Calibration) -> Card:
                 rows,
             ),
             Table(["", ""], about, "Origin", closed=True),
-            *calibration.notes,
+            *calibration.remarks,
         ],
     )
 

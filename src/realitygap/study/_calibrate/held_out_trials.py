@@ -54,7 +54,7 @@ def compare_on_trials(
     kinds: Sequence[str] = PREDICTED,
     seed: int = 0,
 ) -> Parts:
-    """Return the parts of a fit with the errors on held-out trials, and with a recommendation as the first note.
+    """Return the parts of a fit with the errors on held-out trials, and with a recommendation.
 
     The numbers stay those of the fit to all trials. They are judged by a second fit, which does not see some trials
     and predicts them.
@@ -111,7 +111,8 @@ def compare_on_trials(
         else (FITTED, POSTERIOR),
     )
     found = {**parts.evidence, "held_out": compared.to_dict()}
-    return replace(parts, notes=(_advice(compared, len(trials)), *parts.notes), evidence=found)
+    reason, verdict = _advice(compared, len(trials))
+    return replace(parts, verdict=verdict, reasons=(reason, *parts.reasons), evidence=found)
 
 
 def _mean_error(errors: Iterable[float]) -> float:
@@ -135,8 +136,8 @@ def simulate_evidence(
     return ensemble.summarize(one.play, numbers, key, one.of, keep=one.keep)
 
 
-def _advice(compared: Compared, n: int) -> str:
-    """Return the recommendation in words."""
+def _advice(compared: Compared, n: int) -> tuple[str, str]:
+    """Return the errors and the recommendation in words."""
     errors = compared.errors
     text = (
         f"{compared.n} of {n} trials were held out. A fit to the others leaves {errors[FITTED]:.3g} of their variance "
@@ -153,4 +154,4 @@ def _advice(compared: Compared, n: int) -> str:
         words += (
             " Without poses or encoders, trials cannot show that the numbers that it started from are better."
         )
-    return f"{text} {words}"
+    return text, words

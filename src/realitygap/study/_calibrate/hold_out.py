@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
@@ -62,6 +63,17 @@ class Compared:
             "recommended": self.recommended,
         }
 
+    def relative(self, name: str) -> float:
+        """Return the error of the fit as a multiple of that of another prediction."""
+        fitted, other = self.errors[FITTED], self.errors[name]
+        return fitted / other if other else math.inf if fitted else 1.0
+
+    @property
+    def in_words(self) -> str:
+        """The error of the fit next to those of all other predictions, as a sentence."""
+        ratios = "; ".join(f"{name}: {self.relative(name):.3g}" for name in self.errors if name != FITTED)
+        return f"Error of the fit as a multiple of the others' errors: {ratios}."
+
     @property
     def is_better(self) -> bool:
         """True if the fit predicts better than the nominal numbers."""
@@ -84,10 +96,32 @@ def chosen_parts(parts: Parts, compared: Compared | None, given: Mapping[str, fl
     evidence = {key: value for key, value in parts.evidence.items() if key != "held_out"}
     if compared is not None:
         evidence["held_out"] = compared.to_dict()
+        reasons = (compared.in_words, *parts.reasons)
+        parts = replace(parts, verdict=_verdict(compared), reasons=reasons)
     if compared is None or compared.is_better:
         return replace(parts, numbers={**given, **parts.numbers}, evidence=evidence)
-    notes = (*parts.notes, "The robot file's numbers predict better than the fit, and stay.")
-    return replace(parts, numbers=dict(given), draws={}, notes=notes, evidence=evidence)
+    return replace(parts, numbers=dict(given), draws={}, evidence=evidence)
+
+
+def _verdict(compared: Compared) -> str:
+    """Return which numbers the calibration has, and whether they keep up with a lookup table."""
+    better = compared.is_better
+    if not compared.errors[FITTED if better else NOMINAL] > compared.errors.get(TABLE, math.inf):
+        return (
+            "The fit predicts better than the robot file's numbers: use it."
+            if better
+            else "The robot file's numbers predict better than the fit, and stay."
+        )
+    kept = (
+        "better than the robot file's numbers, but"
+        if better
+        else "worse than the robot file's numbers, which stay, and"
+    )
+    return (
+        f"The fit predicts {kept} worse than a lookup table of the same measurements: its error is "
+        f"{compared.relative(TABLE):.3g} times as large. The measurements show something that the simulator does not "
+        "reproduce. Check the mapping and the robot file."
+    )
 
 
 def hold_out_of(text: str) -> HoldOut:

@@ -137,6 +137,8 @@ def _chosen(
         made.misspecified,
         made.misspecification_p,
         made.evidence,
+        made.verdict,
+        made.reasons,
     )
     made_of = calibration_of(
         "all", parts, robot, target.name, target.label, observe, (), target.arena.name, seed
@@ -349,6 +351,8 @@ def calibration_of(
         misspecification_p=p,
         notes=tuple(notes),
         evidence=parts.evidence,
+        verdict=parts.verdict,
+        reasons=parts.reasons,
     )
 
 

@@ -27,3 +27,5 @@ class Parts:
     misspecified: bool = False
     misspecification_p: float = 1.0
     evidence: dict[str, Any] = field(default_factory=dict)
+    verdict: str = ""
+    reasons: tuple[str, ...] = ()

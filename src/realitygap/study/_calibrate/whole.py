@@ -136,6 +136,8 @@ def calibrate_all(
         misspecification_p=parts.misspecification_p,
         notes=(*parts.notes, left_out) if left_out else parts.notes,
         evidence=parts.evidence,
+        verdict=parts.verdict,
+        reasons=parts.reasons,
     )
 
 

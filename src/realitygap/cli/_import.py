@@ -95,9 +95,16 @@ def import_log(
         raise LogError(f"{out} is the log itself. Name another file.")
     report = logs.import_logs(mapped, out, base=base, drop_bad_rows=drop_bad_rows)
     if as_json:
-        about: dict[str, Any] = {"file": out, "log": log, "label": log_map.label}
-        about |= {"mapping_origin": origin, "mapping": log_map.model_dump(exclude_defaults=True)}
+        about: dict[str, Any] = {"file": out, "label": mapped[0].log_map.label}
         about["seconds"] = report.n_steps * report.step_s
+        about["logs"] = [
+            {
+                "log": each.path,
+                "mapping_from": each.origin,
+                "mapping": each.log_map.model_dump(exclude_defaults=True),
+            }
+            for each in mapped
+        ]
         print_json(about | dataclasses.asdict(report))
         return
     _print(mapped, out, report)

@@ -81,7 +81,7 @@ def import_log(
     """
     from realitygap import logs
 
-    mapped = logs.mapped_logs(log, map_file, step_s=step)
+    mapped = logs.mapped_logs(log, map_file, step_s=step, draft=show_map)
     if show_map:
         typer.echo(mapped[0].log_map.to_toml(), nl=False)
         return

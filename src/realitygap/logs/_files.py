@@ -9,7 +9,7 @@ from pathlib import Path
 
 from realitygap.errors import LogError
 
-from ._guess import guess_log_map
+from ._guess import checked_guess, draft_log_map
 from ._log_map import LogMap, load_log_map
 from ._open import BAG_ENDS, is_log_folder, map_beside
 
@@ -40,6 +40,7 @@ def mapped_logs(
     map_file: str | Path | None = None,
     *,
     step_s: float | None = None,
+    draft: bool = False,
 ) -> list[MappedLog]:
     """Return the logs that names stand for, with their mappings.
 
@@ -47,13 +48,14 @@ def mapped_logs(
         names: A log, or several logs of one robot, as for `log_files`.
         map_file: The mapping of all. Default: that next to each log, or a guess by the names of its columns.
         step_s: Length of a step, instead of that of the mappings [s].
+        draft: True to return a guess even if the values of its columns contradict it.
 
     Raises:
         LogError: A mapping has mistakes, or the logs are not of one robot.
     """
     logs = []
     for path in log_files([names] if isinstance(names, str | Path) else names):
-        log_map, origin = mapping_of(path, map_file)
+        log_map, origin = mapping_of(path, map_file, draft=draft)
         if step_s is not None:
             log_map = log_map.model_copy(update={"step_s": step_s})
         logs.append(MappedLog(path, log_map, origin))
@@ -75,12 +77,15 @@ def mapped_logs(
     return logs
 
 
-def mapping_of(path: str | Path, map_file: str | Path | None = None) -> tuple[LogMap, str]:
+def mapping_of(
+    path: str | Path, map_file: str | Path | None = None, *, draft: bool = False
+) -> tuple[LogMap, str]:
     """Return the mapping of a log, and its origin in words.
 
     Args:
         path: The log.
         map_file: The mapping; that next to the log, or a guess by the names of its columns, if not given.
+        draft: True to return a guess even if the values of its columns contradict it.
 
     Raises:
         LogError: The mapping has mistakes, or the names of the columns do not say enough.
@@ -88,7 +93,14 @@ def mapping_of(path: str | Path, map_file: str | Path | None = None) -> tuple[Lo
     file = map_beside(path) if map_file is None else Path(map_file)
     if map_file is not None or file.is_file():
         return load_log_map(file), str(file)
-    return guess_log_map(path), "guessed by the names of the columns"
+    guessed = "guessed by the names of the columns"
+    try:
+        log_map, notes = checked_guess(path)
+    except LogError:
+        if draft:
+            return draft_log_map(path), guessed
+        raise
+    return log_map, "; ".join([guessed, *notes])
 
 
 def log_files(names: Iterable[str | Path]) -> list[Path]:

@@ -15,11 +15,12 @@ from numpy.typing import NDArray
 from realitygap._limits import MOST_TABLE_BYTES, read_file
 from realitygap.errors import LogError
 
-from ._guess import SENSOR, tokens_of, unit_in
+from ._guess import SENSOR
 from ._source import MOST_SHOWN, Floats, check_columns
 from ._table_map import MeasuredFrom, TableColumns, TableMap
 from ._text import TextSource
 from ._units import ANGLES, LENGTHS, unit_factor
+from ._words import tokens_of, unit_in
 
 BITS = (8, 10, 12, 16)
 """Bit widths of converters whose largest number may be the full scale of a table."""

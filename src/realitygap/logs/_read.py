@@ -23,6 +23,8 @@ from ._units import TIMES, unit_factor
 
 REGULAR = 0.25
 """Share by which most intervals may differ from their median if the step is estimated from them."""
+SHORTEST_S, LONGEST_S = 1e-4, 60.0
+"""Time between rows of a robot's log [s]. What is beyond is in another unit."""
 SAME_STEP = 0.01
 """Share by which the mean of intervals may differ from their median if no row is missing."""
 
@@ -176,6 +178,7 @@ class _Assembler:
 
     def _begin(self, stream: _Stream, times: Floats) -> None:
         """Lay the grid by the first rows of the first stream."""
+        _check_unit_of_time(stream, times)
         step_s = self._map.step_s or _step_of(stream, times)
         self._grid = Grid(float(times[0]), step_s)
         for early in self._early:
@@ -239,6 +242,16 @@ class _Assembler:
         return np.empty((0, {"poses": 4, "wheels": 2}.get(name, 0)))
 
 
+def _check_unit_of_time(stream: _Stream, times: Floats) -> None:
+    """Raise an error if the rows of a robot's log are minutes or microseconds apart."""
+    usual = float(np.median(np.diff(times))) if len(times) > 1 else 1.0
+    if not SHORTEST_S < usual < LONGEST_S:
+        raise LogError(
+            f"Rows of [{stream.name}] are {usual:.3g} s apart, expected {SHORTEST_S:g} to {LONGEST_S:g} s. Set "
+            f"time_unit of [{stream.name}]: {', '.join(TIMES)}. It is {stream.part.time_unit!r} now."
+        )
+
+
 def _step_of(stream: _Stream, times: Floats) -> float:
     """Return the step that the times of the commands have."""
     intervals = np.diff(times)
@@ -249,7 +262,7 @@ def _step_of(stream: _Stream, times: Floats) -> float:
     if low < (1 - REGULAR) * usual or high > (1 + REGULAR) * usual:
         raise LogError(
             f"[{stream.name}] comes at irregular times, mostly {low:.3g} to {high:.3g} s apart. Choose the length of a "
-            f"step: step_s = {usual:.3g} in the mapping, or --step."
+            f"step: step_s = {usual:.3g} in the mapping."
         )
     mean = float(intervals.mean())  # less rounded, unless rows are missing
     return mean if abs(mean - usual) < SAME_STEP * usual else usual

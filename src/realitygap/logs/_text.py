@@ -26,6 +26,7 @@ SEPARATORS = {"tab": "\t", "space": " "}
 NOTHING = ("", "nan", "null", "none", "na", "n/a", "-nan", "nan(ind)")
 """Texts for a missing number."""
 _BLANKS = re.compile(rb"[ \t]+")
+_SECONDS = re.compile(r"(.*stamp)([._/])(?:sec|secs|seconds)")
 _SPACE_AT_END = re.compile(rb"(?m)^ | $")
 
 
@@ -112,12 +113,29 @@ class TextSource:
         return names
 
     def columns(self) -> list[str]:
-        """Return the names of all columns; their numbers, counted from 1, are names as well."""
-        return list(self._names)
+        """Return the names of all columns; their numbers, counted from 1, are names as well.
+
+        The columns `stamp.sec` and `stamp.nanosec` of a message's header also are one column `stamp`, in seconds.
+        """
+        return [*self._names, *self._stamps()]
+
+    def _stamps(self) -> dict[str, tuple[str, str]]:
+        """Return the columns of the seconds and the nanoseconds of each stamp."""
+        found = {}
+        for name in self._names:
+            match = _SECONDS.fullmatch(name)
+            for nano in ("nanosec", "nanosecs", "nsec", "nsecs", "nanoseconds"):
+                if match and match[1] not in self._names and f"{match[1]}{match[2]}{nano}" in self._names:
+                    found[match[1]] = (name, f"{match[1]}{match[2]}{nano}")
+        return found
 
     def batches(self, names: Sequence[str], rows: str = "") -> Iterator[Batch]:
         """Yield batches like `Source.batches`."""
-        chosen = {name: self._index(name) for name in names}
+        stamps = {name: both for name, both in self._stamps().items() if name in names}
+        plain = [name for name in names if name not in stamps]
+        chosen = {
+            name: self._index(name) for name in (*plain, *(each for both in stamps.values() for each in both))
+        }
         first = 1
         # numbers stand for the names, so that rows may be shorter than the widest, and names may be anything
         head = self._separator.join(str(k) for k in range(len(self._names))).encode() + b"\n"
@@ -135,6 +153,7 @@ class TextSource:
             except pl.exceptions.PolarsError as error:
                 raise LogError(f"{self.path} cannot be read near row {first}: {error}") from None
             values = {name: self._column(name, frame[str(index)], first) for name, index in chosen.items()}
+            values |= {name: values[sec] + values[nano] * 1e-9 for name, (sec, nano) in stamps.items()}
             if len(frame):
                 yield Batch(first, values)
             first += len(frame)

@@ -15,8 +15,8 @@ BEGAN_NS = 1_700_000_000_000_000_000
 NS = 1_000_000_000
 
 
-def ros_bag(path, commands, poses, storage):
-    """A bag with /cmd_vel (Twist) and /mocap (PoseStamped)."""
+def ros_bag(path, commands, poses, storage, *, late_s=0.0, clock_s=0):
+    """A bag with /cmd_vel (Twist) and /mocap (PoseStamped), recorded late, with stamps of a clock that is off."""
     from rosbags.rosbag2 import StoragePlugin, Writer
     from rosbags.typesys import Stores, get_typestore
 
@@ -35,8 +35,8 @@ def ros_bag(path, commands, poses, storage):
             ahead, turn = vector((left + right) / 2, 0.0, 0.0), vector(0.0, 0.0, (right - left) / TRACK)
             writer.write(told, at, types.serialize_cdr(twist(ahead, turn), twist.__msgtype__))
             where = pose(point(x, y, 0.0), quaternion(0.0, 0.0, np.sin(heading / 2), np.cos(heading / 2)))
-            message = stamped(header(stamp(at // NS, at % NS), "world"), where)
-            writer.write(seen, at, types.serialize_cdr(message, stamped.__msgtype__))
+            message = stamped(header(stamp(at // NS + clock_s, at % NS), "world"), where)
+            writer.write(seen, at + round(late_s * NS), types.serialize_cdr(message, stamped.__msgtype__))
     return path
 
 
@@ -90,6 +90,22 @@ def test_bags_of_ros_give_what_was_driven(tmp_path):
         with pytest.raises(LogError, match="is damaged, cut off, or no such file") as error:
             list(read_logs(single, mapped, ROBOT))
         assert "\n" not in str(error.value)
+
+
+@pytest.mark.slow
+def test_times_are_those_of_headers_unless_their_clock_is_another_one(tmp_path):
+    commands, poses = drive(50)
+    bag = ros_bag(tmp_path / "late", commands, poses, "mcap", late_s=0.4)
+    mapped = guess_log_map(bag)
+    (log,) = read_logs(bag, mapped, ROBOT)
+    assert np.abs(log.poses[:, :2] - poses[:, :2]).max() < 1e-5
+    assert any("times of /mocap/header/stamp" in note for note in log.notes)
+    recorded = mapped.poses.model_copy(update={"time": "@time"})
+    (log,) = read_logs(bag, mapped.model_copy(update={"poses": recorded}), ROBOT)
+    assert log.start_s == pytest.approx(BEGAN_NS / NS + 0.4)
+    simulated = ros_bag(tmp_path / "simulated", commands, poses, "mcap", clock_s=-1_700_000_000)
+    (log,) = read_logs(simulated, mapped, ROBOT)
+    assert np.abs(log.poses[:, :2] - poses[:, :2]).max() < 1e-5
 
 
 def test_mcap_with_json_gives_what_was_driven(tmp_path):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -11,12 +12,14 @@ import numpy as np
 from realitygap._limits import parse_json
 from realitygap.errors import LogError, from_extra
 
-from ._source import RECORDED, Batch, Floats, check_columns
+from ._source import MOST_APART_S, RECORDED, Batch, Floats, check_columns
 
 BATCH_MESSAGES = 20_000
 MOST_FIELDS = 400
 """Numbers of a message that are offered as columns: not the pixels of an image."""
 MOST_LIST = 64
+CHECKED_MESSAGES = 200
+"""Messages whose stamps are compared with the times of their recording."""
 NS = 1e-9
 
 
@@ -50,6 +53,16 @@ class BagSource:
                     break
             self._columns = list(found)
         return self._columns
+
+    def time_of(self, names: Sequence[str]) -> str:
+        """Return the stamp of the messages' header, unless its clock is not that of the recording, or there is none."""
+        topics = self._by_topic(names)
+        stamp = f"{next(iter(topics))}/header/stamp"
+        if len(topics) > 1 or stamp not in self.columns():
+            return RECORDED
+        delays = [at - _flat(topic, message).get(stamp, np.nan) for topic in topics
+                  for at, message in islice(self._messages.read(topic), CHECKED_MESSAGES)]  # fmt: skip
+        return stamp if np.abs(np.median(delays)) < MOST_APART_S else RECORDED
 
     def batches(self, names: Sequence[str], rows: str = "") -> Iterator[Batch]:
         """Yield batches like `Source.batches`. All columns must be of one topic, or the same field of several.
@@ -209,8 +222,9 @@ def _flat(place: str, value: Any) -> dict[str, float]:
     found: dict[str, float] = {}
     for name, part in fields.items():
         found |= _flat(f"{place}/{name}", part)
-    if {"sec", "nanosec"} <= set(fields):  # the time of a header
-        found[place] = float(fields["sec"]) + float(fields["nanosec"]) * NS
+    for sec, nano in (("sec", "nanosec"), ("sec", "nsec"), ("secs", "nsecs")):  # the time of a header
+        if {sec, nano} <= set(fields):
+            found[place] = float(fields[sec]) + float(fields[nano]) * NS
     names = fields.get("name")
     if isinstance(names, list) and all(isinstance(name, str) for name in names):  # the state of joints
         for kind in ("position", "velocity", "effort"):

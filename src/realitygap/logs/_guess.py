@@ -1,4 +1,4 @@
-"""A mapping guessed from the names of columns and their first values. What is uncertain is refused, and not guessed."""
+"""A mapping guessed from the names of columns and their first values. An uncertain guess is refused."""
 
 from __future__ import annotations
 

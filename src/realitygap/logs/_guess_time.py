@@ -10,7 +10,7 @@ import numpy as np
 
 from realitygap.errors import LogError
 
-from ._source import MOST_SHOWN, Floats, Source
+from ._source import MOST_APART_S, MOST_SHOWN, Floats, Source
 from ._units import TIMES
 from ._words import map_name, tokens_of
 
@@ -24,8 +24,6 @@ EPOCHS = {"s": 1e9, "ms": 1e12, "us": 1e15, "ns": 1e18}
 """Times since 1970 lie between this number and three times as much, from 2001 to 2065."""
 MOST_STEP_S = 10.0
 """Time between rows beyond which a column is not in the unit that it seems to be in [s]."""
-MOST_APART_S = 3.0
-"""Time between a message's header and its recording beyond which their clocks have nothing in common [s]."""
 ASCENDS = 0.95
 """Share of rows in which a time does not go back."""
 

@@ -43,7 +43,8 @@ class Part(Settings):
     )
     time: Column = Field(
         "",
-        description="Column of the time. Default: of a bag, the time of recording; otherwise `rate_hz` is needed.",
+        description="Column of the time. Default: of a bag, the stamp in the header of the messages, or the time of "
+        "recording (@time); otherwise `rate_hz` is needed.",
     )
     time_unit: str = Field("s", description="Unit of the time: s, ms, us, ns, or min.")
     rate_hz: float = Field(0.0, ge=0, description="Rows each second, if no column has the time [Hz].")

@@ -52,6 +52,10 @@ class ParquetSource:
         """Return the names of all columns with numbers."""
         return list(self._columns)
 
+    def time_of(self, names: Sequence[str]) -> str:
+        """Return no column: a table names it in its mapping."""
+        return ""
+
     def batches(self, names: Sequence[str], rows: str = "") -> Iterator[Batch]:
         """Yield batches like `Source.batches`."""
         if rows:

@@ -89,7 +89,7 @@ class _Stream:
     ) -> None:
         self.name, self.part, self.source = name, part, source
         self.columns = part.columns()
-        self.time = part.time or ("" if source.is_table else RECORDED)
+        self.time = part.time or source.time_of(self.columns)
         self.rate_hz = part.rate_hz or (0.0 if self.time else source.rate_hz)
         if not self.time and not self.rate_hz:
             raise LogError(
@@ -195,7 +195,8 @@ class _Assembler:
             rate = f"about {1 / usual:.3g} rows/s" if usual > 0 else "one row"
             increments = "increments, " if stream.has_increments else ""
             how = _METHODS[type(self._resampled[stream.name])]
-            self._notes.append(f"{stream.name}: {rate}, {increments}{how}.")
+            stamps = "" if stream.part.time or stream.time in ("", RECORDED) else f"; times of {stream.time}"
+            self._notes.append(f"{stream.name}: {rate}, {increments}{how}{stamps}.")
         self._resampled[stream.name].push(times, values)
         self._ends[stream.name] = float(times[-1])
 

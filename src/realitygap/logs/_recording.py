@@ -42,6 +42,10 @@ class RecordingSource:
         """Return the names of all columns with numbers."""
         return list(dict.fromkeys(name for rows in self._rows.values() for row in rows for name in row))
 
+    def time_of(self, names: Sequence[str]) -> str:
+        """Return the time of a call."""
+        return RECORDED
+
     def batches(self, names: Sequence[str], rows: str = "") -> Iterator[Batch]:
         """Yield batches like `Source.batches`. All columns must be of one kind of call."""
         topics = {name.rpartition("/")[0] for name in names if name != RECORDED}

@@ -46,6 +46,9 @@ class Source(Protocol):
     def columns(self) -> list[str]:
         """Return the names of all columns with numbers."""
 
+    def time_of(self, names: Sequence[str]) -> str:
+        """Return the column of the time of columns, if the format has one; empty otherwise."""
+
     def batches(self, names: Sequence[str], rows: str = "") -> Iterator[Batch]:
         """Yield the rows of columns, in order.
 
@@ -78,5 +81,7 @@ def check_columns(source: Source, names: Sequence[str]) -> None:
     )
 
 
+MOST_APART_S = 3.0
+"""Time between a stamp and the recording of its message beyond which their clocks have nothing in common [s]."""
 MOST_SHOWN = 40
 """Names of columns in a message."""

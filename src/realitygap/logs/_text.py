@@ -129,6 +129,10 @@ class TextSource:
                     found[match[1]] = (name, f"{match[1]}{match[2]}{nano}")
         return found
 
+    def time_of(self, names: Sequence[str]) -> str:
+        """Return no column: a table names it in its mapping."""
+        return ""
+
     def batches(self, names: Sequence[str], rows: str = "") -> Iterator[Batch]:
         """Yield batches like `Source.batches`."""
         stamps = {name: both for name, both in self._stamps().items() if name in names}

@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import io
 import json
+import os
 import tempfile
 from collections.abc import Callable, Mapping
 from functools import cache
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NamedTuple
+from zlib import adler32, crc32
 
 import numpy as np
 
@@ -447,6 +449,170 @@ def _valid_video() -> bytes:
     return _written("video.avi", write)
 
 
+# logs of other programs
+
+
+def _log_rows(path: Path) -> Any:
+    """Read a log as a table of three of its columns."""
+    from realitygap.logs import open_source
+
+    source = open_source(path)
+    return [batch.columns for batch in source.batches(source.columns()[:3])]
+
+
+_LOG_ROWS = {"t": [0.1 * k for k in range(40)], "left": [0.1] * 40, "right": [0.2] * 40}
+
+
+@cache
+def _valid_log_parquet() -> bytes:
+    import polars as pl
+
+    buffer = io.BytesIO()
+    pl.DataFrame(_LOG_ROWS | {"action": [[0.1, 0.2]] * 40}).select("action", "t", "left").write_parquet(
+        buffer
+    )
+    return buffer.getvalue()
+
+
+def _valid_mcap(compression: str) -> bytes:
+    from mcap.writer import CompressionType, Writer
+
+    buffer = io.BytesIO()
+    writer = Writer(buffer, compression=CompressionType[compression])
+    writer.start()
+    channel = writer.register_channel(topic="/drive", message_encoding="json", schema_id=0)
+    for k in range(40):
+        writer.add_message(channel, k, json.dumps({"left": 0.1, "right": [0.2, k]}).encode(), k)
+    writer.finish()
+    return buffer.getvalue()
+
+
+@cache
+def _valid_bag(name: str) -> bytes:
+    """Return the bytes of a bag of ROS 2 that realitygap wrote, or of a file in its folder."""
+    from realitygap.logs import write_bag
+    from realitygap.records import read_observations
+
+    def write(path: Path) -> None:
+        path.with_name("trials.jsonl").write_bytes(_valid_observations())
+        read = read_observations(path.with_name("trials.jsonl"))
+        write_bag(read.trials[0], read.head, path)
+
+    if name.endswith(".mcap"):
+        return _written(name, write)
+    with tempfile.TemporaryDirectory() as folder:
+        write(Path(folder) / "bag")
+        return next(Path(folder, "bag").glob(f"*{name}")).read_bytes()
+
+
+def _mapped(path: Path) -> Any:
+    """Import a log; the bytes are those of its mapping."""
+    from realitygap.logs import import_log, load_log_map
+
+    rows = [",".join(_LOG_ROWS), *(",".join(map(str, row)) for row in zip(*_LOG_ROWS.values(), strict=True))]
+    path.with_name("log.csv").write_text("\n".join(rows))
+    return import_log(path.with_name("log.csv"), path.with_name("trials.jsonl"), load_log_map(path))
+
+
+_MAPPING = b"""\
+robot = "pioneer"
+
+[commands]
+file = "log.csv"
+time = "t"
+left = "left"
+right = "right"
+"""
+
+
+# folders in which files name others
+
+
+def _dataset(folder: Path) -> Any:
+    (folder / "meta").mkdir()
+    (folder / "data").mkdir()
+    (folder / "meta" / "info.json").write_text('{"fps": 10, "features": {}}')
+    for k in range(2):
+        (folder / "data" / f"{k}.parquet").write_bytes(FORMATS["log.parquet"].valid)
+    return lambda: _log_rows(folder)
+
+
+def _bag_folder(folder: Path) -> Any:
+    (folder / "metadata.yaml").write_bytes(_valid_bag("metadata.yaml"))
+    (folder / "bag.db3").write_bytes(_valid_bag(".db3"))
+    return lambda: _log_rows(folder)
+
+
+def _map_folder(folder: Path) -> Any:
+    from realitygap.vision import arena_of_map
+
+    (folder / "map.yaml").write_bytes(_MAP)
+    (folder / "map.png").write_bytes(_image("PNG", 16))
+    return lambda: arena_of_map(folder / "map.yaml")
+
+
+def _floor_folder(folder: Path) -> Any:
+    (folder / "arena.toml").write_bytes(_ARENA + b'\n[floor.image]\nfile = "floor.png"\nwidth = 1.0\n')
+    (folder / "floor.png").write_bytes(_image("PNG", 16))
+    return lambda: _arena(folder / "arena.toml")
+
+
+def _study_folder(folder: Path) -> Any:
+    (folder / "study.toml").write_bytes(
+        _STUDY + b'platform = "sim"\narena = { file = "arena.toml" }\n' + _PLATFORM
+    )
+    (folder / "arena.toml").write_bytes(_ARENA)
+    (folder / "robot.toml").write_bytes(_ROBOT)
+    from realitygap.study import load_study
+
+    return lambda: load_study(folder / "study.toml")
+
+
+_PLATFORM = b'[platform.sim]\nrobot = "robot.toml"\n'
+
+
+def _results_folder(folder: Path) -> Any:
+    (folder / "results").mkdir()
+    (folder / "results" / "study.json").write_bytes(_valid_description())
+    return lambda: _description(folder / "results" / "study.json")
+
+
+_FOLDERS = (_dataset, _bag_folder, _map_folder, _floor_folder, _study_folder, _results_folder)
+_WHOLE_FOLDERS = b"whole"
+_NAMED_BY_USERS = ("study.toml", "map.yaml")
+"""A user may name a pipe, which is then waited for."""
+
+
+def _folders(data: bytes) -> Any:
+    """Read one of the folders, in which one file is a pipe, a folder, or a link to a device or to itself.
+
+    Its bytes choose it; those of the valid example choose all folders as they should be.
+    """
+    for number, make in enumerate(_FOLDERS):
+        with tempfile.TemporaryDirectory() as name:
+            folder = Path(name)
+            read = make(folder)
+            if data != _WHOLE_FOLDERS:
+                if crc32(data) % len(_FOLDERS) != number:
+                    continue
+                files = [
+                    path for path in folder.rglob("*") if path.is_file() and path.name not in _NAMED_BY_USERS
+                ]
+                _spoil(sorted(files), adler32(data))
+            read()
+
+
+def _spoil(files: list[Path], number: int) -> None:
+    victim, kind = files[number % len(files)], number // len(files) % 4
+    victim.unlink()
+    if kind == 0:
+        os.mkfifo(victim)
+    elif kind == 1:
+        victim.mkdir()
+    else:
+        victim.symlink_to("/dev/zero" if kind == 2 else victim)
+
+
 # text
 
 
@@ -508,6 +674,13 @@ def _formats() -> dict[str, Format]:
         "photo.png": Format(_image("PNG", 400), _photo),
         "floor.png": Format(_image("PNG", 16), _reader("floor.png", _floor_arena)),
         "video.avi": Format(_valid_video(), _reader("video.avi", _video)),
+        "log.parquet": Format(_valid_log_parquet(), _reader("log.parquet", _log_rows)),
+        "log.mcap": Format(_valid_mcap("ZSTD"), _reader("log.mcap", _log_rows)),
+        "lz4 log.mcap": Format(_valid_mcap("LZ4"), _reader("log.mcap", _log_rows)),
+        "bag.mcap": Format(_valid_bag("bag.mcap"), _reader("bag.mcap", _log_rows)),
+        "bag.db3": Format(_valid_bag(".db3"), _reader("bag.db3", _log_rows)),
+        "log.map.toml": Format(_MAPPING, _reader("log.map.toml", _mapped)),
+        "folders": Format(_WHOLE_FOLDERS, _folders),
         "results.csv": Format(_TABLE, _reader("results.csv", _table)),
         "scores.txt": Format(b"# by anna\n1: 0 1 13\n", _reader("scores.txt", _scores)),
     }

@@ -22,8 +22,8 @@ import realitygap
 from realitygap import _limits
 from realitygap._image_file import open_image
 from realitygap._limits import LimitError, is_file, parse_json, parse_toml, read_file
+from realitygap._parquet_size import check_size
 from realitygap.errors import LedgerError, RealityGapError, RecordError
-from realitygap.records._parquet_size import check_size
 from tests.formats import FORMATS
 
 SOURCES = Path(realitygap.__file__).parent
@@ -195,10 +195,10 @@ def test_parquet_file_that_would_fill_memory_is_refused(monkeypatch):
     buffer = io.BytesIO()
     pl.DataFrame({"a": [0] * 100_000, "b": ["x" * 50] * 100_000}).write_parquet(buffer)
     check_size(buffer.getvalue())
-    monkeypatch.setattr("realitygap.records._parquet_size.MOST_VALUES", 199_999)
+    monkeypatch.setattr("realitygap._parquet_size.MOST_VALUES", 199_999)
     with pytest.raises(LimitError, match="200,002 values"):
         check_size(buffer.getvalue())
-    monkeypatch.setattr("realitygap.records._parquet_size.MOST_CHUNK_BYTES", 100)
+    monkeypatch.setattr("realitygap._parquet_size.MOST_CHUNK_BYTES", 100)
     with pytest.raises(RecordError, match="cannot be read: it holds"):
         FORMATS["chunk.parquet"].read(FORMATS["chunk.parquet"].valid)
 

@@ -18,12 +18,13 @@ class NamedFileError(ValueError):
     """A named file may not be read. The message can follow "FILE: KEY: "."""
 
 
-def named_file(folder: Path, name: Any) -> Path:
+def named_file(folder: Path, name: Any, *, or_folder: bool = False) -> Path:
     """Return the path of a file that another file in a folder names.
 
     Args:
         folder: Folder of the file that has the name in it.
         name: The name, as it is written there.
+        or_folder: True if it may name a folder.
 
     Raises:
         NamedFileError: It is not the name of a plain file in the folder or below.
@@ -40,7 +41,7 @@ def named_file(folder: Path, name: Any) -> Path:
         raise NamedFileError(
             f"{shown(name)} cannot be read ({getattr(error, 'strerror', None) or error})."
         ) from None
-    if not is_inside or not stat.S_ISREG(mode):
+    if not is_inside or not (stat.S_ISREG(mode) or (or_folder and stat.S_ISDIR(mode))):
         raise _refused(name)
     return path
 

@@ -9,14 +9,17 @@ from typing import Any
 
 import numpy as np
 
-from realitygap._limits import parse_json
+from realitygap._limits import LimitError, open_plain, parse_json
 from realitygap.errors import LogError, from_extra
 
 from ._source import MOST_APART_S, RECORDED, Batch, Floats, check_columns
+from ._unpacking import limit_unpacking
 
 BATCH_MESSAGES = 20_000
 MOST_FIELDS = 400
 """Numbers of a message that are offered as columns: not the pixels of an image."""
+MOST_MESSAGE = 16 << 20
+"""Maximum size of a JSON message [bytes]."""
 MOST_LIST = 64
 CHECKED_MESSAGES = 200
 """Messages whose stamps are compared with the times of their recording."""
@@ -36,6 +39,7 @@ class BagSource:
 
     def __init__(self, path: Path) -> None:
         self.path = path
+        limit_unpacking()
         if path.suffix == ".mcap" and _is_json(path):
             self._messages: Any = _JsonMessages(path)
         else:
@@ -168,9 +172,9 @@ class _JsonMessages:
     def read(self, topic: str) -> Iterator[tuple[float, Any]]:
         make_reader = from_extra("mcap.reader", "import").make_reader
         try:
-            with self.path.open("rb") as file:
+            with open_plain(self.path) as file:
                 for _, _, message in make_reader(file).iter_messages(topics=[topic]):
-                    yield message.log_time * NS, parse_json(message.data)
+                    yield message.log_time * NS, parse_json(message.data, most=MOST_MESSAGE)
         except Exception as error:
             raise _damaged(self.path, error) from error
 
@@ -178,7 +182,7 @@ class _JsonMessages:
 def _channels(path: Path) -> list[Any]:
     make_reader = from_extra("mcap.reader", "import").make_reader
     try:
-        with path.open("rb") as file:
+        with open_plain(path) as file:
             summary = make_reader(file).get_summary()
     except Exception as error:
         raise _damaged(path, error) from error
@@ -191,6 +195,8 @@ def _is_json(path: Path) -> bool:
 
 
 def _damaged(path: Path, error: Exception) -> LogError:
+    if isinstance(error, LimitError):
+        return LogError(f"{path}: {error}.")
     if path.is_file() and not path.stat().st_size:
         return LogError(f"{path} is empty. Record it again.")
     said = str(error).strip().split("\n")[0].rstrip(".")[:200] or type(error).__name__

@@ -7,7 +7,8 @@ from typing import Annotated, Any, Literal, Self, TypeVar
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from realitygap._limits import MOST_TOML_BYTES, parse_toml, read_file
+from realitygap._limits import MOST_TOML_BYTES, is_file, parse_toml, read_file
+from realitygap._named_file import NamedFileError, named_file
 from realitygap.errors import LogError
 from realitygap.settings import Settings
 from realitygap.world import toml_table
@@ -248,18 +249,29 @@ class LogMap(MapFile):
 
 
 def load_log_map(path: str | Path) -> LogMap:
-    """Return the mapping in a TOML file; files that it names may lie next to it.
+    """Return the mapping in a TOML file; files that it names lie next to it, or in the working folder.
 
     Raises:
-        LogError: The file cannot be read or has mistakes; the message has each with its place.
+        LogError: The file cannot be read, has mistakes, or names a file elsewhere; the message has each with its place.
     """
     path = Path(path)
     values = read_map(path)
     for key in ("robot", "arena", "controller"):
         name = values.get(key)
-        if isinstance(name, str) and name and (path.parent / name).is_file():
-            values[key] = str(path.parent / name)
+        if isinstance(name, str) and name:
+            values[key] = _found(path, key, name)
     return checked_map(LogMap, values, path)
+
+
+def _found(path: Path, key: str, name: str) -> str:
+    """Return the path of a file that a mapping names; a name of realitygap's own as it is."""
+    try:
+        return str(named_file(path.parent, name))
+    except NamedFileError as error:
+        is_free = not Path(name).is_absolute() and ".." not in Path(name).parts and "\0" not in name
+        if is_free and not (path.parent / name).exists() and (is_file(name) or not Path(name).exists()):
+            return name
+        raise LogError(f"{path}: {key}: {error}") from None
 
 
 def read_map(path: Path) -> dict[str, Any]:

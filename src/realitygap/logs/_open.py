@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from realitygap._named_file import NamedFileError, named_file
 from realitygap.errors import LogError
 
 from ._bags import BagSource
@@ -44,6 +45,7 @@ def open_source(path: Path, text: TextFormat | None = None) -> Source:
     """
     if not path.exists():
         raise LogError(f"There is no file {path}. Name a log: {KINDS}.")
+    _refuse_pipes(path)
     if path.is_dir():
         if (path / "meta" / "info.json").is_file():
             return lerobot_source(path)
@@ -61,3 +63,23 @@ def open_source(path: Path, text: TextFormat | None = None) -> Source:
     if end == ".jsonl":
         return RecordingSource(path)
     return TextSource(path, text or TextFormat())
+
+
+def _refuse_pipes(path: Path) -> None:
+    """Raise an error if a log, or a file in the folder of a bag, is not a plain file, or is elsewhere.
+
+    Libraries open the files of a bag by their names, and would wait for the other end of a pipe.
+    """
+    if not path.is_dir():
+        if not path.is_file():
+            raise LogError(
+                f"{path} is a pipe or a device, expected a plain file. Save its content in a file."
+            )
+        return
+    try:
+        for entry in path.iterdir():
+            named_file(path, entry.name, or_folder=True)
+    except OSError as error:
+        raise LogError(f"Cannot read {path}: {error.strerror or error}.") from None
+    except NamedFileError as error:
+        raise LogError(f"{path}: {error}") from None

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from realitygap._named_file import NamedFileError, named_file
 from realitygap.errors import LogError
 from realitygap.world import RobotModel
 
@@ -275,9 +276,11 @@ def _streams(path: Path, log_map: LogMap, robot: RobotModel, *, drop: bool) -> l
     sources: dict[Path, Source] = {}
     streams = []
     for name, part in log_map.parts.items():
-        file = path
-        if part.file:
-            file = (path if path.is_dir() else path.parent) / part.file
+        try:
+            folder = path if path.is_dir() else path.parent
+            file = named_file(folder, part.file, or_folder=True) if part.file else path
+        except NamedFileError as error:
+            raise LogError(f"[{name}] of the mapping: file: {error}") from None
         if file not in sources:
             sources[file] = open_source(file, log_map.text)
         streams.append(_Stream(name, part, sources[file], speed, track, drop=drop))

@@ -12,6 +12,7 @@ from typing import IO
 import numpy as np
 import polars as pl
 
+from realitygap._limits import open_plain
 from realitygap.errors import LogError
 
 from ._log_map import TextFormat
@@ -56,8 +57,10 @@ class TextSource:
     def _open(self) -> IO[bytes]:
         try:
             if self.path.suffix == ".gz":
-                return io.BufferedReader(gzip.open(self.path, "rb"))
-            return self.path.open("rb")
+                packed = gzip.GzipFile(fileobj=(file := open_plain(self.path)))
+                packed.myfileobj = file  # type: ignore[assignment]  # is closed with it
+                return io.BufferedReader(packed)
+            return open_plain(self.path)
         except OSError as error:
             raise LogError(f"Cannot read {self.path}: {error.strerror or error}. Name a file.") from None
 

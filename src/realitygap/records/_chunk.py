@@ -12,11 +12,11 @@ from pathlib import Path
 import polars as pl
 
 from realitygap._limits import MOST_CHUNK_BYTES, read_file
+from realitygap._parquet_size import check_size
 from realitygap.errors import RecordError, RecordVersionError
 from realitygap.records._columns import EXTRA_SCHEMA, SCHEMA, check_part, check_rows, schema_with
 from realitygap.records._digest import RowsDigest, Stream, row_streams, rows_digest
 from realitygap.records._files import reading
-from realitygap.records._parquet_size import check_size
 from realitygap.records._seal import BrokenSeal, check_seal, seal
 from realitygap.records._version import RESULTS_VERSION
 

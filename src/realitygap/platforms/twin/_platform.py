@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, ClassVar, Self
 
 from pydantic import Field
 
+from realitygap._limits import MOST_TOML_BYTES
 from realitygap.errors import require_extra
 from realitygap.evolution import ControllerInterface, inputs_of_robot
 from realitygap.robots import Robot
@@ -26,10 +27,17 @@ if TYPE_CHECKING:
     from realitygap.kernels.neat.genome import NeatRules
 
 _HASH = """
-import hashlib, sys
+import hashlib, os, stat, sys
+name, most = sys.argv[1], int(sys.argv[2])
 try:
-    with open(sys.argv[1], "rb") as file:
-        print(hashlib.file_digest(file, "sha256").hexdigest())
+    descriptor = os.open(name, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
+    if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+        sys.exit("it is not a plain file")
+    with os.fdopen(descriptor, "rb") as file:
+        data = file.read(most + 1)
+    if len(data) > most:
+        sys.exit(f"it has more than {most:,} bytes")
+    print(hashlib.sha256(data).hexdigest())
 except OSError as error:
     sys.exit(error.strerror or str(error))
 """
@@ -121,7 +129,7 @@ def hash_elsewhere(file: str) -> str:
     Raises:
         ValueError: There is no such file, or it cannot be read.
     """
-    asked = [sys.executable, "-I", "-S", "-c", _HASH, file]
+    asked = [sys.executable, "-I", "-S", "-c", _HASH, file, str(MOST_TOML_BYTES)]
     done = subprocess.run(asked, capture_output=True, text=True, check=False)
     if done.returncode:
         raise ValueError(

@@ -13,6 +13,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
+from realitygap._limits import MOST_TOML_BYTES, read_file
 from realitygap.errors import DescriptionError, RealityGapError, RobotError
 
 if TYPE_CHECKING:
@@ -32,7 +33,7 @@ class _Twin:
         from ._open import open_twin
 
         try:
-            self._hash = hashlib.sha256(Path(file).read_bytes()).hexdigest()
+            self._hash = hashlib.sha256(read_file(Path(file), MOST_TOML_BYTES, plain=True)).hexdigest()
         except OSError:
             self._hash = ""  # which `load_twin` tells better
         model = load_twin(file)

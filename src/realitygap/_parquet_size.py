@@ -8,29 +8,45 @@ Source: the Parquet format, `parquet.thrift`; Thrift's compact protocol.
 
 from __future__ import annotations
 
-from typing import Any
+import mmap
+from typing import Any, NamedTuple
 
 from realitygap._limits import MOST_CHUNK_BYTES, LimitError
 
 MOST_VALUES = MOST_CHUNK_BYTES // 8
 """Maximum number of values in all columns together."""
+Bytes = bytes | mmap.mmap
 _MOST_DEPTH = 16
 _MOST_ITEMS = 1_000_000
 _WIDTH = 8
 """Width of the length and the mark at a file's end [bytes]."""
 
 
-def check_size(parquet: bytes) -> None:
+class Part(NamedTuple):
+    """The size of a column in a group of rows: by the description or by the heads of its pages, the larger of both.
+
+    Attributes:
+        column: Name of the column, or of the column that it is in.
+        n_bytes: Decompressed bytes.
+        n_values: Values.
+        page: Values of its largest page; 8 bytes are one, too.
+    """
+
+    column: str
+    n_bytes: int
+    n_values: int
+    page: int
+
+
+def check_size(parquet: Bytes) -> None:
     """Raise an error if a Parquet file holds more than memory has room for.
 
     Raises:
         LimitError: The file holds more.
         ValueError: It is not a Parquet file.
     """
-    try:
-        n_bytes, n_values = _sizes(parquet)
-    except (IndexError, KeyError, TypeError, AttributeError) as error:
-        raise ValueError(f"its description cannot be read ({type(error).__name__})") from None
+    parts = [part for group in group_sizes(parquet) for part in group]
+    n_bytes, n_values = sum(part.n_bytes for part in parts), sum(part.n_values for part in parts)
     if n_bytes > MOST_CHUNK_BYTES or n_values > MOST_VALUES:
         raise LimitError(
             f"it holds {n_values:,} values in {n_bytes:,} bytes, expected at most {MOST_VALUES:,} in "
@@ -38,37 +54,51 @@ def check_size(parquet: bytes) -> None:
         )
 
 
-def _sizes(parquet: bytes) -> tuple[int, int]:
-    """Return the decompressed bytes, and values, by the description and by the heads of pages: the larger of both."""
+def group_sizes(parquet: Bytes) -> list[list[Part]]:
+    """Return the sizes of the columns in each group of rows. A column in a column, such as of a list, is one of them.
+
+    Raises:
+        ValueError: It is not a Parquet file.
+    """
+    try:
+        return [
+            [_part(parquet, column[3], _count(group[3])) for column in group[1]]
+            for group in _description(parquet)[4]
+        ]
+    except (IndexError, KeyError, TypeError, AttributeError) as error:
+        raise ValueError(f"its description cannot be read ({type(error).__name__})") from None
+
+
+def _description(parquet: Bytes) -> dict[int, Any]:
     length = int.from_bytes(parquet[-_WIDTH:-4], "little")
     if not 0 < length <= len(parquet) - _WIDTH:
         raise ValueError("its description is longer than the file")
-    described = _Thrift(parquet, len(parquet) - _WIDTH - length).struct()
-    n_bytes = n_values = paged_bytes = paged_values = 0
-    for group in described[4]:
-        for column in group[1]:
-            about = column[3]
-            n_bytes += _count(about[6])
-            n_values += _count(about[5])
-            begin = min(about[9], about.get(11) or about[9])
-            more_bytes, more_values = _pages(parquet, _count(begin), _count(about[7]))
-            paged_bytes += more_bytes
-            paged_values += more_values
-    return max(n_bytes, paged_bytes), max(n_values, paged_values)
+    return _Thrift(parquet, len(parquet) - _WIDTH - length).struct()
 
 
-def _pages(parquet: bytes, begin: int, n_bytes: int) -> tuple[int, int]:
-    """Return the decompressed bytes and values of the pages of a column."""
-    large = values = 0
+def _part(parquet: Bytes, about: dict[int, Any], n_rows: int) -> Part:
+    begin = min(about[9], about.get(11) or about[9])
+    pages = _pages(parquet, _count(begin), _count(about[7]))
+    n_bytes, n_values = (sum(sizes) for sizes in zip(*pages, strict=True)) if pages else (0, 0)
+    return Part(
+        about[3][0].decode("utf-8", "replace"),
+        max(_count(about[6]), n_bytes),
+        max(_count(about[5]), n_values, n_rows),
+        max((max(values, size // 8) for size, values in pages), default=0),
+    )
+
+
+def _pages(parquet: Bytes, begin: int, n_bytes: int) -> list[tuple[int, int]]:
+    """Return the decompressed bytes and values of each page of a column."""
+    pages = []
     at, end = begin, begin + n_bytes
     while at < end:
         thrift = _Thrift(parquet, at)
         head = thrift.struct()
-        large += _count(head[2])
         details = head.get(5) or head.get(8) or head.get(7) or {}
-        values += _count(details.get(1, 0))
+        pages.append((_count(head[2]), _count(details.get(1, 0))))
         at = thrift.at + _count(head[3])
-    return large, values
+    return pages
 
 
 def _count(value: Any) -> int:
@@ -80,7 +110,7 @@ def _count(value: Any) -> int:
 class _Thrift:
     """Reads a value from bytes, field by field."""
 
-    def __init__(self, data: bytes, at: int) -> None:
+    def __init__(self, data: Bytes, at: int) -> None:
         self._data = data
         self._n_items = 0
         self.at = at
@@ -112,7 +142,7 @@ class _Thrift:
         if kind == 8:
             length = self._varint()
             self.at += length
-            return None
+            return self._data[self.at - length : self.at]
         if kind in (9, 10):
             head = self._byte()
             length = head >> 4 if head >> 4 < 15 else self._varint()

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from realitygap.calibration import predict_range_table
 from realitygap.cli import app
 from realitygap.errors import RealityGapError
 from realitygap.evolution import NeatSettings, Population
@@ -240,11 +241,12 @@ def test_sensors_are_fitted_to_a_table_and_compared(tmp_path):
     table = write_sample(tmp_path / "wall.sample", np.round(noisy * 1023), 5, 4, "{:.0f}")
     fit = tmp_path / "fit.toml"
     printed = run("calibrate", "sensors", "--from", table, "--base", base, "-o", fit)
-    assert "Bearings are taken to grow clockwise" in printed
+    assert "Taken: bearings clockwise from the robot's heading" in " ".join(printed.split())
     assert "1023 is taken for the full scale" in printed
     errors = load_calibration(fit).evidence["held_out"]["errors"]
     assert errors["fitted"] < 0.02 < errors["nominal numbers"]
     assert load_robot(fit).range[2].decay == pytest.approx(0.012, rel=0.2)
+    assert load_calibration(fit).verdict.startswith("The fit predicts better")
     made = run("calibrate", "sensors", "--from", table, "--radius-mm", 27.5, "-o", fit, "--hold-out", 0.3)
     assert "at 30% of the places" in " ".join(made.split())
     assert load_calibration(fit).evidence["held_out"]["errors"]["fitted"] < 0.05
@@ -253,3 +255,41 @@ def test_sensors_are_fitted_to_a_table_and_compared(tmp_path):
     assert "has 4 sensors" in refused(
         "calibrate", "sensors", "--from", table, "--base", "scribbler-s2-fluke2", "-o", fit
     )
+
+
+@pytest.mark.slow
+def test_bearings_of_a_text_table_may_count_from_each_sensor(tmp_path):
+    """A table of a Thymio, whose sensors were turned around their own axes."""
+    robot = load_robot("thymio")
+    true = robot.with_numbers({f"range.{k}.half_width": 0.07 for k in range(5)})
+    sensor, distance, bearing = (
+        each.ravel()
+        for each in np.meshgrid(range(5), np.arange(10, 140, 10), np.arange(-60, 61, 12), indexing="ij")
+    )
+    readings = predict_range_table(
+        sensor, distance / 1000, np.radians(bearing), true, measured_from="sensor", bearing_from="sensor"
+    )
+    readings = np.clip(readings + np.random.default_rng(0).normal(0, 0.01, len(readings)), 0, 1)
+    table = write(
+        tmp_path / "wall.csv",
+        np.column_stack([sensor, distance, bearing, readings]),
+        "sensor,distance_mm,bearing_deg,reading",
+    )
+    fit = tmp_path / "fit.toml"
+    command = ["calibrate", "sensors", "--from", table, "-o", fit]
+    found = json.loads(run(*command, "--base", "thymio", "--json"))
+    assert any("from each sensor's own direction" in note for note in found["notes"])
+    errors = found["held_out"]["errors"]
+    assert errors["fitted"] < 0.03 < errors["nominal numbers"]
+    assert errors["fitted"] < errors["lookup table"]
+    for k in range(5):
+        assert found["numbers"][f"range.{k}.direction"] == pytest.approx(robot.range[k].direction, abs=0.05)
+        assert found["numbers"][f"range.{k}.half_width"] == pytest.approx(0.07, rel=0.05)
+    assert "seem to count from each sensor's own direction" in refused(*command, "--radius-mm", 27.5)
+    mapping = tmp_path / "wall.map.toml"
+    mapping.write_text('robot = "thymio"\nbearing_from = "body"\nclockwise = false\n', "utf-8")
+    found = json.loads(run(*command, "--json"))
+    assert "worse than a lookup table" in found["verdict"]
+    assert not any("The mapping leaves open" in note for note in found["notes"])
+    mapping.write_text('bearing_from = "sensor"\n', "utf-8")
+    assert "the mapping has bearing_from = 'sensor'" in refused(*command, "--radius-mm", 27.5)

@@ -20,7 +20,9 @@ def test_sample_gives_places_and_readings(tmp_path):
     assert np.degrees(np.unique(table.bearing)) == pytest.approx([0, 90, 180, 270])
     at = (table.sensor == 1) & (table.distance == table.distance.max()) & np.isclose(table.bearing, np.pi / 2)
     assert table.readings[at] == pytest.approx([made[2, 1, 1]])
-    assert table.measured_from == "body"
+    assert (table.measured_from, table.bearing_from, table.clockwise) == (None, None, None)
+    mapped = read_range_table(tmp_path / "wall.sample", TableMap(measured_from="body", bearing_from="sensor"))
+    assert (mapped.measured_from, mapped.bearing_from) == ("body", "sensor")
 
 
 def test_scaled_readings_become_shares(tmp_path):

@@ -19,10 +19,11 @@ from ._path_baselines import drive_on, look_up_motion
 from ._predict_table import look_up_readings, place_ranks, predict_range_table
 from ._predictive import PREDICTED, Misfit, misfits, prediction_errors
 from ._prior import Effect, Floats, Parameter, numbers_of, ranges_of, scribbler_prior, standard_of, values_of
-from ._range_table import RangeTableFit, fit_range_table
+from ._range_table import BearingFrom, MeasuredFrom, RangeTableFit, bearings_from_heading, fit_range_table
 from ._ruler import Moved, end_pose_of, moved_in, ruled
 from ._simulate import Simulate
 from ._step import of_one_length, step_of
+from ._table_frame import TableFrame, choose_frame
 from .infrared._checks import Independence, independence
 from .infrared._fit import LEAST_PLACEMENTS, SensorFit, fit_sensor
 from .infrared._plans import distance_of, placements_of, sensor_plans
@@ -34,12 +35,14 @@ __all__ = [
     "LEAST_STEPS",
     "MOTION",
     "PREDICTED",
+    "BearingFrom",
     "Effect",
     "Effort",
     "Evidence",
     "Floats",
     "HeldOut",
     "Independence",
+    "MeasuredFrom",
     "Misfit",
     "MotionFit",
     "MotionLog",
@@ -52,7 +55,10 @@ __all__ = [
     "RangeTableFit",
     "SensorFit",
     "Simulate",
+    "TableFrame",
     "Vectors",
+    "bearings_from_heading",
+    "choose_frame",
     "contact_plans",
     "distance_of",
     "drive_on",

@@ -7,7 +7,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from realitygap.world import RobotModel
 
-from ._range_table import NUMBERS, MeasuredFrom, gaps_to_wall, plain_number, wall_reading
+from ._range_response import numbers_in_file, wall_reading
+from ._range_table import BearingFrom, MeasuredFrom, gaps_to_wall
 from ._simulate import Floats
 
 FARTHEST = 6
@@ -21,6 +22,7 @@ def predict_range_table(
     robot: RobotModel,
     *,
     measured_from: MeasuredFrom = "body",
+    bearing_from: BearingFrom | None = None,
 ) -> Floats:
     """Return the expected readings of a robot along a long, straight wall, shape (n,), 0 to 1.
 
@@ -28,19 +30,16 @@ def predict_range_table(
         sensor: (n,) index of the range sensor in the robot's file.
         distance_m: (n,) shortest distance to the wall [m].
         bearing_rad: (n,) direction from the robot to the nearest point of the wall, positive to the left [rad].
-        robot: The robot; its sensors have the response `ir`.
-        measured_from: The point that distances are measured from, as in `fit_range_table`.
+        robot: The robot.
+        measured_from, bearing_from: As in `fit_range_table`.
     """
     which = np.asarray(sensor, np.int64)
-    gap, bearing = gaps_to_wall(
-        which, np.asarray(distance_m, np.float64), np.asarray(bearing_rad, np.float64), robot, measured_from
-    )
+    distance, bearing = np.asarray(distance_m, np.float64), np.asarray(bearing_rad, np.float64)
+    gap, bearing = gaps_to_wall(which, distance, bearing, robot, measured_from, bearing_from)
     readings = np.empty(len(which))
     for k in np.unique(which):
-        own = robot.range[k]
         at = which == k
-        numbers = {number.name: plain_number(robot, int(k), number.name) for number in NUMBERS}
-        readings[at] = wall_reading(gap[at], bearing[at], numbers, own.reach, own.rays)
+        readings[at] = wall_reading(gap[at], bearing[at], numbers_in_file(robot, int(k)), robot.range[k])
     return readings
 
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import dataclass, replace
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,9 +13,11 @@ from numpy.typing import ArrayLike
 from realitygap.world import Fitted, RobotModel
 
 from ._held_out import HeldOut, HeldOutFit
+from ._range_response import NAMES, Number, file_numbers, numbers_in_file, numbers_to_fit, wall_reading
 from ._simulate import Bools, Floats, Ints
 
 MeasuredFrom = Literal["body", "origin", "sensor"]
+BearingFrom = Literal["body", "sensor"]
 
 N_DRAWS = 200
 ENDS = (0.05, 0.95)
@@ -28,56 +31,31 @@ IDENTIFIED = 0.5
 """A parameter is identified if its interval is narrower than this share of its prior's."""
 
 NOISE = 0.05
-"""Standard deviation of readings around the response that the prior is weighed against."""
+"""Standard deviation of readings around the response that the priors are weighed against at first."""
 
-STEP = 1e-4
-"""Step of finite differences, in standard deviations of the prior."""
+LEAST_WEIGHT = 0.01
+"""Smallest weight of the priors of numbers in a second fit: the square of a standard deviation of 0.1 `NOISE`."""
+
+STEP, WIDE_STEP = 1e-4, 0.1
+"""Steps of finite differences, in standard deviations of the prior; the wide one for readings that jump."""
+
+JUMPS = ("lorentz", "table")
+"""Responses that jump at the reach or in their table: the slope at a point does not show that."""
 
 MOST_STEPS, MOST_DAMPING, ENOUGH = 200, 1e8, 1e-5
 """Limits of least squares. A step that gains less than the share `ENOUGH` is the last."""
 
-LEAST_COSINE = 1e-3
-"""Minimum cosine of the angle between a ray and the normal of a wall. A flatter ray meets no wall."""
+N_TRIED, N_STARTS, FEW_STEPS = 150, 3, 30
+"""Points of the prior that are tried for each sensor, those of them that a fit starts from, and its steps."""
+
+MOST_ROWS = 400
+"""Readings of a sensor that the search of a start uses."""
 
 METHOD = (
-    "Least squares of readings between 0 and 1 with a normal prior, response as in `sim`; distances that were set "
-    "together may be off together; intervals from the sandwich covariance, clustered by distance (White 1982)."
+    "Least squares of readings between 0 and 1 with a normal prior from several starts, response as in `sim`; "
+    "distances that were set together may be off together; "
+    "intervals from the sandwich covariance, clustered by distance (White 1982)."
 )
-
-
-@dataclass(frozen=True)
-class Number:
-    """A number of a range sensor with its prior.
-
-    Attributes:
-        name: Name, the same as in the robot's file.
-        kind: ratio: its logarithm is normal around `middle`; plus: it is normal around the robot's own.
-        spread: Standard deviation of the prior.
-        unit: Unit of its values.
-        advice: Data to record if it is not identified.
-    """
-
-    name: str
-    kind: Literal["ratio", "plus"]
-    spread: float
-    unit: str
-    advice: str
-
-
-NUMBERS = (
-    Number("amplitude", "ratio", 3.0, "", "Record nearer to the wall."),
-    Number("decay", "ratio", 1.0, "m", "Record at more distances at which readings are between 0 and 1."),
-    Number("direction", "plus", 0.3, "rad", "Record at more bearings, to both sides of the sensor."),
-    Number("cone", "ratio", 0.7, "rad", "Record at more bearings, to both sides of the sensor."),
-    Number("incidence", "ratio", 1.5, "", "Record at more bearings, to both sides of the sensor."),
-    Number(
-        "compression", "ratio", 1.5, "", "Record at more distances at which readings are between 0.5 and 1."
-    ),
-)
-"""Priors are wide: tables are made because little is known."""
-
-LEAST = {"cone": 0.02, "incidence": 0.3, "compression": 0.3, "amplitude": 0.01, "decay": 1e-4}
-"""The middle of a prior of ratios is at least this."""
 
 
 @dataclass(frozen=True)
@@ -95,6 +73,7 @@ def fit_range_table(
     robot: RobotModel,
     *,
     measured_from: MeasuredFrom = "body",
+    bearing_from: BearingFrom | None = None,
     hold_out: bool = True,
     shared: Sequence[str] = ("compression",),
     distance_sd_m: float = 0.0005,
@@ -108,9 +87,12 @@ def fit_range_table(
         bearing_rad: (n,) direction from the robot to the nearest point of the wall, positive to the left of the
             heading [rad].
         readings: (n,) 0 to 1.
-        robot: The robot with its nominal numbers; mounts, reach, rays and response stay.
+        robot: The robot with its nominal numbers; mounts, rays and response stay, and so does the reach unless the
+            response is linear.
         measured_from: The point that distances are measured from: the body's outline, its origin, or the sensor's
-            mount. With "sensor", bearings count from the direction in which the sensor looks.
+            mount.
+        bearing_from: The direction that bearings count from: the body's heading, or the direction in which the robot
+            file has the sensor look. Default: as `measured_from`.
         hold_out: True to leave out every second place, like a chessboard over distances and bearings.
         shared: Numbers that have one value for all sensors; the others differ.
         distance_sd_m: Standard deviation of the error of each distance, which all places at that distance share [m]; 0
@@ -122,13 +104,18 @@ def fit_range_table(
         with distances as they are written. `held_out.more` also has the errors with distances as corrected.
 
     Raises:
-        ValueError: The arrays do not fit together, a sensor is not in the robot's file, or its response is not `ir`.
+        ValueError: The arrays do not fit together, or a sensor is not in the robot's file.
     """
-    table = _Table.of(sensor, distance_m, bearing_rad, readings, robot, measured_from, hold_out=hold_out)
+    table = Readings.of(
+        sensor, distance_m, bearing_rad, readings, robot, measured_from, bearing_from, hold_out=hold_out
+    )
     if not 0.0 <= distance_sd_m < 0.1:
         raise ValueError(f"distance_sd_m is {distance_sd_m:g}, expected 0 to 0.1 m.")
-    problem = _Problem.of(table, robot, shared, distance_sd_m)
-    best, spread = problem.solve()
+    problem = RangeProblem.of(table, robot, shared, distance_sd_m)
+    first = problem.descend(problem.start(seed))
+    weight = float(np.mean(problem.left(first) ** 2))
+    problem = replace(problem, prior_weight=min(max(weight, LEAST_WEIGHT), 1.0))
+    best, spread = problem.solve(first)
     rng = np.random.default_rng(seed)
     draws = best + rng.standard_normal((N_DRAWS, len(best))) @ np.linalg.cholesky(spread).T
     numbers = problem.numbers(best)
@@ -149,7 +136,7 @@ def fit_range_table(
 
 
 @dataclass(frozen=True)
-class _Table:
+class Readings:
     """Places by sensor."""
 
     sensor: Ints
@@ -168,9 +155,10 @@ class _Table:
         readings: ArrayLike,
         robot: RobotModel,
         measured_from: MeasuredFrom,
+        bearing_from: BearingFrom | None,
         *,
         hold_out: bool,
-    ) -> _Table:
+    ) -> Readings:
         which = np.asarray(sensor)
         columns = {"distance_m": distance_m, "bearing_rad": bearing_rad, "readings": readings}
         arrays = {name: np.asarray(values, np.float64) for name, values in columns.items()}
@@ -196,10 +184,9 @@ class _Table:
             )
         if arrays["distance_m"].min() < 0:
             raise ValueError(f"A distance is {arrays['distance_m'].min():g} m, expected at least 0.")
-        for k in np.unique(index):
-            if robot.range[k].response != "ir":
-                raise ValueError(f"range.{k} has the response {robot.range[k].response!r}, expected 'ir'.")
-        gap, bearing = gaps_to_wall(index, arrays["distance_m"], arrays["bearing_rad"], robot, measured_from)
+        gap, bearing = gaps_to_wall(
+            index, arrays["distance_m"], arrays["bearing_rad"], robot, measured_from, bearing_from
+        )
         ranks = tuple(
             np.unique(np.round(arrays[name], 6), return_inverse=True)[1]
             for name in ("distance_m", "bearing_rad")
@@ -211,18 +198,46 @@ class _Table:
                 raise ValueError(f"The fit sees {n} readings of range.{k}, expected at least {LEAST_PLACES}.")
         return cls(index, gap, bearing, arrays["readings"], seen, (ranks[0], ranks[1]))
 
+    def of_sensor(self, k: int, most: int = MOST_ROWS) -> Readings:
+        """Return the seen readings of one sensor; a random part of them if there are more than `most`."""
+        rows = np.flatnonzero(self.seen & (self.sensor == k))
+        if len(rows) > most:
+            rows = np.sort(np.random.default_rng(0).choice(rows, most, replace=False))
+        place = self.place[0][rows], self.place[1][rows]
+        return Readings(
+            self.sensor[rows], self.gap[rows], self.bearing[rows], self.readings[rows], self.seen[rows], place
+        )
+
+
+def bearings_from_heading(
+    sensor: Ints, bearing: Floats, robot: RobotModel, bearing_from: BearingFrom
+) -> Floats:
+    """Return the bearing of the wall from the body's heading, (n,) [rad]."""
+    if bearing_from not in ("body", "sensor"):
+        raise ValueError(f"bearing_from is {bearing_from!r}, expected 'body' or 'sensor'.")
+    if bearing_from == "body":
+        return bearing
+    return np.asarray(bearing + np.array([_center(each.direction) for each in robot.range])[sensor])
+
 
 def gaps_to_wall(
-    sensor: Ints, distance: Floats, bearing: Floats, robot: RobotModel, measured_from: MeasuredFrom
+    sensor: Ints,
+    distance: Floats,
+    bearing: Floats,
+    robot: RobotModel,
+    measured_from: MeasuredFrom,
+    bearing_from: BearingFrom | None = None,
 ) -> tuple[Floats, Floats]:
     """Return the distance from each sensor's mount to the wall [m], and the wall's bearing from the heading [rad]."""
-    mounts = np.array([[s.x, s.y, s.direction] for s in robot.range])[sensor]
-    if measured_from == "sensor":
-        return distance, bearing + mounts[:, 2]
-    if measured_from not in ("body", "origin"):
+    if measured_from not in ("body", "origin", "sensor"):
         raise ValueError(f"measured_from is {measured_from!r}, expected 'body', 'origin' or 'sensor'.")
+    is_own = measured_from == "sensor"
+    bearing = bearings_from_heading(sensor, bearing, robot, bearing_from or ("sensor" if is_own else "body"))
+    if is_own:
+        return distance, bearing
+    mounts = np.array([[_center(each.x), _center(each.y)] for each in robot.range])[sensor]
     normal = np.stack([np.cos(bearing), np.sin(bearing)], axis=1)
-    gap = distance - (normal * mounts[:, :2]).sum(axis=1)
+    gap = distance - (normal * mounts).sum(axis=1)
     if measured_from == "body":
         reach = [(normal @ np.array(part.corners).T).max(axis=1) + part.radius for part in robot.body]
         gap = gap + np.max(reach, axis=0)
@@ -230,25 +245,32 @@ def gaps_to_wall(
 
 
 @dataclass(frozen=True)
-class _Problem:
+class RangeProblem:
     """A table, and the numbers that are fitted to it."""
 
-    table: _Table
+    table: Readings
     robot: RobotModel
     free: tuple[tuple[Number, tuple[int, ...]], ...]  # a number, and the sensors that have it
     distance_sd: float
+    own: Mapping[int, dict[str, float]]  # numbers in the robot file, by sensor
+    prior_weight: float = 1.0  # of the priors of numbers
 
     @classmethod
-    def of(cls, table: _Table, robot: RobotModel, shared: Sequence[str], distance_sd: float) -> _Problem:
-        unknown = sorted(set(shared) - {number.name for number in NUMBERS})
+    def of(
+        cls, table: Readings, robot: RobotModel, shared: Sequence[str], distance_sd: float
+    ) -> RangeProblem:
+        unknown = sorted(set(shared) - set(NAMES))
         if unknown:
-            expected = ", ".join(number.name for number in NUMBERS)
-            raise ValueError(f"shared has {unknown[0]!r}, expected some of {expected}.")
-        sensors = tuple(int(k) for k in np.unique(table.sensor))
+            raise ValueError(f"shared has {unknown[0]!r}, expected some of {', '.join(NAMES)}.")
+        sensors: dict[Number, list[int]] = {}
+        for k in np.unique(table.sensor):
+            for number in numbers_to_fit(robot.range[k]):
+                sensors.setdefault(number, []).append(int(k))
         free: list[tuple[Number, tuple[int, ...]]] = []
-        for number in NUMBERS:
-            free += [(number, sensors)] if number.name in shared else [(number, (k,)) for k in sensors]
-        return cls(table, robot, tuple(free), distance_sd)
+        for number, which in sensors.items():
+            free += [(number, tuple(which))] if number.name in shared else [(number, (k,)) for k in which]
+        own = {int(k): numbers_in_file(robot, int(k)) for k in np.unique(table.sensor)}
+        return cls(table, robot, tuple(free), distance_sd, own)
 
     @property
     def n_rings(self) -> int:
@@ -261,79 +283,100 @@ class _Problem:
 
     def middle(self, number: Number, sensors: Sequence[int]) -> float:
         """Return the center of the prior."""
-        own = float(np.mean([plain_number(self.robot, k, number.name) for k in sensors]))
-        return max(own, LEAST[number.name]) if number.kind == "ratio" else own
+        own = float(np.mean([self.own[k][number.name] for k in sensors]))
+        return max(own, number.least) if number.kind == "ratio" else own
 
-    def values(self, point: Floats) -> dict[str, Floats]:
-        """Return (s,) numbers of all sensors of the robot at a point (p,) of the standard normal scale."""
-        values = {
-            n.name: np.array([plain_number(self.robot, k, n.name) for k in range(len(self.robot.range))])
-            for n in NUMBERS
-        }
+    def fitted_values(self, point: Floats) -> dict[int, dict[str, float]]:
+        """Return the fitted numbers of each sensor at a point (p,) of the standard normal scale."""
+        values: dict[int, dict[str, float]] = {k: {} for k in self.own}
         for (number, sensors), z in zip(self.free, point, strict=False):  # distances follow
-            middle = self.middle(number, sensors)
-            value = (
-                middle * np.exp(number.spread * z) if number.kind == "ratio" else middle + number.spread * z
-            )
-            values[number.name][list(sensors)] = value
-        values["cone"] = np.minimum(values["cone"], np.pi)
+            value = number.value(self.middle(number, sensors), float(z))
+            for k in sensors:
+                values[k][number.name] = value
         return values
 
     def numbers(self, point: Floats) -> dict[str, float]:
-        """Return the robot's numbers by dotted name."""
-        values = self.values(point)
-        sensors = np.unique(self.table.sensor)
-        return {
-            f"range.{k}.{number.name}": float(values[number.name][k]) for k in sensors for number in NUMBERS
-        }
+        """Return the robot's numbers by dotted name. Directions are at most half a turn from those of the file."""
+        numbers = {}
+        for k, values in self.fitted_values(point).items():
+            turn = values["direction"] - self.own[k]["direction"]
+            values["direction"] -= 2 * math.pi * round(turn / (2 * math.pi))
+            for name, value in file_numbers(values, self.robot.range[k]).items():
+                numbers[f"range.{k}.{name}"] = value
+        return numbers
 
-    def expected(self, values: Mapping[str, Floats], more: Floats | float = 0.0) -> Floats:
-        """Return (n,) readings of all places, at gaps that are larger by `more` [m]."""
+    def expected(self, values: Mapping[int, Mapping[str, float]], more: Floats | float = 0.0) -> Floats:
+        """Return (n,) readings of all places, at gaps that are larger by `more` [m].
+
+        Args:
+            values: Numbers of each sensor that differ from those of the robot file.
+            more: (n,) [m].
+        """
         table, readings = self.table, np.empty(len(self.table.sensor))
         gaps = table.gap + more
-        for k in np.unique(table.sensor):
-            at, sensor = table.sensor == k, self.robot.range[k]
-            one = {name: float(each[k]) for name, each in values.items()}
-            readings[at] = wall_reading(gaps[at], table.bearing[at], one, sensor.reach, sensor.rays)
+        for k, own in self.own.items():
+            at = table.sensor == k
+            readings[at] = wall_reading(
+                gaps[at], table.bearing[at], {**own, **values.get(k, {})}, self.robot.range[k]
+            )
         return readings
 
     def at(self, point: Floats) -> Floats:
         """Return (n,) readings of all places at a point of the standard scale."""
         more = self.off_by(point)[self.table.place[0]] if self.n_rings else 0.0
-        return self.expected(self.values(point), more)
+        return self.expected(self.fitted_values(point), more)
 
-    def slopes(self, point: Floats) -> Floats:
+    def slopes(self, point: Floats, step: float = STEP) -> Floats:
         """Return (n, p) derivatives of the readings: numbers of different sensors change in one go."""
         table, here = self.table, self.at(point)
         slopes = np.zeros((len(here), len(point)))
-        for number in NUMBERS:
-            columns = [k for k, (each, _) in enumerate(self.free) if each.name == number.name]
+        for name in dict.fromkeys(number.name for number, _ in self.free):
+            columns = [k for k, (each, _) in enumerate(self.free) if each.name == name]
             moved = point.copy()
-            moved[columns] += STEP
-            change = (self.at(moved) - here) / STEP
+            moved[columns] += step
+            change = (self.at(moved) - here) / step
             for column in columns:
                 rows = np.isin(table.sensor, self.free[column][1])
                 slopes[rows, column] = change[rows]
         if self.n_rings:
             moved = point.copy()
-            moved[len(self.free) :] += STEP
-            slopes[np.arange(len(here)), len(self.free) + table.place[0]] = (self.at(moved) - here) / STEP
+            moved[len(self.free) :] += step
+            slopes[np.arange(len(here)), len(self.free) + table.place[0]] = (self.at(moved) - here) / step
         return slopes
 
-    def solve(self) -> tuple[Floats, Floats]:
-        """Return the best point, (p,), and its covariance, (p, p): Levenberg-Marquardt."""
-        table, seen = self.table, self.table.seen
-        point, damping = np.zeros(len(self.free) + self.n_rings), 1e-2
-        left = (self.at(point) - table.readings)[seen] / NOISE
-        for _ in range(MOST_STEPS):
-            slopes = self.slopes(point)[seen] / NOISE
-            curvature = slopes.T @ slopes + np.eye(len(point))
-            slope = slopes.T @ left + point
+    @property
+    def weights(self) -> Floats:
+        """The weights of the priors of numbers and of errors of distances, (p,)."""
+        return np.concatenate([np.full(len(self.free), self.prior_weight), np.ones(self.n_rings)])
+
+    def cost(self, point: Floats) -> float:
+        """Return the squares of what a point leaves unexplained, and of its distance from the prior's center."""
+        left = self.left(point)
+        return float(left @ left + self.weights @ point**2)
+
+    def left(self, point: Floats) -> Floats:
+        """Return what a point leaves unexplained of the seen readings, in multiples of `NOISE`."""
+        return np.asarray((self.at(point) - self.table.readings)[self.table.seen] / NOISE)
+
+    def descend(self, point: Floats, most_steps: int = MOST_STEPS) -> Floats:
+        """Return the best point near another one, (p,)."""
+        if any(self.robot.range[k].response in JUMPS for k in self.own):
+            point = self._descend(point, most_steps, WIDE_STEP)
+        return self._descend(point, most_steps, STEP)
+
+    def _descend(self, point: Floats, most_steps: int, step: float) -> Floats:
+        """Return the best point near another one by Levenberg-Marquardt, (p,)."""
+        seen, weights, damping = self.table.seen, self.weights, 1e-2
+        left = self.left(point)
+        for _ in range(most_steps):
+            slopes = self.slopes(point, step)[seen] / NOISE
+            curvature = slopes.T @ slopes + np.diag(weights)
+            slope = slopes.T @ left + weights * point
             gained = 0.0
             while damping < MOST_DAMPING:
                 new = point - np.linalg.solve(curvature + damping * np.diag(np.diag(curvature)), slope)
-                then = (self.at(new) - table.readings)[seen] / NOISE
-                gained = left @ left + point @ point - then @ then - new @ new
+                then = self.left(new)
+                gained = left @ left + weights @ point**2 - then @ then - weights @ new**2
                 if gained > 0:
                     break
                 damping *= 4.0
@@ -342,11 +385,65 @@ class _Problem:
             point, left, damping = new, then, max(damping / 8.0, 1e-9)
             if gained < ENOUGH * (left @ left):
                 break
+        return point
+
+    def start(self, seed: int) -> Floats:
+        """Return the point to start from: for each sensor alone, the best of fits from several places."""
+        start = np.zeros(len(self.free) + self.n_rings)
+        n_sensors = np.zeros(len(start))
+        for k in self.own:
+            alone = RangeProblem.of(self.table.of_sensor(k), self.robot, (), 0.0)
+            best = alone.best_of_several(seed)
+            for (number, _), z in zip(alone.free, best, strict=True):
+                column = next(
+                    j for j, (each, sensors) in enumerate(self.free) if each == number and k in sensors
+                )
+                start[column] += z
+                n_sensors[column] += 1
+        return start / np.maximum(n_sensors, 1)
+
+    def best_of_several(self, seed: int, n_tried: int = N_TRIED, n_starts: int = N_STARTS) -> Floats:
+        """Return the best point for one sensor, of fits from the robot file's numbers and from points of the prior.
+
+        In half of the points, the sensor looks where it reads most, and has usual numbers: the robot file may be far
+        off.
+
+        Args:
+            seed: Seed of the points.
+            n_tried: Number of the points.
+            n_starts: Number of the best points from which a fit starts.
+        """
+        (k,) = self.own
+        rng = np.random.default_rng(seed)
+        points = rng.standard_normal((n_tried, len(self.free)))
+        column = next(j for j, (number, _) in enumerate(self.free) if number.name == "direction")
+        pull = np.angle(np.sum(self.table.readings**2 * np.exp(1j * self.table.bearing)))
+        turn = (pull - self.own[k]["direction"] + math.pi) % (2 * math.pi) - math.pi
+        points[::2] = 0.5 * points[::2] + self._usual(float(self.table.gap.max()))
+        points[::2, column] += turn / self.free[column][0].spread
+        costs = [self.cost(point) for point in points]
+        starts = [np.zeros(len(self.free)), *points[np.argsort(costs)[:n_starts]]]
+        return min((self.descend(point, FEW_STEPS) for point in starts), key=self.cost)
+
+    def _usual(self, farthest: float) -> Floats:
+        """Return the point of usual numbers for readings up to a distance [m], (p,)."""
+        point = np.zeros(len(self.free))
+        for column, (number, sensors) in enumerate(self.free):
+            if number.usual:
+                usual = number.usual * (farthest if number.unit == "m" else 1.0)
+                point[column] = math.log(usual / self.middle(number, sensors)) / number.spread
+        return point
+
+    def solve(self, start: Floats) -> tuple[Floats, Floats]:
+        """Return the best point near a start, (p,), and its covariance, (p, p)."""
+        table, seen = self.table, self.table.seen
+        point = self.descend(start)
+        left = self.left(point)
         slopes = self.slopes(point)[seen] / NOISE
-        inverse = np.linalg.inv(slopes.T @ slopes + np.eye(len(point)))
+        inverse = np.linalg.inv(slopes.T @ slopes + np.diag(self.weights))
         cluster = table.place[0][seen]
         pulls = np.array([slopes[cluster == k].T @ left[cluster == k] for k in np.unique(cluster)])
-        spread = inverse @ (pulls.T @ pulls + np.eye(len(point))) @ inverse
+        spread = inverse @ (pulls.T @ pulls + np.diag(self.weights**2)) @ inverse
         return point, (spread + spread.T) / 2 + 1e-12 * np.eye(len(point))
 
     def fitted(self, best: Floats, spread: Floats) -> list[Fitted]:
@@ -356,8 +453,7 @@ class _Problem:
             middle = self.middle(number, sensors)
 
             def of(z: float, number: Number = number, middle: float = middle) -> float:
-                step = number.spread * z
-                return float(middle * np.exp(step)) if number.kind == "ratio" else float(middle + step)
+                return number.value(middle, z)
 
             wide = 1.645 * float(np.sqrt(spread[k, k]))
             identified = wide < IDENTIFIED * 1.645
@@ -377,46 +473,12 @@ class _Problem:
         return rows
 
 
-def wall_reading(
-    gap: Floats, bearing: Floats, numbers: Mapping[str, float], reach: float, rays: int
-) -> Floats:
-    """Return (n,) readings along a straight wall, as kernels/sim/ranges.py.
-
-    Args:
-        gap: (n,) distance from the mount to the wall [m].
-        bearing: (n,) bearing of the wall from the body's heading [rad].
-        numbers: Values of `NUMBERS`, by name.
-        reach: [m].
-        rays: Number of rays.
-    """
-    part = np.linspace(-1.0, 1.0, rays) if rays > 1 else np.zeros(1)
-    weights = 1.0 - 0.5 * part**2
-    cosine = np.cos(numbers["direction"] + numbers["cone"] * part - bearing[:, None])
-    meets = cosine > LEAST_COSINE
-    cosine = np.where(meets, cosine, 1.0)
-    distance = np.maximum(gap[:, None], 0.0) / cosine
-    back = np.exp(-distance / numbers["decay"]) * (meets & (distance < reach))
-    back = back * cosine / (cosine + numbers["incidence"] * (1.0 - cosine))
-    light = numbers["amplitude"] * (back @ (weights / weights.sum()))
-    c = numbers["compression"]
-    return np.asarray(np.clip(np.log1p(c * light) / c if c else light, 0.0, 1.0))
-
-
-def plain_number(robot: RobotModel, k: int, name: str) -> float:
-    value = getattr(robot.range[k], name)
-    return float(value.center if hasattr(value, "center") else value)
-
-
-def _compare(problem: _Problem, best: Floats) -> HeldOut:
+def _compare(problem: RangeProblem, best: Floats) -> HeldOut:
     """Predict the places that the fit did not see."""
     table = problem.table
-    own = {
-        n.name: np.array([plain_number(problem.robot, k, n.name) for k in range(len(problem.robot.range))])
-        for n in NUMBERS
-    }
     predicted = {
-        "own": problem.expected(own),
-        "fitted": problem.expected(problem.values(best)),
+        "own": problem.expected({}),
+        "fitted": problem.expected(problem.fitted_values(best)),
         "at": problem.at(best),
     }
     left = {name: values - table.readings for name, values in predicted.items()}
@@ -444,7 +506,7 @@ def _compare(problem: _Problem, best: Floats) -> HeldOut:
     )
 
 
-def _floor(table: _Table) -> float | None:
+def _floor(table: Readings) -> float | None:
     """Return the error of predicting each held-out reading by the mean of its fitted neighbors in the table."""
     rows, columns = table.place
     grid = np.full((table.sensor.max() + 1, rows.max() + 3, columns.max() + 3), np.nan)
@@ -455,6 +517,11 @@ def _floor(table: _Table) -> float | None:
     if not some.any():
         return None
     return _rms(np.nanmean(around[:, some], axis=0) - table.readings[~table.seen][some])
+
+
+def _center(value: Any) -> float:
+    """Return a number, or the center of its distribution."""
+    return float(getattr(value, "center", value))
 
 
 def _rms(values: Floats) -> float:

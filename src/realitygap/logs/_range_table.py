@@ -17,7 +17,7 @@ from realitygap.errors import LogError
 
 from ._guess import SENSOR
 from ._source import MOST_SHOWN, Floats, check_columns
-from ._table_map import MeasuredFrom, TableColumns, TableMap
+from ._table_map import BearingFrom, MeasuredFrom, TableColumns, TableMap
 from ._text import TextSource
 from ._units import ANGLES, LENGTHS, unit_factor
 from ._words import tokens_of, unit_in
@@ -36,8 +36,9 @@ class RangeTable:
         distance: (n,) to the wall [m].
         bearing: (n,) bearing of the wall in the sign of the table [rad].
         readings: (n,) 0 to 1.
-        measured_from: The point that distances are measured from.
-        clockwise: True if bearings grow clockwise; None if the table does not show it.
+        measured_from: The point that distances are measured from; None if neither table nor mapping say it.
+        clockwise: True if bearings grow clockwise; None if the mapping does not say it.
+        bearing_from: The direction that bearings count from; None if the mapping does not say it.
         notes: Notes on the table.
     """
 
@@ -45,8 +46,9 @@ class RangeTable:
     distance: Floats
     bearing: Floats
     readings: Floats
-    measured_from: MeasuredFrom
+    measured_from: MeasuredFrom | None
     clockwise: bool | None
+    bearing_from: BearingFrom | None = None
     notes: tuple[str, ...] = ()
 
     @property
@@ -80,10 +82,8 @@ def read_range_table(path: str | Path, table_map: TableMap | None = None) -> Ran
     head = _HEAD.match(data)
     if head is not None and table_map.columns is None:
         sensor, distance, bearing, raw = _sample(path, data, [float(part) for part in head[1].split()])
-        measured_from: MeasuredFrom = "body"
     else:
         sensor, distance, bearing, raw = _text(path, table_map)
-        measured_from = "body" if np.ptp(bearing) else "sensor"
     if not len(raw):
         raise LogError(f"{path} has no readings.")
     readings, notes = _scaled(path, raw, table_map)
@@ -94,8 +94,9 @@ def read_range_table(path: str | Path, table_map: TableMap | None = None) -> Ran
         distance,
         bearing + math.radians(table_map.first_bearing_deg),
         readings,
-        table_map.measured_from or measured_from,
+        table_map.measured_from or (None if np.ptp(bearing) else "sensor"),
         table_map.clockwise,
+        table_map.bearing_from,
         tuple(notes),
     )
 

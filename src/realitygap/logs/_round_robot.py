@@ -17,6 +17,8 @@ CONE_DEG = 30
 AMPLITUDE = 2.0
 DECAY = 0.25
 """Share of the farthest distance in which readings fall to 1/e, before the fit."""
+SAME_DIRECTION = 0.98
+"""Length of the mean of unit vectors from which on sensors look in one direction: all within about 0.2 rad."""
 SPEED, TRACK = 0.1, 1.8
 """Speed [m/s], and track in radii: a table does not show them."""
 
@@ -35,7 +37,7 @@ def round_robot(table: RangeTable, radius: float, name: str, *, clockwise: bool)
         clockwise: True if the bearings of the table grow clockwise.
 
     Raises:
-        LogError: A sensor reads nothing, or the table has no bearings.
+        LogError: A sensor reads nothing, or the bearings of the table do not place the sensors.
     """
     if not np.ptp(table.bearing):
         raise LogError(
@@ -43,13 +45,14 @@ def round_robot(table: RangeTable, radius: float, name: str, *, clockwise: bool)
         )
     bearing = table.bearing_left(clockwise=clockwise)
     farthest = float(table.distance.max())
-    sensors = []
+    sensors, angles = [], []
     for k in range(table.n_sensors):
         at = table.sensor == k
         pull = np.sum(table.readings[at] ** 2 * np.exp(1j * bearing[at])) if at.any() else 0j
         if not abs(pull):
             raise LogError(f"Sensor {k} of the table reads nothing anywhere. Leave it out of the mapping.")
         angle = float(np.angle(pull))
+        angles.append(angle)
         sensors.append(
             {
                 "x": radius * math.cos(angle), "y": radius * math.sin(angle), "direction": angle,
@@ -57,6 +60,12 @@ def round_robot(table: RangeTable, radius: float, name: str, *, clockwise: bool)
                 "amplitude": AMPLITUDE, "decay": DECAY * farthest,
             }
         )  # fmt: skip
+    if len(angles) > 1 and np.abs(np.mean(np.exp(1j * np.array(angles)))) > SAME_DIRECTION:
+        raise LogError(
+            f"All {len(angles)} sensors of the table read most at about the same bearing, so bearings seem to count "
+            "from each sensor's own direction. Such a table does not show where the sensors are. Write a robot file "
+            "with their mounts, and name it with --base."
+        )
     values = {
         "name": name,
         "description": f"A disc with {table.n_sensors} infrared sensors, made from a table of their readings.",

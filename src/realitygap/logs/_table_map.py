@@ -12,6 +12,7 @@ from realitygap.settings import Settings
 from ._log_map import Column, MapFile, TextFormat, checked_map, read_map
 
 MeasuredFrom = Literal["body", "origin", "sensor"]
+BearingFrom = Literal["body", "sensor"]
 
 
 class TableColumns(Settings):
@@ -47,11 +48,16 @@ class TableMap(MapFile):
     measured_from: MeasuredFrom | None = Field(
         None,
         description="Point that distances are measured from: the body's outline, its origin, or the sensor. "
-        "Default: the outline; the sensor if there are no bearings.",
+        "Default: the sensor if bearings count from it or if there are none; otherwise the outline.",
+    )
+    bearing_from: BearingFrom | None = Field(
+        None,
+        description="Direction that bearings count from: the heading of the body, or the direction in which the robot "
+        "file has the sensor look. Default: the one in which the robot fits the table better.",
     )
     clockwise: bool | None = Field(
         None,
-        description="True if bearings grow clockwise. Default: the direction that agrees with the robot file.",
+        description="True if bearings grow clockwise. Default: the direction in which the robot fits the table better.",
     )
     first_bearing_deg: float = Field(0.0, description="Bearing of the first row; 0 is ahead.")
     full: float = Field(

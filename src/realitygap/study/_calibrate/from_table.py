@@ -9,7 +9,17 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from realitygap.calibration import fit_range_table, look_up_readings, place_ranks, predict_range_table
+from realitygap.calibration import (
+    BearingFrom,
+    MeasuredFrom,
+    TableFrame,
+    bearings_from_heading,
+    choose_frame,
+    fit_range_table,
+    look_up_readings,
+    place_ranks,
+    predict_range_table,
+)
 from realitygap.errors import StudyError
 from realitygap.logs import RangeTable, TableMap, load_table_map, map_beside, read_range_table, round_robot
 from realitygap.platforms import JyroPlatform
@@ -25,6 +35,12 @@ BETWEEN = (0.03, 1.0)
 N_DISTANCES = 5
 """Bands of distance by which residuals are shown."""
 N_BEARINGS = 6
+
+POINTS: dict[BearingFrom, tuple[MeasuredFrom, ...]] = {"body": ("body",), "sensor": ("sensor", "body")}
+"""Points that distances are usually measured from, by the direction that bearings count from."""
+
+MOST_OTHERS = 3
+"""Number of rejected ways to read a table that the note names."""
 
 
 def calibrate_from_table(
@@ -69,16 +85,20 @@ def calibrate_from_table(
             f"{path} has {table.n_sensors} sensors, and robot {robot.name!r} has {len(robot.range)}. Name the robot "
             "that was measured: --base ROBOT. For a round robot without a file, give --radius-mm."
         )
-    bearing, notes = _turned(table, robot)
     seen = _seen(table, hold_out, seed)
     try:
+        frame, notes = _frame(table, robot, seen, is_placed=radius is not None)
+        bearing = bearings_from_heading(
+            table.sensor, table.bearing_left(clockwise=frame.clockwise), robot, frame.bearing_from
+        )
         fit = fit_range_table(
             table.sensor[seen],
             table.distance[seen],
             bearing[seen],
             table.readings[seen],
             robot,
-            measured_from=table.measured_from,
+            measured_from=frame.measured_from,
+            bearing_from="body",
             hold_out=False,
             seed=seed,
         )
@@ -86,7 +106,8 @@ def calibrate_from_table(
         raise StudyError(f"{path}: {error}") from None
     compared = None
     if not seen.all():
-        compared = _compare(table, bearing, seen, robot, robot.with_numbers(fit.numbers), hold_out)
+        fitted = robot.with_numbers(fit.numbers)
+        compared = _compare(table, bearing, seen, robot, fitted, frame, hold_out)
     notes = [*table.notes, *notes, *fit.notes]
     parts = Parts(fit.fitted, fit.numbers, fit.draws, fit.method, tuple(notes), evidence=fit.evidence)
     parts = chosen_parts(parts, compared, {})
@@ -101,29 +122,52 @@ def _map_of(path: str | Path, map_file: str | Path | None) -> TableMap:
 
 def _write_robot(table: RangeTable, radius: float, file: Path) -> Path:
     """Write the file of a round robot with the sensors of a table, clockwise if nobody says how bearings grow."""
+    if table.bearing_from == "sensor":
+        raise StudyError(
+            "--radius-mm places the sensors by the bearings of the table, but the mapping has bearing_from = 'sensor'. "
+            "Write a robot file with the mounts of the sensors, and name it with --base."
+        )
     text = round_robot(table, radius, file.name.split(".")[0], clockwise=table.clockwise is not False)
     write_whole(file, text.encode())
     return file
 
 
-def _turned(table: RangeTable, robot: RobotModel) -> tuple[NDArray[np.float64], list[str]]:
-    """Return bearings, positive to the left: by the mapping, or in the direction that suits the robot file better."""
-    if table.clockwise is not None or not np.ptp(table.bearing):
-        return table.bearing_left(clockwise=bool(table.clockwise)), []
-    errors = {}
-    for clockwise in (True, False):
-        bearing = table.bearing_left(clockwise=clockwise)
-        nominal = predict_range_table(
-            table.sensor, table.distance, bearing, robot, measured_from=table.measured_from
-        )
-        errors[clockwise] = _rms(nominal - table.readings)
-    best = errors[True] <= errors[False]
-    names = {True: "clockwise", False: "counterclockwise"}
+def _frame(
+    table: RangeTable, robot: RobotModel, seen: NDArray[np.bool_], *, is_placed: bool
+) -> tuple[TableFrame, list[str]]:
+    """Return how distances and bearings count: by the mapping, or so that the sensors fit the table best.
+
+    Args:
+        table: The table.
+        robot: The robot with its nominal numbers.
+        seen: (n,) whether the fit sees each reading.
+        is_placed: Whether the table itself placed the sensors by bearings from the robot's heading.
+    """
+    bearings: tuple[BearingFrom, ...] = ("body", "sensor")
+    if table.bearing_from is not None:
+        bearings = (table.bearing_from,)
+    elif is_placed:
+        bearings = ("body",)
+    elif not np.ptp(table.bearing):
+        bearings = ("sensor" if table.measured_from == "sensor" else "body",)
+    turns = (True, False) if table.clockwise is None else (table.clockwise,)
+    frames = [
+        TableFrame(point, bearing, clockwise)
+        for bearing in bearings
+        for point in ((table.measured_from,) if table.measured_from else POINTS[bearing])
+        for clockwise in (turns if np.ptp(table.bearing) else (False,))
+    ]
+    if len(frames) == 1:
+        return frames[0], []
+    rows = table.sensor[seen], table.distance[seen], table.bearing[seen], table.readings[seen]
+    frame, errors = choose_frame(*rows, robot, frames)
+    others = sorted((error, str(other)) for other, error in errors.items() if other != frame)
     note = (
-        f"Bearings are taken to grow {names[best]}: the robot file's error is {errors[best]:.3f} so, and "
-        f"{errors[not best]:.3f} {names[not best]}."
+        f"The mapping leaves open how the table counts. Taken: {frame} (error of a first fit: {errors[frame]:.3f}). "
+        f"Otherwise: {'; '.join(f'{other} ({error:.3f})' for error, other in others[:MOST_OTHERS])}. To choose, set "
+        "bearing_from, clockwise, and measured_from in the mapping."
     )
-    return table.bearing_left(clockwise=best), [note]
+    return frame, [note]
 
 
 def _seen(table: RangeTable, hold_out: HoldOut, seed: int) -> NDArray[np.bool_]:
@@ -142,14 +186,26 @@ def _compare(
     seen: NDArray[np.bool_],
     nominal: RobotModel,
     fitted: RobotModel,
+    frame: TableFrame,
     hold_out: HoldOut,
 ) -> Compared:
     """Return errors at the places that the fit did not see."""
-    at = table.sensor, table.distance, bearing
+
+    def predicted(robot: RobotModel) -> NDArray[np.float64]:
+        return predict_range_table(
+            table.sensor,
+            table.distance,
+            bearing,
+            robot,
+            measured_from=frame.measured_from,
+            bearing_from="body",
+        )
+
+    looked_up = look_up_readings(table.sensor, table.distance, table.bearing, table.readings, seen)
     off = {
-        FITTED: predict_range_table(*at, fitted, measured_from=table.measured_from) - table.readings,
-        NOMINAL: predict_range_table(*at, nominal, measured_from=table.measured_from) - table.readings,
-        TABLE: look_up_readings(*at, table.readings, seen) - table.readings,
+        FITTED: predicted(fitted) - table.readings,
+        NOMINAL: predicted(nominal) - table.readings,
+        TABLE: looked_up - table.readings,
     }
     between = (table.readings > BETWEEN[0]) & (table.readings < BETWEEN[1])
 

@@ -272,7 +272,7 @@ def test_tags_are_printed_at_true_scale(command, tmp_path):
     [
         (("--camera", "no.mp4"), "There is no video no.mp4"),
         (("--camera", "99"), "There is no camera 99"),
-        (("--camera", "x", "--tag", "cat"), "--tag is 'cat', expected a number"),
+        (("--camera", "x", "--tag", "cat"), "tag is 'cat', expected a number"),
         (("--camera", "x", "--tag", "36h12:3"), "Did you mean '36h11'?"),
         (("--camera", "x", "--tag-at", "1,2"), "expected three numbers"),
         (("--camera", "x", "--tag-size", "0"), "expected a length above 0 m"),

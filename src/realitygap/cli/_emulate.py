@@ -104,7 +104,7 @@ def emulate(
 ) -> None:
     """Emulate a robot on a pseudo-terminal or TCP port.
 
-    The first line is the name of the port: a pseudo-terminal, for `--port` of other commands and for other programs, or
+    The first line is the name of the port: a pseudo-terminal, for other commands and programs, or
     a TCP port. In a terminal, a live view of a Scribbler follows. It shows the arena, the robot, its path and lights,
     and the last command.
 

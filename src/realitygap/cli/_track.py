@@ -143,7 +143,7 @@ def track(
 
     A tag at each corner locates the arena. The track is interpolated, and marked, while the robot's tag is not visible.
     With --trial, the commands of the trial locate it in the video. Its cells and path go to the ledger of --study.
-    With --into, the trial and its poses go to a file for `calibrate --from` and `gap`.
+    With --into, the trial and its poses go to a file for `realitygap calibrate --from` and `realitygap gap`.
 
     Example: realitygap track --camera trial-12.mp4 --sheet -o trial-12.csv --overlay seen.mp4
 

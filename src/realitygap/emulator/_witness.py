@@ -227,7 +227,7 @@ class RemoteWitness(ClosedOnExit):
             self._socket = socket.create_connection((host or "127.0.0.1", int(port)), timeout=timeout_s)
         except OSError as error:
             raise RobotError(
-                f"No witness at {address} ({error}). Start the emulator with --witness PORT and give 127.0.0.1:PORT."
+                f"No witness at {address} ({error}). Start realitygap emulate --witness PORT, and give 127.0.0.1:PORT."
             ) from error
         self._file = self._socket.makefile("rb")
         # of a question and its answer: a page that shows a trial looks from a thread of its own

@@ -184,7 +184,7 @@ class Genome(_json.Written[_json.GenomeForm], ShownAsCard):
             raise ControllerError(
                 f"The controller has {n_inputs} inputs and {n_outputs} outputs, and does not name them. "
                 f"Expected {', '.join(paper.inputs)} and {', '.join(paper.outputs)}, or names for them "
-                "(--inputs)."
+                "(`realitygap try --inputs`)."
             )
         return paper
 

@@ -74,7 +74,7 @@ def trial_of(log: Log, log_map: LogMap, number: int = 0) -> TrialRecord:
         verb = "is told" if log.has_commands else "has by its encoder"
         raise LogError(
             f"At {log.time_s[k]:.4g} s a wheel {verb} {wheel[k]:.3g} times the robot's full speed. Set speed in the "
-            "mapping to its full speed [m/s], or name the robot that drove with --base."
+            "mapping to its full speed [m/s], or set robot to the robot that drove."
         )
     poses = log.poses
     if len(poses) and not log.has_heading:

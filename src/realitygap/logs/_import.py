@@ -60,7 +60,8 @@ def robot_of(log_map: LogMap, base: str | None = None) -> tuple[str, RobotModel]
     name = base or log_map.robot
     if not name:
         raise LogError(
-            f"The mapping does not name the robot that drove. Give --base ROBOT: {', '.join(robot_names())}, or a file."
+            f"The mapping does not name the robot that drove. Set robot in it, or give `realitygap import "
+            f"--base ROBOT`, or `realitygap calibrate --base ROBOT`: {', '.join(robot_names())}, or a file."
         )
     given = {"drive.speed": log_map.speed, "drive.track": log_map.track}
     return name, load_robot(name).with_numbers({key: value for key, value in given.items() if value})

@@ -17,7 +17,7 @@ from ._text import TextSource
 BAG_ENDS = (".mcap", ".db3", ".bag")
 KINDS = (
     "a text table (CSV and the like), Parquet, MCAP, a bag of ROS (folder, .db3, .bag), a folder of a LeRobot dataset, "
-    "or a recording of `realitygap robot --record`"
+    "or a recording of `realitygap robot drive --record`"
 )
 
 

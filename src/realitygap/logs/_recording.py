@@ -1,4 +1,4 @@
-"""Recordings of `realitygap robot --record`, whose calls are topics such as `/call/drive`."""
+"""Recordings of `realitygap robot drive --record`, whose calls are topics such as `/call/drive`."""
 
 from __future__ import annotations
 

@@ -12,7 +12,9 @@ from realitygap.errors import LogError
 
 from ._source import Floats
 
-ADVICE = "Mend the log, or leave such rows out with --drop-bad-rows."
+ADVICE = (
+    "Mend the log, or leave such rows out: `realitygap import --drop-bad-rows`, and the same for calibrate."
+)
 OF_INCREMENTS = "Mend the log: a row of increments cannot be left out, because its distance would be lost."
 
 

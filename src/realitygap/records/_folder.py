@@ -93,7 +93,7 @@ class ResultsFolder(PublishedResults):
             if lost:
                 raise RecordError(
                     f"{self._path} holds trials of {listed(lost)}, which the new description does not list. "
-                    "List them, or restart (--fresh, or another folder)."
+                    "List them, or restart (`realitygap run --fresh`, or another folder)."
                 )
             new.write(self._path / DESCRIPTION_NAME)
             self._description = new
@@ -280,8 +280,8 @@ class ResultsFolder(PublishedResults):
     def _refuse_unless_empty(self) -> None:
         if (self._path / DESCRIPTION_NAME).exists():
             raise RecordError(
-                f"{self._path} already has the results of a study. Resume it, restart (--fresh), or name "
-                "another folder."
+                f"{self._path} already has the results of a study. Resume it, restart (`realitygap run --fresh`), or "
+                "name another folder."
             )
         with reading(self._path):
             found = sorted(entry.name for entry in self._path.iterdir() if not is_trace(entry))
@@ -294,7 +294,7 @@ class ResultsFolder(PublishedResults):
         if self.version_note is not None:
             raise RecordVersionError(
                 f"{self.version_note} They are not extended, because versions must not mix. Restart with "
-                "--fresh, or name another folder."
+                "`realitygap run --fresh`, or name another folder."
             )
 
     def _refuse_overlap(self, name: ChunkName, condition_hash: str) -> None:
@@ -309,7 +309,7 @@ class ResultsFolder(PublishedResults):
         if first is not None and self._load(first).condition_hash != condition_hash:
             raise RecordError(
                 f"{self._path} holds trials of condition {name.condition!r} with other settings. Restart "
-                "(--fresh), name another folder, or give the condition another name."
+                "(`realitygap run --fresh`), name another folder, or give the condition another name."
             )
 
     def _names_published(self) -> PublishedNames:

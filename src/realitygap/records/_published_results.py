@@ -485,13 +485,13 @@ class PublishedResults(ShownAsCard):
             if chunk.results_version != self.results_version:
                 raise RecordVersionError(
                     f"{chunk.path} was computed by results version {chunk.results_version}, {DESCRIPTION_NAME} "
-                    f"says {self.results_version}. Move it elsewhere or delete it, or restart (--fresh)."
+                    f"says {self.results_version}. Move it elsewhere, delete it, or restart (`realitygap run --fresh`)."
                 )
             first = first_of.setdefault(chunk.condition, chunk)
             if chunk.condition_hash != first.condition_hash:
                 raise RecordError(
                     f"{chunk.path} and {first.path.name} come from two different settings of condition "
-                    f"{chunk.condition!r}. Move one of them elsewhere, or restart (--fresh)."
+                    f"{chunk.condition!r}. Move one of them elsewhere, or restart (`realitygap run --fresh`)."
                 )
 
     def _check_known(self, condition: str) -> None:

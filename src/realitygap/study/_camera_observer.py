@@ -77,8 +77,8 @@ class CameraObserver:
         """
         if arena not in (None, self._arena):
             raise RobotError(
-                f"The camera was set up for arena {self._arena.name!r}, and the trials are in {arena.name!r}. Name the "
-                f"arena (--arena)."
+                f"The camera was set up for arena {self._arena.name!r}, and the trials are in {arena.name!r}. Set it "
+                "up for the arena of the trials."
             )
         self.beside.meet(robot, arena)
 

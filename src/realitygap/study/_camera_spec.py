@@ -60,12 +60,12 @@ def tag_of(text: str, size: float, height: float, at: str) -> RobotTag:
     family, colon, number = text.rpartition(":")
     if not number.isdecimal() or (colon and family not in FAMILIES):
         raise StudyError(
-            f"--tag is {text!r}, expected a number such as 10, or FAMILY:NUMBER. {did_you_mean(family, FAMILIES)}"
+            f"tag is {text!r}, expected a number such as 10, or FAMILY:NUMBER. {did_you_mean(family, FAMILIES)}"
         )
     try:
         ahead, left, degrees = (float(part) for part in at.split(","))
     except ValueError:
-        raise StudyError(f"--tag-at is {at!r}, expected three numbers such as 0.02,0,90.") from None
+        raise StudyError(f"tag-at is {at!r}, expected three numbers such as 0.02,0,90.") from None
     try:
         return RobotTag(int(number), size, height, family, ahead, left, math.radians(degrees))
     except ValueError as error:

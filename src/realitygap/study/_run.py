@@ -357,7 +357,7 @@ def _refuse_other_settings(folder: ResultsFolder, study: Study) -> None:
 def _ways_out(folder: ResultsFolder) -> str:
     if (folder.path / LEDGER_NAME).exists():
         return "Use another folder (--out DIR); this one holds trials of a robot, which are never deleted."
-    return "Use another folder (--out DIR), or --fresh to delete the existing results and restart."
+    return "Use another folder (--out DIR), or `realitygap run --fresh` to delete the existing results and restart."
 
 
 def _differences(old: Any, new: Any, place: str = "") -> list[str]:

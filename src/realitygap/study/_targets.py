@@ -85,9 +85,9 @@ SEEN_AS: dict[Observe, str] = {
 }
 WOULD_SEE: dict[Observe, str] = {
     "readings": "Record new trials.",
-    "cells": "Use an operator who counts them, a camera (--camera), or a witness (--witness).",
+    "cells": "Use an operator who counts them, a camera, or the witness of an emulated robot.",
     "encoders": "A Scribbler 2, a real Thymio, and a simulated robot have encoders.",
-    "track": "Use a camera (--camera), or the witness of an emulated robot (--witness).",
+    "track": "Use a camera, or the witness of an emulated robot.",
 }
 
 

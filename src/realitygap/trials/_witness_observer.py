@@ -171,5 +171,5 @@ def _refuse_other_arena(there: Arena, wanted: Arena) -> None:
     if there.grid != wanted.grid or set(there.walls) != set(wanted.walls):
         raise RobotError(
             f"The emulated robot drives in the arena {there.name!r}, and the study is about {wanted.name!r}: other "
-            "walls or cells. Start the emulator with the study's arena (--arena, or arena= in its port)."
+            "walls or cells. Start it with the study's arena (`realitygap emulate --arena`, or arena= in its port)."
         )

@@ -22,7 +22,7 @@ of draws that are even between the ends of the prior is 0.056 away; one of a tai
 
 _HEAD = """\
 # What was measured of a robot, with intervals of 90 %. `sim:FILE` simulates it with [numbers];
-# `--randomize posterior` draws a column of [draws] for each trial. In meters, radians and seconds.
+# `realitygap run --randomize posterior` draws a column of [draws] for each trial. In meters, radians and seconds.
 """
 
 

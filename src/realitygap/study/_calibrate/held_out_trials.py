@@ -146,7 +146,7 @@ def _advice(compared: Compared, n: int) -> tuple[str, str]:
     )
     advice = {
         FITTED: "Use this calibration.",
-        POSTERIOR: "Use this calibration with draws of the posterior (--randomize posterior).",
+        POSTERIOR: "Use this calibration with draws of the posterior (`realitygap run --randomize posterior`).",
         NOMINAL: "The numbers that it started from predict best: use them instead, or record more trials.",
     }
     words = advice[compared.recommended]

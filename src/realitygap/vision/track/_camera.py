@@ -113,7 +113,7 @@ def fit_camera(
         raise VisionError(
             f"The tags at the arena's corners are {made.rms:.1f} pixels from where they should be. Are numbers 0 to 3 "
             "at the lower left, lower right, upper right and upper left, upright, and their size and distance from the "
-            "walls as said (--corner-size, --corner-inset)?"
+            "walls as said (corner-size, corner-inset)?"
         )
     return made
 

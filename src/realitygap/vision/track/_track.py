@@ -114,8 +114,8 @@ def track_of(found: Sightings, camera: Camera, tag: RobotTag) -> Track:
     if seen.sum() < LEAST_SEEN:
         raise VisionError(
             f"The robot's tag was seen in {seen.sum()} of {len(seen)} pictures, expected at least {LEAST_SEEN}. Is "
-            "it lit well enough for the camera to expose shortly, and are its size and height as said (--tag-size, "
-            "--tag-height)?"
+            "it lit well enough for the camera to expose shortly, and are its size and height as said (tag-size, "
+            "tag-height)?"
         )
     heading = headings - tag.turned
     shift = np.exp(1j * heading) * (tag.ahead + 1j * tag.left)

@@ -209,7 +209,7 @@ def refuse_unseen(found: Sightings, tag: RobotTag) -> None:
         family = f" of {tag.family}" if tag.family else ""
         raise VisionError(
             f"The robot's tag {tag.number}{family} is in none of {len(found.times)} pictures. Expected it flat on top "
-            "of the robot, whole, with a white border, at least 30 pixels wide (--tag names another number)."
+            "of the robot, whole, with a white border, at least 30 pixels wide (the option tag names another number)."
         )
 
 

@@ -100,7 +100,7 @@ def _warnings(found: Sightings, track: Track) -> list[str]:
         how = "larger" if track.size_error > 0 else "smaller"
         said.append(
             f"The robot's tag looks {abs(track.size_error):.0%} {how} than its size and height say: measure both again "
-            "(--tag-size, --tag-height); where it is, is off by as much of its parallax."
+            "(tag-size, tag-height); where it is, is off by as much of its parallax."
         )
     if found.moved > MOST_MOVED_PX:
         said.append(

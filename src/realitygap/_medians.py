@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from realitygap import _special as special
+from realitygap.errors import finite_numbers
 
 CONFIDENCE = 0.95
 """The least that an interval of ours covers, unless it says otherwise."""
@@ -150,6 +151,4 @@ def quartiles(values: npt.NDArray[np.float64]) -> Quartiles:
 def _checked(values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
     if values.ndim != 1:
         raise ValueError(f"values has shape {values.shape}, expected (n,).")
-    if not np.isfinite(values).all():
-        raise ValueError("values holds a number that is not finite.")
-    return values
+    return finite_numbers("values", values)

@@ -6,7 +6,7 @@ import difflib
 import math
 import operator
 import reprlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from importlib import import_module
 from importlib.util import find_spec
 from numbers import Real
@@ -178,14 +178,36 @@ def real_number(name: str, value: object, least: float | None = None, most: floa
         expected = f"at least {least}" if most is None else f"{least} to {most}"
     if not isinstance(value, Real) or isinstance(value, bool):
         raise TypeError(f"{name} is {value!r}, expected a number{'' if least is None else f', {expected}'}.")
-    try:
-        number = float(value)
-    except OverflowError:
-        number = math.inf
-    is_low = least is not None and number < least
-    if not math.isfinite(number) or is_low or (least is not None and most is not None and number > most):
+    number = float(value) if _is_finite(value) else math.nan
+    is_within = least is None or (least <= number and (most is None or number <= most))
+    if math.isnan(number) or not is_within:
         raise ValueError(f"{name} is {value}, expected {expected}.")
     return number
+
+
+def _is_finite(number: Real) -> bool:
+    try:
+        return math.isfinite(number)
+    except OverflowError:  # an integer beyond all floats
+        return False
+
+
+def check_finite(values: Mapping[str, object]) -> None:
+    """Raise an error if a number among some values, or in tuples and lists of them, is infinite or NaN.
+
+    Args:
+        values: Values of any kind, by name.
+
+    Raises:
+        ValueError: The message names the first such number.
+    """
+    for name, value in values.items():
+        if isinstance(value, tuple | list):
+            for index, part in enumerate(value):
+                if isinstance(part, tuple | list) or (isinstance(part, Real) and not _is_finite(part)):
+                    check_finite({f"{name}[{index}]": part})
+        elif isinstance(value, Real) and not _is_finite(value):
+            raise ValueError(f"{name} is {value}, expected a finite number.")
 
 
 def finite_numbers(name: str, values: ArrayLike) -> NDArray[np.float64]:

@@ -115,7 +115,7 @@ def test_wrong_logs_are_refused_with_one_message() -> None:
     refused("expected ascending times", time_s=np.zeros(40))
     refused(r"commands has shape \(40, 3\), expected \(40, 2\)", commands=np.ones((40, 3)))
     refused(
-        "commands has no number in row 3",
+        "commands\\[3, 0\\] is nan",
         commands=np.where(np.arange(40)[:, None] == 3, np.nan, 1.0) * np.ones(2),
     )
     refused("All commands are 0", commands=np.zeros((40, 2)))

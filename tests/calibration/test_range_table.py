@@ -217,7 +217,7 @@ def test_wrong_tables_are_refused_with_one_message() -> None:
     refused("expected whole numbers from 0 to 7", sensor=np.full(n, 8))
     refused("A reading is 1023, expected 0 .* Divide by the full scale", readings=np.full(n, 1023.0))
     refused("A distance is -0.1 m", distance_m=np.full(n, -0.1))
-    refused("distance_m has no number in row 0", distance_m=np.full(n, np.nan))
+    refused("distance_m\\[0\\] is nan", distance_m=np.full(n, np.nan))
     refused("measured_from is 'rim'", measured_from="rim")
     refused("bearing_from is 'north', expected 'body' or 'sensor'", bearing_from="north")
     refused("shared has 'gain', expected some of", shared=("gain",))

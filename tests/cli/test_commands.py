@@ -8,7 +8,9 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any, get_args, get_type_hints
 
 import pytest
 import typer
@@ -62,17 +64,17 @@ def test_list_of_commands_cuts_no_line_at_any_width():
             assert f"{command.name} {command.summary}" in words
 
 
+def members() -> Iterator[tuple[list[str], Any]]:
+    """Yield the words of each command and group, and the command itself."""
+    for name, group in APP.commands.items():
+        yield [name], group
+        for key, member in getattr(group, "commands", {}).items():
+            yield [name, key], member
+
+
 @pytest.mark.slow
 def test_help_of_every_command_is_whole_at_any_width():
-    members = [
-        ([name, *rest], command)
-        for name, group in APP.commands.items()
-        for rest, command in [
-            ([], group),
-            *(([key], member) for key, member in getattr(group, "commands", {}).items()),
-        ]
-    ]
-    for name, command in members:
+    for name, command in members():
         for columns in (60, 80, 200):
             done = CliRunner().invoke(app, [*name, "--help"], terminal_width=columns - 2)
             words = "".join(done.stdout.split())
@@ -135,6 +137,33 @@ def loaded_for(*words: str) -> set[str]:
     )
     done = subprocess.run([sys.executable, "-c", code, *words], capture_output=True, text=True, check=True)
     return {name.split(".")[0] for name in done.stderr.split()}
+
+
+def test_every_number_of_every_command_must_be_finite():
+    """Python's `float` takes nan, inf and 1e400. Bounds of an option do not refuse all of them."""
+    n_numbers = 0
+    for path, command in members():
+        hints = get_type_hints(command.callback) if command.params and command.callback else {}
+        needed = [
+            word
+            for parameter in command.params
+            if parameter.required
+            for word in ((parameter.opts[0], "1") if parameter.opts[0].startswith("-") else ("1",))
+        ]
+        for parameter in command.params:
+            if float in (hints.get(parameter.name), *get_args(hints.get(parameter.name))):
+                n_numbers += 1
+                for wrong in ("nan", "inf", "-inf", "1e400"):
+                    if parameter.opts[0].startswith("-"):
+                        words = [*needed, f"{parameter.opts[0]}={wrong}"]
+                    else:
+                        words = ["--", *(wrong for word in needed)]
+                    done = CliRunner().invoke(app, [*path, *words])
+                    assert done.exit_code == 2, f"{path} {words}: {done.output}"
+                    assert "finite number" in done.output or "Input should be" in done.output, (
+                        f"{path} {words}"
+                    )
+    assert n_numbers > 20
 
 
 def test_option_version_prints_the_version():

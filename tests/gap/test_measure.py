@@ -99,7 +99,7 @@ def test_other_controllers_on_both_sides_are_refused():
 
 
 def test_a_side_must_be_finite_and_whole():
-    with pytest.raises(ValueError, match="not finite"):
+    with pytest.raises(ValueError, match="expected a finite number"):
         GapSide("sim", "SIM", np.array([[np.nan]]))
     with pytest.raises(ValueError, match="cells of sim"):
         GapSide("sim", "SIM", np.zeros((2, 3)), np.zeros((2, 2, 5), bool))

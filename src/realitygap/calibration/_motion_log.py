@@ -9,6 +9,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from realitygap.errors import finite_numbers
 from realitygap.world import Fitted, RobotModel
 
 from ._held_out import HeldOut, HeldOutFit
@@ -249,11 +250,7 @@ def motion_log(
             f"time_s is {time[k]:g} s in row {k} and {time[k + 1]:g} s in row {k + 1}, expected ascending times. Sort "
             "the log, and leave out repeated rows."
         )
-    asked = _rows("commands", commands, n, (2,))
-    if not np.isfinite(asked).all():
-        raise ValueError(
-            f"commands has no number in row {int(np.argwhere(~np.isfinite(asked))[0, 0])}, expected two."
-        )
+    asked = finite_numbers("commands", _rows("commands", commands, n, (2,)))
     if not np.any(asked):
         raise ValueError("All commands are 0, expected a robot that drives.")
     seen = np.full((n, 3), np.nan)

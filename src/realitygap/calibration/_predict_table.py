@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from realitygap.errors import finite_numbers
 from realitygap.world import RobotModel
 
 from ._range_response import numbers_in_file, wall_reading
@@ -88,7 +89,7 @@ def look_up_readings(
 def place_ranks(distance_m: ArrayLike, bearing_rad: ArrayLike) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Return the ranks of distances and bearings among all of a table, both (n,)."""
     ranks = [
-        np.unique(np.round(np.asarray(values, np.float64), 6), return_inverse=True)[1].astype(np.int64)
-        for values in (distance_m, bearing_rad)
+        np.unique(np.round(finite_numbers(name, values), 6), return_inverse=True)[1].astype(np.int64)
+        for name, values in (("distance_m", distance_m), ("bearing_rad", bearing_rad))
     ]
     return ranks[0], ranks[1]

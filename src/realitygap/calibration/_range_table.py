@@ -10,6 +10,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from realitygap.errors import finite_numbers
 from realitygap.world import Fitted, RobotModel
 
 from ._held_out import HeldOut, HeldOutFit
@@ -161,16 +162,12 @@ class Readings:
     ) -> Readings:
         which = np.asarray(sensor)
         columns = {"distance_m": distance_m, "bearing_rad": bearing_rad, "readings": readings}
-        arrays = {name: np.asarray(values, np.float64) for name, values in columns.items()}
+        arrays = {name: finite_numbers(name, values) for name, values in columns.items()}
         if which.ndim != 1 or not len(which):
             raise ValueError(f"sensor has shape {which.shape}, expected (n,): one index for each reading.")
         for name, values in arrays.items():
             if values.shape != which.shape:
                 raise ValueError(f"{name} has shape {values.shape}, expected {which.shape}, as sensor has.")
-            if not np.isfinite(values).all():
-                raise ValueError(
-                    f"{name} has no number in row {int(np.flatnonzero(~np.isfinite(values))[0])}."
-                )
         index = which.astype(np.int64)
         if np.any(index != which) or index.min() < 0 or index.max() >= len(robot.range):
             raise ValueError(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import itertools
+import math
 import sys
 from collections.abc import Sequence
 from importlib import import_module
@@ -64,7 +65,7 @@ def _example_of(command: Any) -> str:
 
 
 class _GroupedCommand(TyperCommand):
-    """A command that refuses empty names of files, and two values of an option that takes one.
+    """A command that refuses empty names of files, infinite numbers, and two values of an option that takes one.
 
     Its help lists the options of each mode together.
 
@@ -86,7 +87,14 @@ class _GroupedCommand(TyperCommand):
                     f"{option} is empty. Name a file or folder, or leave {option} out.", ctx
                 )
         self._refuse_second_values(ctx, args)
-        return super().parse_args(ctx, args)
+        rest = super().parse_args(ctx, args)
+        for parameter in self.get_params(ctx):
+            value = ctx.params.get(parameter.name or "")
+            for number in value if isinstance(value, list | tuple) else (value,):
+                if isinstance(number, float) and not math.isfinite(number):
+                    name = parameter.opts[0] if parameter.opts[0].startswith("-") else parameter.metavar
+                    raise typer.BadParameter(f"{name} is {number}, expected a finite number.", ctx)
+        return rest
 
     def _refuse_second_values(self, ctx: Any, args: list[str]) -> None:
         """Raise an error if an option that takes one value has two. Typer takes the last one, and says nothing."""

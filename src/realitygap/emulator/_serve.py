@@ -13,7 +13,7 @@ from pathlib import Path
 from threading import Event, RLock, Thread
 
 from realitygap._closing import ClosedOnExit
-from realitygap.errors import RobotError
+from realitygap.errors import RobotError, check_finite
 
 from ._emulator import Emulator
 from ._time import SECOND, nanoseconds
@@ -322,6 +322,7 @@ class Server(ClosedOnExit):
         watch: Callable[[Emulator], None] | None = None,
         watch_s: float = 0.125,
     ) -> None:
+        check_finite({"speed": speed, "watch_s": watch_s})
         self.emulator, self._channel, self._speed = emulator, channel, speed
         self.name = channel.name
         self._lock = RLock()

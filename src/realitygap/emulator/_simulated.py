@@ -7,6 +7,7 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
+from realitygap.errors import check_finite
 from realitygap.world import Arena, Body, Pose
 
 from ._walls import Floats, Walls
@@ -98,6 +99,7 @@ class BoxOnWheels:
 
     def place(self, pose: Pose) -> None:
         """Put it at another place."""
+        check_finite({"pose": tuple(pose), "spacing": self.spacing})
         self.pose = Pose(*map(float, pose))
         self.stalled = False
         self._free = 0.0  # how far the origin can go before the outline may touch something [m]

@@ -11,7 +11,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from realitygap.errors import did_you_mean
+from realitygap.errors import did_you_mean, finite_numbers
 from realitygap.kernels.neat import distances as distances_kernels
 from realitygap.kernels.neat.distances import Behaviors, Measure
 
@@ -228,10 +228,8 @@ def first_visits(cells: Any, columns: int, rows: int) -> NDArray[np.int64]:
 
 
 def _pack_positions(positions: Sequence[Cells] | ArrayLike) -> Behaviors:
-    points = np.ascontiguousarray(positions, np.float64)
-    if points.ndim != 2 or points.shape[1] != 2 or not np.isfinite(points).all():
-        raise ValueError(
-            f"Behaviors have shape {points.shape}, expected (n, 2) finite numbers: where each trial ended [m]."
-        )
+    points = np.ascontiguousarray(finite_numbers("behaviors", np.asarray(positions, np.float64)))
+    if points.ndim != 2 or points.shape[1] != 2:
+        raise ValueError(f"behaviors has shape {points.shape}, expected (n, 2): where each trial ended [m].")
     n = len(points)
     return Behaviors(np.zeros((n, 1), np.int32), np.zeros(n, np.int32), points)

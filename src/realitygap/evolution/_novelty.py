@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from realitygap.drawing import ShownAsCard
+from realitygap.errors import finite_numbers, real_number
 from realitygap.kernels.neat import novelty as novelty_kernels
 from realitygap.settings import Settings
 
@@ -199,10 +200,11 @@ class NearestArchive(ShownAsCard):
             patience: Number of evaluations without an entry after which the threshold falls.
 
         Raises:
-            ValueError: k < 1.
+            ValueError: k < 1, or a threshold that is infinite or NaN.
         """
         if k < 1:
             raise ValueError(f"k is {k}, expected at least 1.")
+        real_number("threshold", threshold)
         self._distance = distance
         self._k = k
         self._patience = patience
@@ -231,11 +233,12 @@ class NearestArchive(ShownAsCard):
             (n,) float64, in the unit of the distance; 0 if there is nothing to compare with.
 
         Raises:
-            ValueError: The array is not two-dimensional, a value is not finite, or d differs from the archive's.
+            ValueError: The array is not two-dimensional, a value or a distance is not finite, or d differs from the
+                archive's.
         """
-        rows = np.asarray(behaviors, np.float64)
-        if rows.ndim != 2 or not np.isfinite(rows).all():
-            raise ValueError(f"behaviors has shape {rows.shape}, expected (n, d) finite numbers.")
+        rows = finite_numbers("behaviors", behaviors)
+        if rows.ndim != 2:
+            raise ValueError(f"behaviors has shape {rows.shape}, expected (n, d).")
         if self.behaviors and self.behaviors[0].shape != rows.shape[1:]:
             raise ValueError(
                 f"behaviors has {rows.shape[1]} columns, expected {self.behaviors[0].size}: as in the archive."
@@ -246,6 +249,7 @@ class NearestArchive(ShownAsCard):
         for i in range(n):
             for j, other in enumerate(others):
                 distances[i, j] = -1.0 if i == j else self._distance(rows[i], other)
+        finite_numbers("distance", distances)
         nearest = np.empty(self._k)
         novelty = np.array([novelty_kernels.mean_of_nearest(row, len(others), nearest) for row in distances])
         entered = np.empty(n, np.bool_)

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from realitygap import _special as special
+from realitygap.errors import check_finite
 
 from ._side import Values
 
@@ -88,6 +89,7 @@ def equivalence_power(margin: float, spread: float, n: int, difference: float = 
     Source: Owen (1965), approximated: the noncentral t distributions of both tests, as if they never missed together
     (Phillips 1990); within 0.01 of the truth for a power of 0.5 and more.
     """
+    check_finite({"margin": margin, "spread": spread, "difference": difference})
     if spread <= 0:
         return float(abs(difference) < margin)
     critical = float(special.stdtrit(n - 1, 1 - ALPHA))

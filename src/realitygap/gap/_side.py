@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from realitygap.errors import finite_numbers
+
 Values = NDArray[np.float64]
 
 
@@ -34,8 +36,7 @@ class GapSide:
                 f"values of {self.name} has shape {self.values.shape}, expected (controllers, trials), at least one of "
                 "each."
             )
-        if not np.isfinite(self.values).all():
-            raise ValueError(f"values of {self.name} holds a number that is not finite.")
+        finite_numbers(f"values of {self.name}", self.values)
         for name, array in (("cells", self.cells), ("ends", self.ends)):
             if len(array) and array.shape[:2] != self.values.shape:
                 raise ValueError(

@@ -15,7 +15,7 @@ from realitygap.evolution import OUTPUTS, WHEELS, Channels, ControllerInterface,
 from realitygap.kernels.neat.genome import NeatRules
 from realitygap.kernels.neat.network import Networks
 from realitygap.records import Observe, TrialRecord
-from realitygap.robots import Command, Label, channels_of, select_channels
+from realitygap.robots import Command, Label, channels_of, check_observation, select_channels
 from realitygap.tasks import TraceArrays
 from realitygap.trials import (
     NoiseKey,
@@ -282,7 +282,7 @@ def trial_number(key: int, counter: NDArray[np.uint32]) -> int:
 
 def seen_of(robot: Any) -> dict[str, Any]:
     """Return the readings and the pose of a robot, as plain values for JSON."""
-    seen = robot.observe()
+    seen = check_observation(robot.observe())
     return {
         "readings": seen.readings,
         "stalled": bool(seen.stalled),

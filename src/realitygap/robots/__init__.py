@@ -2,7 +2,16 @@
 
 from . import scribbler, thymio, twin
 from ._clock import Clock, SystemClock, VirtualClock
-from ._contract import Command, Label, Observation, Robot, channels_of, check_command, select_channels
+from ._contract import (
+    Command,
+    Label,
+    Observation,
+    Robot,
+    channels_of,
+    check_command,
+    check_observation,
+    select_channels,
+)
 from ._families import is_in_this_program, list_ports, open_on, split_port
 from ._in_program import ProgramRobot
 from ._recorded_robot import RecordedRobot
@@ -23,6 +32,7 @@ __all__ = [
     "VirtualClock",
     "channels_of",
     "check_command",
+    "check_observation",
     "export_mcap",
     "is_in_this_program",
     "list_ports",

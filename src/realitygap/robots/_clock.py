@@ -6,6 +6,8 @@ import time
 from collections.abc import Callable
 from typing import Protocol, runtime_checkable
 
+from realitygap.errors import real_number
+
 HEAR_S = 0.1
 """Longest uninterrupted wait [s]. Ctrl-C that comes just before such a wait takes effect after it."""
 
@@ -52,6 +54,7 @@ class VirtualClock:
 
     def sleep(self, seconds: float) -> None:
         """Let time pass."""
+        real_number("seconds", seconds)
         if self._wait is None:
             self.seconds += seconds
         else:
@@ -60,7 +63,7 @@ class VirtualClock:
 
 def sleep(seconds: float) -> None:
     """Wait in real time [s], in pieces so short that Ctrl-C and SIGTERM take effect soon: a robot may be driving."""
-    until = time.monotonic() + seconds
+    until = time.monotonic() + real_number("seconds", seconds)
     while seconds > HEAR_S:
         time.sleep(HEAR_S)
         seconds = until - time.monotonic()

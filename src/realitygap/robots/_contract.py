@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from types import MappingProxyType, TracebackType
 from typing import Any, Literal, NamedTuple, Protocol, Self, runtime_checkable
 
+from realitygap.errors import RobotError, check_finite
 from realitygap.world import Pose
 
 Label = Literal["SIM", "TWIN", "EMULATED", "REAL"]
@@ -99,6 +100,21 @@ def select_channels(robot: Any, names: Sequence[str]) -> None:
     """Choose the sensors, other than range sensors, that a robot reads from the next `observe` on."""
     if channels_of(robot):
         robot.select(tuple(names))
+
+
+def check_observation(seen: Observation) -> Observation:
+    """Return what a robot observed if it is valid.
+
+    Raises:
+        RobotError: A number is infinite or NaN.
+    """
+    try:
+        check_finite({"readings": tuple(seen.readings), **seen.channels})
+    except ValueError as error:
+        raise RobotError(
+            f"The robot returned a wrong observation: {error} Check its sensors or its driver."
+        ) from error
+    return seen
 
 
 def check_command(command: Command) -> Command:

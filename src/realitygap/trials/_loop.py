@@ -10,7 +10,16 @@ import numpy as np
 from realitygap.errors import RobotError, RobotStopped
 from realitygap.evolution import ControllerInterface, Network, inputs_of_robot, listed, paper_interface
 from realitygap.records import TrialRecord
-from realitygap.robots import Clock, Command, Observation, Robot, SystemClock, channels_of, select_channels
+from realitygap.robots import (
+    Clock,
+    Command,
+    Observation,
+    Robot,
+    SystemClock,
+    channels_of,
+    check_observation,
+    select_channels,
+)
 from realitygap.world import Pose
 
 from ._ending import EndReason
@@ -102,7 +111,7 @@ def run_trial(
             begin()
         began = clock.now()
         for number in range(n_steps):
-            seen = robot.observe()
+            seen = check_observation(robot.observe())
             time = clock.now() - began
             if look is not None:
                 look(number)
@@ -114,7 +123,7 @@ def run_trial(
             robot.drive(command)
         robot.stop()
         if sees_end:
-            seen = robot.observe()
+            seen = check_observation(robot.observe())
             looks.append((clock.now() - began, seen))
         if look is not None:
             look(n_steps)

@@ -156,10 +156,14 @@ def check_plans(
             raise ValueError(f"The commands of plan {k} have shape {shape}, expected (t, 2): move and turn.")
         if (plan.genome is None) == (len(plan.commands) == 0):
             raise ValueError(f"Plan {k} has to have a genome or commands, and not both.")
-        if plan.genome is None and not np.all(
-            np.abs(plan.commands) <= 1
-        ):  # so that no number is refused, too
-            raise ValueError(f"The commands of plan {k} are not all numbers from -1 to 1.")
+        if plan.genome is None:
+            wrong = np.argwhere(~(np.abs(plan.commands) <= 1))  # also of NaN
+            if len(wrong):
+                row, part = wrong[0].tolist()
+                raise ValueError(
+                    f"commands[{row}, {part}] of plan {k} is {plan.commands[row, part]}, expected a number from "
+                    "-1 to 1."
+                )
         if plan.genome is not None and target.inputs is not None:
             plan.genome.interface.check(target.inputs, "The controller", target.name)
         whole_number(f"number of plan {k}", plan.number, 0, most_number)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from realitygap.errors import check_finite
 from realitygap.world import Arena, Grid
 
 from ._tag_family import FAMILIES
@@ -50,8 +51,10 @@ class RobotTag:
         """Refuse what is no tag.
 
         Raises:
-            ValueError: A size that is not above 0, a height below the floor, or a family that nobody knows.
+            ValueError: A size that is not above 0, a height below the floor, a number that is infinite or NaN, or a
+                family that nobody knows.
         """
+        check_finite(vars(self))
         if not self.size > 0:
             raise ValueError(f"size is {self.size}, expected a length above 0 m.")
         if not self.height >= 0:
@@ -94,6 +97,7 @@ def corner_tags(
     Raises:
         ValueError: They do not fit.
     """
+    check_finite({"size": size, "inset": inset})
     left, lower, right, upper = bounds(arena)
     if inset is None:
         inset = (

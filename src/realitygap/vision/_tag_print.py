@@ -40,6 +40,8 @@ def print_tags(
     if paper not in PAPERS:
         raise ValueError(f"paper is {paper!r}, expected {', '.join(PAPERS)}.")
     robot = tag or RobotTag()
+    if not corner_size > 0:
+        raise ValueError(f"corner_size is {corner_size}, expected a length above 0 m.")
     height, width = PAPERS[paper]
     robots_side, corners_side = _with_border(robot.size), _with_border(corner_size)
     room = width - 2 * EDGE_M

@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass, field, replace
 from typing import Any, NamedTuple
 
 from realitygap.drawing import picture_of
+from realitygap.errors import check_finite
 
 from ._arena_file import ArenaFile
 from ._distribution import Distribution
@@ -53,6 +54,10 @@ class Grid:
     columns: int
     rows: int
 
+    def __post_init__(self) -> None:
+        """Raise a ValueError if a number is infinite or NaN."""
+        check_finite(vars(self))
+
     @property
     def n_cells(self) -> int:
         """Number of cells."""
@@ -93,6 +98,10 @@ class Arena:
     goal: Goal | None = None
     vary: Mapping[str, Distribution] = field(default_factory=dict, hash=False)
     others: tuple[Pose, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Raise a ValueError if a number is infinite or NaN."""
+        check_finite(vars(self))
 
     @property
     def starts(self) -> tuple[Pose, ...]:

@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from realitygap.errors import check_finite
+
 from ._obstacle import TAPE_WIDTH, Segment, distance_to_segment
 
 MOST_PIXELS = 512  # across or up: a larger image is more than line sensors see, and would fill records
@@ -33,6 +35,10 @@ class FloorImage:
     columns: int
     rows: int
     pixels: str
+
+    def __post_init__(self) -> None:
+        """Raise a ValueError if a number is infinite or NaN."""
+        check_finite(vars(self))
 
     @classmethod
     def of(cls, x: float, y: float, width: float, gray: NDArray[np.uint8]) -> FloorImage:
@@ -79,6 +85,10 @@ class Floor:
     tape: tuple[Segment, ...] = ()
     tape_width: float = TAPE_WIDTH
     image: FloorImage | None = None
+
+    def __post_init__(self) -> None:
+        """Raise a ValueError if a number is infinite or NaN."""
+        check_finite(vars(self))
 
     def brightness(self, x: float, y: float) -> float:
         """Return the brightness of the floor at a point [m]: 0 black, as tape is, to 1 white."""

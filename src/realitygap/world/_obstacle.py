@@ -6,6 +6,8 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from realitygap.errors import check_finite
+
 from ._part import Points, rounded
 
 TAPE_WIDTH = 0.019  # of a line on the floor [m]: the usual 3/4 in
@@ -28,6 +30,10 @@ class Obstacle:
     heading: float = 0.0
     corners: Points = ((0.0, 0.0),)
     radius: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Raise a ValueError if a number is infinite or NaN."""
+        check_finite(vars(self))
 
     @property
     def placed(self) -> Points:
@@ -75,6 +81,10 @@ class Light:
     y: float
     strength: float = 1.0
 
+    def __post_init__(self) -> None:
+        """Raise a ValueError if a number is infinite or NaN."""
+        check_finite(vars(self))
+
 
 @dataclass(frozen=True)
 class Goal:
@@ -88,6 +98,10 @@ class Goal:
     x: float
     y: float
     radius: float
+
+    def __post_init__(self) -> None:
+        """Raise a ValueError if a number is infinite or NaN."""
+        check_finite(vars(self))
 
 
 def distance_to_segment(x: float, y: float, segment: Segment) -> float:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from realitygap.errors import check_finite
+
 
 @dataclass(frozen=True)
 class Body:
@@ -14,6 +16,10 @@ class Body:
     """
 
     corners: tuple[tuple[float, float], ...]
+
+    def __post_init__(self) -> None:
+        """Raise a ValueError if a number is infinite or NaN."""
+        check_finite(vars(self))
 
 
 @dataclass(frozen=True)
@@ -27,6 +33,10 @@ class RangeSensors:
 
     mounts: tuple[tuple[float, float, float], ...]
     max_range: float
+
+    def __post_init__(self) -> None:
+        """Raise a ValueError if a number is infinite or NaN."""
+        check_finite(vars(self))
 
 
 # Jyro's Scribbler: forward +-0.09 m, left +-0.08 m.

@@ -11,7 +11,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from realitygap.errors import whole_number
+from realitygap.errors import finite_numbers, whole_number
 from realitygap.evolution import Genome, NeatSettings, Population, decode_all
 from realitygap.kernels.math.philox import PURPOSE_NOISE
 from realitygap.kernels.neat.genome import NeatRules
@@ -176,9 +176,9 @@ class SimEnsemble:
         Raises:
             ValueError: Arrays that do not fit, or a number that cannot be so.
         """
-        given = np.asarray(commands, np.float64)
+        given = finite_numbers("commands", commands)
         play = Play(
-            np.asarray(starts, np.float64).reshape(-1, 3),
+            finite_numbers("starts", starts).reshape(-1, 3),
             given.shape[1] if given.ndim == 3 else 0,
             given,
             anchors=np.empty((0, 0, 3)) if anchors is None else np.asarray(anchors, np.float64),
@@ -201,7 +201,7 @@ class SimEnsemble:
         Arguments and errors as in `replay`; also of genomes as in `try_genomes`.
         """
         play = Play(
-            np.asarray(starts, np.float64).reshape(-1, 3),
+            finite_numbers("starts", starts).reshape(-1, 3),
             whole_number("n_steps", n_steps, 1),
             genomes=tuple(genomes),
         )

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realitygap.drawing import Line, Picture, Point, Shape, hex_of
-from realitygap.errors import RobotError
+from realitygap.errors import RobotError, real_number
 from realitygap.evolution import NeatSettings
 from realitygap.kernels.math.lanes import LANES
 from realitygap.kernels.sim import crowd
@@ -165,7 +165,7 @@ class SimWorld:
 
     def run(self, seconds: float, *, brains: bool = True) -> None:
         """Simulate for a time [s], rounded to whole steps."""
-        self.step(round(seconds / self.step_s), brains=brains)
+        self.step(round(real_number("seconds", seconds) / self.step_s), brains=brains)
 
     def reset(self) -> None:
         """Put all robots at their starts, standing, with the same random numbers as before."""

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realitygap.drawing import Ink, Line, Picture, Point, Shape, Text, hex_of
-from realitygap.errors import RobotError
+from realitygap.errors import RobotError, check_finite
 from realitygap.kernels.jyro.scene import START_ENERGY
 from realitygap.world import Pose
 
@@ -161,6 +161,7 @@ class SceneRobot:
         hex_of(color)  # refused here, not in the middle of a step
         self.name = name
         self.color = color
+        check_finite({"body": tuple(map(tuple, body))})
         self.body = tuple((float(forward), float(left)) for forward, left in body)
         self.brain = brain
         self.devices: list[Device] = []
@@ -207,20 +208,24 @@ class SceneRobot:
 
     def localize(self, x: float = 0.0, y: float = 0.0, heading: float = 0.0) -> None:
         """Set the odometry: x ahead [m], y to the left [m], heading [rad], in a frame of the robot."""
+        check_finite({"x": x, "y": y, "heading": heading})
         self._odometry = Pose(x, y, heading)
 
     # driving
 
     def move(self, speed: float, turn_rate: float) -> None:
         """Drive at a speed [m/s] and turn to the left at a rate [rad/s] from now on. There are no limits."""
+        check_finite({"speed": speed, "turn_rate": turn_rate})
         self.speed, self.turn_rate = speed, turn_rate
 
     def translate(self, speed: float) -> None:
         """Set the speed alone [m/s]."""
+        check_finite({"speed": speed})
         self.speed = speed
 
     def rotate(self, turn_rate: float) -> None:
         """Set the rate of turn alone [rad/s]."""
+        check_finite({"turn_rate": turn_rate})
         self.turn_rate = turn_rate
 
     def stop(self) -> None:
@@ -392,6 +397,7 @@ def _segments(segments: Sequence[Sequence[float]]) -> list[Edge]:
             raise ValueError(
                 f"A segment is {edge!r}, expected forward and left of both ends [m]: four numbers."
             )
+        check_finite({"segment": tuple(edge)})
         edges.append((float(edge[0]), float(edge[1]), float(edge[2]), float(edge[3])))
     return edges
 

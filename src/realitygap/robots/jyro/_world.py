@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realitygap.drawing import Ink, Line, Picture, Shape, hex_of, picture_of
-from realitygap.errors import RobotError
+from realitygap.errors import RobotError, check_finite, real_number
 from realitygap.kernels.jyro import scene as kernel
 from realitygap.world import Arena
 
@@ -113,6 +113,7 @@ class JyroWorld:
         """Add four walls around a box, given by two opposite corners [m]. Robots may be inside or outside."""
         color = fill if wall_color is None else wall_color
         hex_of(fill)
+        check_finite({"x1": x1, "y1": y1, "x2": x2, "y2": y2})
         left, right, bottom, top = min(x1, x2), max(x1, x2), min(y1, y2), max(y1, y2)
         self.add_wall(left, top, left, bottom, color)
         self.add_wall(left, top, right, top, color)
@@ -145,6 +146,7 @@ class JyroWorld:
     def add_light(self, x: float, y: float, brightness: float = 1.0, color: str = "yellow") -> Lamp:
         """Add a lamp [m] and return it."""
         hex_of(color)
+        check_finite({"x": x, "y": y, "brightness": brightness})
         lamp = Lamp(x, y, brightness, color)
         self.lights.append(lamp)
         self._first_lights.append(Lamp(x, y, brightness, color))
@@ -225,7 +227,7 @@ class JyroWorld:
             brains: Whether to call the robots' brains.
             real_time: Whether to run at real-time speed.
         """
-        for _ in range(round(seconds / self.step_s)):
+        for _ in range(round(real_number("seconds", seconds) / self.step_s)):
             began = time.perf_counter()
             self.step(brains=brains)
             if real_time:

@@ -6,7 +6,7 @@ import weakref
 from pathlib import Path
 from typing import Any
 
-from realitygap.errors import RobotError
+from realitygap.errors import RobotError, check_finite
 from realitygap.robots._clock import Clock
 from realitygap.robots._contract import Command, Label, Observation, check_command
 from realitygap.robots._port_driver import PortDriver
@@ -71,6 +71,7 @@ class Scribbler(Driving, Channels, SoundAndLight, Camera, Board, PortDriver):
         record: Path | str | None = None,
         watchdog_s: float | None = None,
     ) -> None:
+        check_finite({"step_s": step_s, "reading_max": reading_max, "watchdog_s": watchdog_s})
         if not (step_s >= 0 and reading_max > 0):
             raise ValueError(
                 f"step_s is {step_s} and reading_max {reading_max}, expected 0 or more and more than 0."

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from realitygap.errors import RobotError, RobotStopped
+from realitygap.errors import RobotError, RobotStopped, check_finite
 from realitygap.robots._contract import Command, Label, Observation, check_command
 from realitygap.robots._port_driver import PortDriver
 from realitygap.robots.scribbler._exits import EXITS
@@ -131,6 +131,14 @@ class Thymio(PortDriver):
         ground_black: float = GROUND_BLACK,
         record: Path | str | None = None,
     ) -> None:
+        check_finite(
+            {
+                "step_s": step_s,
+                "reading_max": reading_max,
+                "ground_white": ground_white,
+                "ground_black": ground_black,
+            }
+        )
         if not (step_s >= 0 and 0 < full_speed <= 1000 and reading_max > 0 and ground_white > ground_black):
             raise ValueError(
                 f"step_s is {step_s}, full_speed {full_speed}, reading_max {reading_max}, ground_white {ground_white} "

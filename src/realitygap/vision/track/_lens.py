@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realitygap._limits import MOST_TOML_BYTES, parse_toml, read_file
-from realitygap.errors import VisionError, from_extra
+from realitygap.errors import VisionError, check_finite, from_extra
 
 Floats = NDArray[np.float64]
 
@@ -43,6 +43,10 @@ class Lens:
     center: tuple[float, float]
     distortion: tuple[float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0)
     rms: float = float("nan")
+
+    def __post_init__(self) -> None:
+        """Raise a ValueError if a number other than the error is infinite or NaN."""
+        check_finite({"focal": self.focal, "center": self.center, "distortion": self.distortion})
 
     @property
     def matrix(self) -> Floats:

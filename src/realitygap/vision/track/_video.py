@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from realitygap.errors import check_finite
 from realitygap.vision._tag_layout import CORNER_SIZE_M, RobotTag, corner_tags
 from realitygap.world import Arena
 
@@ -57,6 +58,10 @@ class Marks:
     lens: Lens | None = None
     corner_size: float = CORNER_SIZE_M
     corner_inset: float | None = None
+
+    def __post_init__(self) -> None:
+        """Raise a ValueError if a number is infinite or NaN."""
+        check_finite(vars(self))
 
     def tracked(self, found: Sightings) -> Tracked:
         """Compute the track and the camera from sightings.

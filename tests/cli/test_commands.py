@@ -237,6 +237,17 @@ def test_a_full_disk_stops_the_run_with_a_message_and_loses_nothing(tmp_path):
     assert "36 of 72 runs computed" in done.stdout
 
 
+def limit_memory() -> None:
+    resource.setrlimit(resource.RLIMIT_AS, (300_000 * 1024, 300_000 * 1024))
+
+
+@pytest.mark.slow
+def test_lack_of_memory_is_one_message(tmp_path):
+    """A library that could not be loaded was reported as output that cannot be written."""
+    short = started("run", "paper", "--replicates", "1", "--out", "r", cwd=tmp_path, preexec_fn=limit_memory)
+    one_message(short, "There is not enough memory")
+
+
 def test_a_torn_file_is_named(tmp_path):
     realitygap("run", "paper", "--replicates", "1", "--out", "r", cwd=tmp_path)
     victim = next((tmp_path / "r" / "trials").glob("*.parquet"))

@@ -1,6 +1,7 @@
 """Carrying out a study: the same results whatever happens on the way."""
 
 import random
+import shutil
 import subprocess
 import sys
 import time
@@ -297,3 +298,44 @@ def test_a_genome_beyond_all_room_ends_the_sitting_and_is_in_the_log(tmp_path, m
     events = ResultsFolder.open(tmp_path / "r").read_log()
     assert [each["event"] for each in events] == ["start", "outgrown"]
     assert "Lower add_node" in events[-1]["message"]
+
+
+AFTER_A_STUDY = """
+import multiprocessing, sys
+import realitygap
+
+def work(name):
+    return realitygap.run_study("paper", name, replicates=1).folder.digest()
+
+def summary(name):
+    return str(realitygap.summarize(name))
+
+if __name__ == "__main__":
+    realitygap.run_study("paper", "first", replicates=1, threads=2)
+    with multiprocessing.get_context(sys.argv[1]).Pool(1) as pool:
+        for function, name in ((work, "second"), (summary, "first")):
+            try:
+                pool.apply(function, [name])
+                print("done")
+            except RuntimeError as error:
+                print(error)
+"""
+
+
+@pytest.mark.slow
+def test_forked_process_refuses_to_wait_for_threads_of_its_parent(tmp_path):
+    """It never ended after the parent had run a study: a fork lacks the threads of polars."""
+    file = tmp_path / "program.py"
+    file.write_text(AFTER_A_STUDY)
+    for method, text in (("fork", 'get_context("spawn")'), ("spawn", "done")):
+        for folder in tmp_path.glob("*/"):
+            shutil.rmtree(folder)
+        done = subprocess.run(
+            [sys.executable, file, method],
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+            check=False,
+            timeout=300,
+        )
+        assert done.stdout.count(text) == 2, done.stdout + done.stderr

@@ -72,23 +72,51 @@ def main() -> None:
             stream.reconfigure(errors="replace")
     try:
         _run_command()
-    except RealityGapError as error:
-        _print_error(str(error))
-        sys.exit(1)
     except BrokenPipeError:
         _forget_output()
         sys.exit(1)
-    except OSError as error:
-        what = error.filename or "The output cannot be written"
-        _print_error(f"{what}: {error.strerror or error}.")
-        _forget_output()
+    except (RealityGapError, OSError, ImportError, MemoryError) as error:
+        _print_error(_message_of(error))
+        if isinstance(error, OSError):
+            _forget_output()
         sys.exit(1)
     except KeyboardInterrupt:
         sys.exit(130)
     except RuntimeError as error:
         if isinstance(error.__cause__, KeyboardInterrupt):  # Python 3.11 reports one in a class body so
             sys.exit(130)
-        raise
+        if not _is_lack_of_memory(error):
+            raise
+        _print_error(_message_of(error))
+        sys.exit(1)
+
+
+_NO_MEMORY = ("failed to map segment", "cannot allocate memory", "can't start new thread")
+"""Words of the system, in small letters, for a lack of memory."""
+
+
+def _is_lack_of_memory(error: BaseException | None) -> bool:
+    """Return whether an exception, or one that it replaced, comes from a lack of memory."""
+    while error is not None:
+        if isinstance(error, MemoryError) or any(words in str(error).lower() for words in _NO_MEMORY):
+            return True
+        error = error.__cause__ or error.__context__
+    return False
+
+
+def _message_of(error: Exception) -> str:
+    """Return the message of an error that needs no traceback."""
+    if _is_lack_of_memory(error):
+        return "There is not enough memory. Close other programs, or raise the limit that `ulimit -v` shows."
+    if isinstance(error, RealityGapError):
+        return str(error)
+    if isinstance(error, ImportError):
+        return f"A part of realitygap cannot be loaded: {error}. Install it again."
+    if isinstance(error, OSError) and error.errno is None:  # not of a file, but of a library
+        return f"A part of realitygap cannot be loaded: {error}"
+    if isinstance(error, OSError):
+        return f"{error.filename or 'The output cannot be written'}: {error.strerror or error}."
+    return str(error)
 
 
 @contextlib.contextmanager

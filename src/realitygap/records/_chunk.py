@@ -11,6 +11,7 @@ from pathlib import Path
 
 import polars as pl
 
+from realitygap._forked import use_polars
 from realitygap._limits import MOST_CHUNK_BYTES, read_file
 from realitygap._parquet_size import check_size
 from realitygap.errors import RecordError, RecordVersionError
@@ -107,6 +108,7 @@ def encode_chunk(
         TypeError: `frame` is not a polars frame, or the hash is not text.
         ValueError: `condition`, `first` or the rows are not fit to be published.
     """
+    use_polars()
     check_condition(condition)
     if not isinstance(condition_hash, str):
         raise TypeError(f"The condition's hash is {condition_hash!r}, expected text.")
@@ -160,6 +162,7 @@ def digest_rows(path: Path, digest: RowsDigest) -> tuple[Chunk, pl.DataFrame]:
 
 
 def _open(path: Path) -> tuple[Chunk, bytes]:
+    use_polars()
     with reading(path):
         sealed = read_file(path, MOST_CHUNK_BYTES, plain=True)
     try:

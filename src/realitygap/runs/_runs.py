@@ -9,6 +9,7 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
+from realitygap._forked import use_polars
 from realitygap.errors import OutgrownError, whole_number
 from realitygap.evolution import distance_kind
 from realitygap.kernels.neat import block
@@ -198,6 +199,7 @@ def run_replicates(condition: Condition, first_replicate: int, n_runs: int) -> p
 
 def frame_of(condition: Condition, first_replicate: int, rows: RunRows) -> pl.DataFrame:
     """Return the rows of runs as a frame with the columns of the records."""
+    use_polars()
     n_runs, n_generations, n = rows.fitness.shape
     total = n_runs * n_generations * n
     n_cells = condition.arena.arena().grid.n_cells

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from realitygap._forked import use_polars
 from realitygap.errors import OutgrownError, StudyError, whole_number
 from realitygap.platforms import built_in_platforms
 from realitygap.records import LEDGER_NAME, Ledger, ResultsFolder
@@ -108,9 +109,11 @@ def run_study(
         StudyError: The study cannot be run as written, or the folder has another one; the message shows the difference.
         RecordError: The folder has an untrustworthy file, or cannot be written.
         RealityGapError: The cluster cannot be reached.
+        RuntimeError: This process was forked from one that had used polars. Use the start method `spawn`.
         TypeError: A count is not a whole number, or study or cluster is none of these.
         ValueError: A count below 1, or both threads and a cluster.
     """
+    use_polars()
     threads = None if threads is None else whole_number("threads", threads, 1)
     chunk = None if chunk is None else whole_number("chunk", chunk, 1)
     study, path = _resolved(study, out, seed, replicates, allow_code, fresh=fresh)

@@ -163,6 +163,18 @@ def test_increments_of_encoders_are_recognized_by_names_or_values(tmp_path):
         assert ("increments" in origin) == bool(per), case
 
 
+def test_encoders_of_unknown_scale_are_left_out_if_there_are_commands(tmp_path):
+    path = table(
+        tmp_path / "log.csv", {"t": "t", "v": "v", "w": "w", "encoder_left": "el", "encoder_right": "er"}
+    )
+    log_map, origin = mapping_of(path)
+    assert log_map.wheels is None
+    assert "because ticks_per_m is unknown" in origin
+    assert mapping_of(path, draft=True)[0].wheels.unit == "ticks"
+    (log,) = read_logs(path, log_map, ROBOT)
+    assert log.has_commands
+
+
 def test_poses_have_the_stamp_of_their_header_if_its_clock_is_that_of_the_log(tmp_path):
     for stamp, expected in (("s", "odom.header.stamp"), ("t", "Time")):
         layout = {

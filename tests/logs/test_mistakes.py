@@ -117,6 +117,14 @@ def test_heading_that_never_changes_is_a_mistake_if_the_path_turns():
         assert blamed <= 1, noise
 
 
+def test_increments_that_are_read_as_counters_are_a_mistake():
+    commands, poses = drive(200)
+    steps = np.concatenate([np.zeros((1, 2)), commands * SPEED * STEP_S])
+    for wheels, expected in ((steps, ["increments"]), (np.cumsum(steps, 0), [])):
+        log = Log("", 0.0, STEP_S, commands, poses, wheels, NOTHING, poses[:, 2])
+        assert [mistake.kind for mistake in diagnose(log, SPEED, TRACK).mistakes] == expected
+
+
 def test_a_robot_that_stands_shows_nothing():
     commands, poses = drive(100)
     assert kinds(0 * commands, poses) == []

@@ -459,7 +459,7 @@ def test_results_of_another_version_are_never_extended(older):
         lambda: older.publish("coverage", 4, make_rows(first=4), HASH),
         lambda: older.update_description(DESCRIPTION),
     ):
-        with pytest.raises(RecordVersionError, match="--fresh, or name another folder"):
+        with pytest.raises(RecordVersionError, match="--fresh`, or name another folder"):
             write()
     assert len(older.chunks()) == 2
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from realitygap.errors import LogError
 
 from ._guess import checked_guess, draft_log_map
+from ._guess_values import usable
 from ._log_map import LogMap, load_log_map
 from ._open import BAG_ENDS, is_log_folder, map_beside
 
@@ -100,6 +101,9 @@ def mapping_of(
         if draft:
             return draft_log_map(path), guessed
         raise
+    if not draft:
+        log_map, left_out = usable(log_map)
+        notes += left_out
     return log_map, "; ".join([guessed, *notes])
 
 

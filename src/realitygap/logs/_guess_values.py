@@ -12,7 +12,7 @@ from realitygap.errors import LogError
 from ._guess_time import time_unit
 from ._log_map import Commands, LogMap, Part, Poses
 from ._source import Floats, Source
-from ._units import TIMES
+from ._units import ANGLES, TIMES
 from ._words import map_name, tokens_of, unit_in
 
 MOST_SPEED = 5.0
@@ -65,6 +65,19 @@ def checked(source: Source, log_map: LogMap) -> tuple[LogMap, list[str]]:
             changes["wheels"] = wheels.model_copy(update={"per": per})
             notes.append("encoders are taken for increments since the row before, by their values")
     return log_map.model_copy(update=changes), notes
+
+
+def usable(log_map: LogMap) -> tuple[LogMap, list[str]]:
+    """Return a mapping without encoders whose scale is unknown, if it has commands, and a note."""
+    wheels = log_map.wheels
+    if log_map.commands is None or wheels is None:
+        return log_map, []
+    unit = wheels.unit.split("/")[0]
+    missing = "ticks_per_m" if unit == "ticks" else "wheel_diameter_mm" if unit in (*ANGLES, "rpm") else ""
+    if not missing:
+        return log_map, []
+    note = f"{wheels.left} and {wheels.right} are left out, because {missing} is unknown"
+    return log_map.model_copy(update={"wheels": None}), [note]
 
 
 def _rows(source: Source, columns: Sequence[str]) -> Floats:

@@ -28,6 +28,14 @@ MOST_LATE_S = 0.5
 """A robot's own lag and delay: what follows later is a clock."""
 SCALES = {1000.0: ("millimeters", "mm"), 100.0: ("centimeters", "cm"), 1 / 0.0254: ("inches", "in")}
 LEAST_WAY = 1e-9
+FEWEST_INCREMENTS = 50
+"""Minimum number of steps that show whether encoders count on."""
+ALIKE = 0.7
+"""Correlation with the motion of the poses at which encoders are that motion, if the other reading has less."""
+INCREMENTS = (
+    "The encoders do not count on, but follow the speed of the poses: they are increments since the row before. "
+    'Set wheels.per = "row".'
+)
 LEAST_BEND = 0.1
 """Change of direction below which a path counts as straight [rad]."""
 CLEAR_BEND = 5.0
@@ -42,7 +50,8 @@ class Mistake:
 
     Attributes:
         kind: swapped, reversed, left reversed, right reversed, degrees, millimeters, centimeters, inches, unit,
-            half track, double track, clockwise, constant heading, heading offset, or clock.
+            half track, double track, clockwise, constant heading, heading offset,
+            clock, or increments.
         message: Observation, and the next step.
     """
 
@@ -76,6 +85,8 @@ def diagnose(log: Log, speed: float, track: float) -> Diagnosis:
         track: Distance between the wheels in the robot's file [m].
     """
     log = _begin(log)
+    if _are_increments(log):
+        return Diagnosis((Mistake("increments", INCREMENTS),))
     ways = log.commands * speed * log.step_s
     if not len(log.poses) or not np.abs(ways).max(initial=0.0) > LEAST_WAY:
         return Diagnosis()
@@ -95,6 +106,22 @@ def diagnose(log: Log, speed: float, track: float) -> Diagnosis:
     if offset is not None and (offset.high < -log.step_s / 4 or offset.low > MOST_LATE_S):
         mistakes.append(_clock(offset, log.wheel_part))
     return Diagnosis(tuple(mistakes), offset, measured, gain)
+
+
+def _are_increments(log: Log) -> bool:
+    """Return whether the encoders do not count on, but follow the speed of the poses."""
+    if not len(log.wheels) or not len(log.poses) or len(log.commands) < FEWEST_INCREMENTS:
+        return False
+    moved = np.hypot(*np.diff(log.poses[:, :2], axis=0).T)
+    way = log.wheels.mean(1)
+    as_counter, as_increment = (_correlation(moved, each) for each in (np.abs(np.diff(way)), way[1:]))
+    return as_increment > ALIKE and as_counter < ALIKE * as_increment
+
+
+def _correlation(first: Floats, second: Floats) -> float:
+    if not (np.ptp(first) and np.ptp(second)):
+        return 0.0
+    return float(np.corrcoef(first, second)[0, 1])
 
 
 def _begin(log: Log) -> Log:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 READ_S, WAIT_S = 20.0, 120.0
 """Processor time and real time that a reader may take [s]."""
-MEMORY = 2 << 30
+MEMORY = 1 << 30
 """Memory that a reader may take, on top of what its process has [bytes]."""
 NUMBERS = (b"0", b"-1", b"1e999", b"nan", b"9" * 30, b"4294967296", b"0.1", b"true", b'""', b"[]", b"{}")
 

@@ -123,7 +123,11 @@ def _frames(tally: Tally, content: Mapping[str, Any]) -> Iterator[tuple[str, str
 
 def _csv(rows: list[list[str]]) -> bytes:
     buffer = io.StringIO()
-    csv.writer(buffer, lineterminator="\n").writerows(rows)
+    plain = csv.writer(buffer, lineterminator="\n")
+    quoted = csv.writer(buffer, lineterminator="\n", quoting=csv.QUOTE_ALL)
+    for row in rows:
+        # the writer does not quote a lone carriage return, which ends a row for readers
+        (quoted if any("\r" in cell for cell in row) else plain).writerow(row)
     return buffer.getvalue().encode("utf-8", "replace")
 
 

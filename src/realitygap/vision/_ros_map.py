@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import json
 import math
 import re
 import warnings
@@ -311,8 +310,9 @@ def save_map(arena: Arena, path: str | Path, *, resolution: float = RESOLUTION) 
     Image.fromarray(gray).save(stream, "PPM")
     write_whole(file, stream.getvalue())
     start = ", ".join(f"{value:g}" for value in arena.start)
+    name = " ".join("".join(c if c.isprintable() else " " for c in arena.name).split())
     text = (
-        f"# Arena {' '.join(arena.name.split())}. Start: {start} (x [m], y [m], heading [rad])\n"
+        f"# Arena {name}. Start: {start} (x [m], y [m], heading [rad])\n"
         f"image: {_yaml_text(file.name)}\nmode: trinary\nresolution: {_yaml_number(resolution)}\n"
         f"origin: [{_yaml_number(origin[0])}, {_yaml_number(origin[1])}, 0.0]\nnegate: 0\n"
         f"occupied_thresh: {OCCUPIED_THRESH:g}\nfree_thresh: {FREE_THRESH:g}\n"
@@ -327,7 +327,9 @@ def _yaml_number(value: float) -> str:
 
 
 def _yaml_text(name: str) -> str:
-    return name if _PLAIN_NAME.fullmatch(name) else json.dumps(name)
+    if _PLAIN_NAME.fullmatch(name):
+        return name
+    return '"' + "".join(c if c.isalnum() and c.isascii() else f"\\U{ord(c):08x}" for c in name) + '"'
 
 
 def _draw_obstacle(draw: Any, obstacle: Obstacle, pixel: Any) -> None:

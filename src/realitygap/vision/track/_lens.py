@@ -99,9 +99,14 @@ class Lens:
         """Return the text of a file."""
         return (
             f"format = {LENS_FORMAT!r}\nwidth = {self.width}  # px\nheight = {self.height}\n"
-            f"focal = {list(self.focal)}  # px, across and down\ncenter = {list(self.center)}\n"
-            f"distortion = {list(self.distortion)}  # k1, k2, p1, p2, k3\nrms = {self.rms}  # px\n"
+            f"focal = {_plain(self.focal)}  # px, across and down\ncenter = {_plain(self.center)}\n"
+            f"distortion = {_plain(self.distortion)}  # k1, k2, p1, p2, k3\nrms = {float(self.rms)}  # px\n"
         )
+
+
+def _plain(numbers: Iterable[float]) -> list[float]:
+    """Return Python's numbers, whose text is that of TOML."""
+    return [float(number) for number in numbers]
 
 
 def read_lens(path: Path | str) -> Lens:
@@ -125,7 +130,7 @@ def read_lens(path: Path | str) -> Lens:
         made = Lens(
             int(values["width"]), int(values["height"]), (fx, fy), (cx, cy), (k1, k2, p1, p2, k3), float(values["rms"])
         )  # fmt: skip
-        if not all(map(math.isfinite, (fx, fy, cx, cy, *made.distortion, made.rms))):
+        if not all(map(math.isfinite, (fx, fy, cx, cy, *made.distortion))) or math.isinf(made.rms):
             raise ValueError("a number of it is not finite")
         if not all(value > 0 for value in (made.width, made.height, fx, fy)):
             raise ValueError("its size or focal length is not above 0")

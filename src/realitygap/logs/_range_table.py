@@ -77,6 +77,8 @@ def read_range_table(path: str | Path, table_map: TableMap | None = None) -> Ran
     path, table_map = Path(path), table_map or TableMap()
     try:
         data = read_file(path, MOST_TABLE_BYTES)
+    except FileNotFoundError:
+        raise LogError(f"There is no file {path}. Name a table of readings.") from None
     except OSError as error:
         raise LogError(f"Cannot read {path}: {error.strerror or error}. Name a table of readings.") from None
     head = _HEAD.match(data)

@@ -16,3 +16,8 @@ def significant(value: float, digits: int, *, keep_zeros: bool = False) -> str:
         return f"{rounded:,.0f}" if abs(rounded) < 1e15 else f"{value:.{digits}g}"
     text = f"{value:{'#' if keep_zeros else ''}.{digits}g}"
     return text.removesuffix(".")
+
+
+def fixed(value: float, digits: int) -> str:
+    """Return a number with some digits after the point; from a billion on with an exponent, so that it stays short."""
+    return f"{value:.{digits}f}" if abs(value) < 1e9 else f"{value:.4g}"

@@ -9,6 +9,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from realitygap._numbers import fixed
 from realitygap.errors import finite_numbers
 from realitygap.world import Fitted, RobotModel
 
@@ -448,7 +449,7 @@ def _predict(problem: _Problem, log: MotionLog, split: int, best: Floats) -> tup
         off = np.hypot(*np.moveaxis(predicted[:, rows, :2] - log.poses[rows, :2], -1, 0))
         lasts = log.time_s[rows[-1]] - log.time_s[split - 1]
         held_out = HeldOut(
-            f"mean distance between seen and predicted positions over the last {lasts:.1f} s",
+            f"mean distance between seen and predicted positions over the last {fixed(lasts, 1)} s",
             "m",
             float(off[0].mean()),
             float(off[1].mean()),
@@ -467,7 +468,7 @@ def _predict(problem: _Problem, log: MotionLog, split: int, best: Floats) -> tup
     off = np.sqrt(((speeds - seen) ** 2).mean(axis=(1, 2)))
     full = problem.own["drive.speed"]
     held_out = HeldOut(
-        f"root mean square error of the wheels' speeds over the last {log.time_s[-1] - log.time_s[split]:.1f} s",
+        f"root mean square error of the wheels' speeds over the last {fixed(log.time_s[-1] - log.time_s[split], 1)} s",
         "m/s",
         float(off[0]),
         float(off[1]),

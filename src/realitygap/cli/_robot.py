@@ -9,6 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
+from realitygap._numbers import fixed
 from realitygap.errors import RobotError
 
 from ._json import print_json
@@ -181,7 +182,7 @@ def battery(port: Port, as_json: Json = False, record: Record = None) -> None:
     if as_json:
         print_json({name: round(value, 3)})
         return
-    typer.echo(f"{value:.2f} V" if name.endswith("_v") else f"{value:g}, without a unit")
+    typer.echo(f"{fixed(value, 2)} V" if name.endswith("_v") else f"{value:g}, without a unit")
 
 
 @robot.command("picture")
@@ -288,7 +289,7 @@ def _row(line: Any) -> tuple[str, str, str, str]:
         what = f"{line['sent']} > {_shortened(line['answered'])}"
     if line.get("outcome", "ok") != "ok":
         what = f"{what} {line['outcome']}".strip()
-    return f"{line['t']:.3f}", line["kind"], line["name"], what
+    return fixed(line["t"], 3), line["kind"], line["name"], what
 
 
 def _shortened(text: str, most: int = 60) -> str:
@@ -297,7 +298,7 @@ def _shortened(text: str, most: int = 60) -> str:
 
 def _value(value: Any) -> str:
     if isinstance(value, float):
-        return f"{value:.3f}"
+        return fixed(value, 3)
     return " ".join(map(_value, value)) if isinstance(value, list | tuple) else str(value)
 
 

@@ -9,6 +9,8 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from realitygap._numbers import fixed
+
 if TYPE_CHECKING:
     import polars as pl
 
@@ -108,7 +110,7 @@ def table_of(title: str, caption: str = "") -> Table:
 def _number(value: float | None) -> str:
     if value is None:
         return "-"
-    text = f"{value:.3f}"
+    text = fixed(value, 3)
     return text.replace("0.", ".", 1) if abs(value) < 1 else text
 
 

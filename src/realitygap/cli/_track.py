@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from realitygap._numbers import fixed
 from realitygap.errors import StudyError
 
 from ._json import print_json
@@ -460,7 +461,7 @@ def _print(found: Tracked, placed: TrackedTrial | None, written: _Written, *, as
             "as said" if math.isnan(begun.agreement) else f"commands and path agree to {begun.agreement:.2f}"
         )
         typer.echo(
-            f"The trial begins at {begun.time:.2f} s ({how}) and crosses {len(placed.score.cells)} cells."
+            f"The trial begins at {fixed(begun.time, 2)} s ({how}) and crosses {len(placed.score.cells)} cells."
         )
     for said in found.warnings:
         typer.echo(f"Note: {said}")

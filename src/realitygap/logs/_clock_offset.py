@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from realitygap._numbers import fixed
+
 from ._source import Floats
 
 LONGEST_S = 3.0
@@ -37,7 +39,7 @@ class ClockOffset:
     def __str__(self) -> str:
         """Return the offset with its interval."""
         at, low, high = (round(value, 2) + 0.0 for value in (self.seconds, self.low, self.high))
-        return f"{at:.2f} s ({low:.2f} to {high:.2f})"
+        return f"{fixed(at, 2)} s ({fixed(low, 2)} to {fixed(high, 2)})"
 
 
 def clock_offset(told: Floats, seen: Floats, step_s: float, *, seed: int = 0) -> ClockOffset | None:

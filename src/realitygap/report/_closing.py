@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from realitygap._numbers import fixed
 from realitygap._version import __version__
 from realitygap.records import write_whole
 from realitygap.report._closing_figures import draw_closing, words_of
@@ -167,7 +168,7 @@ def _percent(value: float | None) -> str:
 
 
 def _number(value: float | None) -> str:
-    return "–" if value is None else f"{value:.3f}".replace("-", "−")
+    return "–" if value is None else fixed(value, 3).replace("-", "−")
 
 
 def _span(estimate: Mapping[str, Any], form: Any) -> str:

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import polars as pl
 
+from realitygap._numbers import fixed
 from realitygap._wording import Basis, signed, span
 from realitygap.platforms import is_physical
 from realitygap.report._champions import FRESH_TRIALS, MOST_RUNS, Champions
@@ -284,7 +285,7 @@ def _spread(tally: Tally) -> dict[str, Any]:
 
 
 def _number(value: float, digits: int = 3) -> str:
-    return f"{value:.{digits}f}" if math.isfinite(value) else "–"
+    return fixed(value, digits) if math.isfinite(value) else "–"
 
 
 # variety

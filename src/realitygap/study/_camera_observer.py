@@ -9,6 +9,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from realitygap._numbers import fixed
 from realitygap.errors import RobotError, VisionError
 from realitygap.records import Observe, Score, TrialRecord
 from realitygap.robots import Clock, Robot
@@ -167,7 +168,8 @@ def seen_between(camera: Looking, first: float, last: float) -> Track:
     if track.times[0] > first + AT_REST_S or track.times[-1] < last - AT_REST_S:
         from_s, to_s = track.times[0] - first, track.times[-1] - first
         raise RobotError(
-            f"The camera saw the robot from {from_s:.1f} to {to_s:.1f} s of a trial of {last - first:.1f} s, expected "
+            f"The camera saw the robot from {fixed(from_s, 1)} to {fixed(to_s, 1)} s of a trial of "
+            f"{fixed(last - first, 1)} s, expected "
             "all of it. Does it see the whole arena?"
         )
     return track.held(min(first, track.times[0]), max(last, track.times[-1]))

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from realitygap._numbers import fixed
 from realitygap.errors import StudyError
 from realitygap.records import (
     LEDGER_NAME,
@@ -152,7 +153,7 @@ def place_trial(
     first, last = begun.time, begun.time + wanted.times[-1]
     if not (track.times[0] <= first and last <= track.times[-1]):
         raise StudyError(
-            f"The trial is from {first:.2f} to {last:.2f} s of the video, and the robot is seen from "
+            f"The trial is from {fixed(first, 2)} to {fixed(last, 2)} s of the video, and the robot is seen from "
             f"{track.times[0]:.2f} to {track.times[-1]:.2f} s. Film it from before the start until it stops, "
             "or correct --begins."
         )
@@ -213,6 +214,6 @@ def note_of_track(camera: str, found: Tracked, placed: TrackedTrial) -> str:
         with Path(camera).open("rb") as file:
             what += f", sha256 {hashlib.file_digest(file, 'sha256').hexdigest()}"
     return (
-        f"Cells and path by camera: {what}; begins at {begun.time:.2f} s ({how}); robot seen in {placed.seen:.0%} of "
-        f"its pictures; tag {found.tag.family}:{found.tag.number}."
+        f"Cells and path by camera: {what}; begins at {fixed(begun.time, 2)} s ({how}); robot seen in "
+        f"{placed.seen:.0%} of its pictures; tag {found.tag.family}:{found.tag.number}."
     )

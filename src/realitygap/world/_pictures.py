@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from itertools import pairwise
 
+from realitygap._numbers import fixed
 from realitygap.drawing import Disc, Ink, Line, Picture, Shape, Text, picture_of
 
 from ._arena import Arena, Pose
@@ -307,7 +308,10 @@ def dimension_line(
 def length_text(value: float) -> str:
     """Return a length [m] in meters, and also in inches if these are whole."""
     inches = value / INCH
-    metric = f"{value:.3f}".rstrip("0").rstrip(".") + " m"
+    metric = fixed(value, 3)
+    if "e" in metric:
+        return f"{metric} m"
+    metric = metric.rstrip("0").rstrip(".") + " m"
     if abs(inches - round(inches)) < _WHOLE * max(1.0, inches) and round(inches) > 0:
         return f"{metric} ({round(inches)} in)"
     return metric

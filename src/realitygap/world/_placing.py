@@ -7,6 +7,8 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
+from realitygap._numbers import fixed
+
 from ._arena import Arena, Pose
 from ._obstacle import Segment, distance_to_segment
 from ._robot import Body
@@ -35,8 +37,8 @@ def check_start(arena: Arena, robot: Body | RobotModel) -> None:
         for x, y in outline:
             if enclosing and not _is_within(enclosing, x, y):
                 raise ValueError(
-                    f"{start}: a corner of its body would be at ({x:.3f}, {y:.3f}), beyond a wall. Move the start "
-                    "away from the wall."
+                    f"{start}: a corner of its body would be at ({fixed(x, 3)}, {fixed(y, 3)}), beyond a wall. Move "
+                    "the start away from the wall."
                 )
         for what, other in _solids(arena):
             if _overlap(outline, other):

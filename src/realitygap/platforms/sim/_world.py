@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from realitygap._numbers import fixed
 from realitygap.drawing import Line, Picture, Point, Shape, hex_of
 from realitygap.errors import RobotError, real_number
 from realitygap.evolution import NeatSettings
@@ -184,8 +185,8 @@ class SimWorld:
             parts = robot._parts()
             if any(overlaps(part, other) for part in parts for other in standing):
                 raise RobotError(
-                    f"{robot.name} starts in a wall, an obstacle or another robot at ({robot.start.x:.3f}, "
-                    f"{robot.start.y:.3f}). Start it elsewhere."
+                    f"{robot.name} starts in a wall, an obstacle or another robot at ({fixed(robot.start.x, 3)}, "
+                    f"{fixed(robot.start.y, 3)}). Start it elsewhere."
                 )
             standing += parts
         for robot in self.robots:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from realitygap._numbers import fixed
 from realitygap.errors import VisionError
 
 from ._track import Track
@@ -50,8 +51,8 @@ def find_beginning(track: Track, times: Floats, commands: Floats, stalled: NDArr
     room = track.times[-1] - track.times[0] - times[-1]
     if room < 0:
         raise VisionError(
-            f"The trial lasts {times[-1]:.1f} s, and the robot is seen for {track.times[-1] - track.times[0]:.1f} s. "
-            "Film it from before the start until it stops."
+            f"The trial lasts {fixed(times[-1], 1)} s, and the robot is seen for "
+            f"{track.times[-1] - track.times[0]:.1f} s. Film it from before the start until it stops."
         )
     step = max(COARSE_S, room * len(times) / MOST_TRIED)
     tried = track.times[0] + np.arange(0.0, room + 1e-9, step)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from realitygap._numbers import fixed
 from realitygap.errors import VisionError
 from realitygap.vision._tag_layout import RobotTag
 from realitygap.world import Grid, cells_along
@@ -56,8 +57,8 @@ class Track:
         times = np.asarray(times, np.float64)
         if len(times) and not (times.min() >= self.times[0] - 1e-9 and times.max() <= self.times[-1] + 1e-9):
             raise ValueError(
-                f"times are {times.min():.2f} to {times.max():.2f} s, expected within {self.times[0]:.2f} to "
-                f"{self.times[-1]:.2f} s, which the camera saw."
+                f"times are {fixed(times.min(), 2)} to {fixed(times.max(), 2)} s, expected within "
+                f"{self.times[0]:.2f} to {self.times[-1]:.2f} s, which the camera saw."
             )
         return np.column_stack([np.interp(times, self.times, column) for column in self.poses.T])
 

@@ -81,6 +81,10 @@ class ProtocolError(RobotError):
     """A received byte or message does not follow the protocol."""
 
 
+class RobotWarning(UserWarning):
+    """A robot has not answered for some time, and its motors may be running. The driver tries to reach it again."""
+
+
 class LedgerError(RecordError):
     """A ledger of physical trials cannot be trusted or written, or does not allow the requested change."""
 

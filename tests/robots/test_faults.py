@@ -6,6 +6,7 @@ import gc
 import random
 import signal
 import time
+import warnings
 
 import pytest
 from hypothesis import given
@@ -263,6 +264,51 @@ def test_a_hang_up_is_survived_when_the_port_comes_back():
         assert port.robot.motors == RIGHT_LEFT_BYTES  # went on
         assert [command[0] for command in port.robot.carried_out].count(108) == 2
     assert port.robot.motors == STILL
+
+
+def silence(port: FakePort) -> None:
+    """Have a robot answer nothing, without a hang-up."""
+    port.wire.to_host = lambda number, byte: b""
+
+
+def hang_up(port: FakePort) -> None:
+    port.gone = True
+
+
+@pytest.mark.parametrize("lose", [silence, hang_up])
+@pytest.mark.parametrize("setup", ["s1", "s2", "s2+fluke1", "s2+fluke2"])
+def test_warning_that_motors_may_be_running_comes_within_3_s(lose, setup):
+    port = FakePort(FakeScribbler(setup))
+    warned: list[tuple[float, str]] = []
+    robot = Scribbler(port)
+    with warnings.catch_warnings():
+        warnings.simplefilter("default")
+        warnings.showwarning = lambda text, *_: warned.append((port.clock.now(), str(text)))
+        for n_episodes in (1, 2):
+            robot.motors(*LEFT_RIGHT)
+            lost_s = port.clock.now()
+            to_host = port.wire.to_host
+            lose(port)
+            with pytest.raises(RobotError, match="the motors may be running"):
+                robot.observe()
+            assert len(warned) == n_episodes
+            said_s, text = warned[-1]
+            assert said_s - lost_s <= 3.0
+            assert "its motors may be running" in text
+            port.wire.to_host, port.gone = to_host, False
+            robot.stop()
+    robot.close()
+
+
+def test_robot_that_stands_gives_no_warning_when_it_is_lost():
+    port = FakePort(FakeScribbler("s2+fluke1"))
+    robot = Scribbler(port)
+    silence(port)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for command in (robot.observe, robot.close):
+            with pytest.raises(RobotError, match="motors stopped"):
+                command()
 
 
 def test_a_hang_up_in_the_greeting_is_survived_too():

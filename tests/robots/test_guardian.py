@@ -276,11 +276,12 @@ except Exception as error:
         assert "This program was silent for 1 s" in process.stdout.readline()
 
 
-def test_guardian_that_is_killed_is_replaced_and_the_motors_stop():
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
+def test_guardian_that_is_killed_or_frozen_is_replaced_and_the_motors_stop(number):
     with serve_pty(Emulator("s2", "1")) as server, Scribbler(server.name, step_s=0.0) as robot:
         robot.drive(Command(1, 0))
         first = robot.link.guardian_id
-        os.kill(first, signal.SIGKILL)
+        os.kill(first, number)
         time_to_stand(server)
         with pytest.raises(
             RobotError, match="The process that guards the robot ended, so the motors were stopped"
@@ -317,6 +318,36 @@ def test_ctrl_c_for_the_whole_group_lets_the_program_stop_its_robot():
             assert is_alive(guardian)
             process.kill()
             time_to_stand(server)
+
+
+UNWRITABLE = {
+    "pipe": "while True:\n    robot.observe()\n    print('x' * 100, flush=True)\n",
+    "file": """
+import resource
+resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, 10_000))
+with open(sys.argv[2], "wb", buffering=0) as file:
+    while True:
+        robot.observe()
+        file.write(bytes(1000))
+""",
+}
+"""What a program does until a pipe is closed, or a file has its largest size."""
+
+
+@pytest.mark.parametrize("kind", UNWRITABLE)
+def test_motors_stop_when_a_driving_program_can_write_no_more(kind, tmp_path):
+    """SIGPIPE and SIGXFSZ are ignored, so that the write fails and the robot is closed; they end nobody at once."""
+    with (
+        serve_pty(Emulator("s2", "1")) as server,
+        program(DRIVE + UNWRITABLE[kind], server.name, str(tmp_path / "file")) as (process, guardian),
+    ):
+        process.send_signal(signal.SIGPIPE)
+        process.send_signal(signal.SIGXFSZ)
+        process.stdout.close()
+        assert process.wait(60) == 1
+        assert server.witness.motors() == STILL
+        assert not is_alive(guardian)
+        assert ("Broken pipe" if kind == "pipe" else "File too large") in process.stderr.read()
 
 
 def test_closed_robots_leave_no_process_and_no_descriptor():

@@ -9,7 +9,7 @@ from typing import Any
 
 from ._job import MOST_POINTS, Job
 
-SILENT_S = 3.0
+SILENT_S = 2.0
 """Time without a step of a trial from which the robot counts as silent [s]. A step lasts half a second."""
 OPTIONS = ("port", "witness", "camera", "counts", "when")
 """Keys of an order that state how a robot is connected."""

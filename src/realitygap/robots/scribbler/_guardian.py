@@ -20,6 +20,8 @@ START_S = 10.0
 """Maximum time until the guardian has started [s]. It needs some 20 ms."""
 END_S = 2.0
 """Maximum time until the guardian has ended [s]."""
+MOST_UNHEARD = 100
+"""Number of beats without an answer after which the guardian counts as frozen: 2 s of a program that runs itself."""
 
 
 def descriptor_of(port: object) -> int | None:
@@ -40,7 +42,7 @@ class Guardian:
 
     Args:
         descriptor: Descriptor of the open port.
-        on_death: Called from a thread if the guardian ends before `end` is called.
+        on_death: Called from a thread if the guardian ends before `end` is called. A frozen one is killed.
         stop: Bytes that stop the motors of a robot that does not answer them. Default: those of a Scribbler.
 
     Raises:
@@ -54,6 +56,7 @@ class Guardian:
         self._is_ready = False
         self._is_stopping = False
         self._has_stopped = False
+        self._n_unheard = 0
         self._on_death = on_death
         try:
             self._process: subprocess.Popen[bytes] = subprocess.Popen(
@@ -131,9 +134,17 @@ class Guardian:
             with self._lock:
                 if self._is_moving and not self._ended.is_set():
                     self._tell(MOVING)
+                    self._check_answer()
             if self._process.poll() is not None and not self._ended.is_set():
                 self._on_death()
                 return
+
+    def _check_answer(self) -> None:
+        """Kill the guardian if it has not answered for many beats: it could not stop the motors."""
+        self._n_unheard += 1
+        self._listen(0.0)
+        if self._n_unheard > MOST_UNHEARD and not self._is_stopping:
+            self._process.kill()
 
     def _tell(self, message: bytes) -> None:
         try:
@@ -150,8 +161,10 @@ class Guardian:
             if not messages:
                 self._is_stopping = False
                 return
+            self._n_unheard = 0
             self._is_ready = self._is_ready or READY in messages
-            self._is_stopping = messages.rfind(STOPPING) > messages.rfind(STOPPED)
+            if STOPPING in messages or STOPPED in messages:
+                self._is_stopping = messages.rfind(STOPPING) > messages.rfind(STOPPED)
             self._has_stopped = self._has_stopped or STOPPING in messages
             if not self._is_stopping:
                 timeout_s = 0.0

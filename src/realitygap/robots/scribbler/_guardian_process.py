@@ -21,8 +21,9 @@ import time
 MOVING, STANDING, QUIT = b"m", b"s", b"q"
 """Messages from the program: the motors may run (repeated every `BEAT_S`); the motors are off; the port will be closed.
 """
-READY, STOPPING, STOPPED = b"r", b"f", b"d"
-"""Messages to the program: watching; stopping the motors, because the program was silent; stopped, or given up."""
+READY, HEARD, STOPPING, STOPPED = b"r", b"h", b"f", b"d"
+"""Messages to the program: watching; answer to `MOVING`; stopping the motors, because the program was silent; stopped,
+or given up."""
 
 BEAT_S = 0.02
 """Time between two messages of a program whose robot may be moving [s]."""
@@ -47,6 +48,7 @@ def main() -> None:
     stop = bytes.fromhex(sys.argv[3]) if len(sys.argv) > 3 else b""
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT):
         signal.signal(number, signal.SIG_IGN)  # what ends the program must not end its guardian first
+    os.set_blocking(1, False)  # a program that reads nothing must not hold up its guardian
     _tell(READY)
     is_moving, heard_s = False, time.monotonic()
     while True:
@@ -57,6 +59,8 @@ def main() -> None:
             if not messages:
                 break
             is_moving, heard_s = messages.endswith(MOVING), time.monotonic()
+            if is_moving:
+                _tell(HEARD)
         elif os.getppid() != program:
             break
         elif is_moving and time.monotonic() - heard_s > SILENT_S:

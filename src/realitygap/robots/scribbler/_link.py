@@ -15,11 +15,12 @@ import contextlib
 import errno
 import threading
 import time
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple, TypeVar
 
-from realitygap.errors import ProtocolError, RobotError
+from realitygap.errors import ProtocolError, RobotError, RobotWarning
 from realitygap.robots._clock import Clock, SystemClock
 from realitygap.robots._serial_port import reason_of, serial_port
 
@@ -46,6 +47,8 @@ PROBE_S = 0.3
 """Maximum time for a Fluke's battery reading when probing [s]."""
 MAX_PROBES = 12
 """More than the bytes that any of the Fluke's counters can still expect."""
+DOUBT_S = 2.0
+"""Time without an answer after which a warning states that the motors may be running [s]."""
 WRITE_S = 2.0
 """Maximum time for which a port may refuse a command [s]."""
 ATTEMPTS = 5
@@ -236,6 +239,8 @@ class Link:
         self._in_step = False
         self._fault: Fault | None = None
         self._recoveries = RECOVERIES
+        self._asked_s = self.spoken_s
+        self._has_warned = False
         self._is_open = True
         self._guardian: Guardian | None = None
         self._stopped = (
@@ -279,6 +284,7 @@ class Link:
             if self.watch is not None:
                 self.watch()
             fault, lost, n_sent = None, False, 0
+            self._asked_s = self.clock.now()
             for attempt in range(ATTEMPTS):
                 self._refuse_if_stopped(request)
                 try:
@@ -332,7 +338,7 @@ class Link:
             self._record(request, since, fault.got, str(fault))
             raise
         self._in_step = True
-        self._recoveries = RECOVERIES
+        self._recoveries, self._has_warned = RECOVERIES, False
         self.spoken_s = self.clock.now()
         if request.data[0] in _STEERING:
             self._note_motors(request)
@@ -475,6 +481,7 @@ class Link:
         motors, fault = self._motors, self._fault
         n_silent = 0
         for _ in range(self._recoveries):
+            self._warn_if_silent()
             try:
                 if isinstance(fault, HangUp):
                     self._reopen(fault)
@@ -490,6 +497,19 @@ class Link:
                 break
         self._fault = fault
         raise _LostStep(fault)
+
+    def _warn_if_silent(self) -> None:
+        """Warn once if the motors may be running and the robot has not answered for some time."""
+        silent_s = self.clock.now() - self._asked_s
+        if self.motors_off is not False or self._has_warned or silent_s < DOUBT_S:
+            return
+        self._has_warned = True
+        text = (
+            f"The robot on {self.name} has not answered for {silent_s:.0f} s, and its motors may be running. If it "
+            "moves, switch it off. This program is trying to reach it again."
+        )
+        # a registry would show the same text only once
+        warnings.warn_explicit(text, RobotWarning, __file__, 0, registry=None)
 
     def _settle(self, fault: Fault | None) -> None:
         """Wait for silence, then send commands whose answers prove that both sides are synchronized."""
@@ -573,6 +593,7 @@ class Link:
                 self.port.open()
                 self._start_guardian()
                 return
+            self._warn_if_silent()
         raise _LostStep(fault)
 
     def _move_on(self, request: Request) -> None:

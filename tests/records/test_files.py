@@ -189,6 +189,7 @@ def public_path():
 @contextlib.contextmanager
 def _unprivileged():
     """Root may write anywhere; for a while, be somebody else."""
+    before = os.geteuid()
     try:
         os.seteuid(65534)
     except PermissionError:  # not root, or a root without its powers: bound by the modes already
@@ -197,7 +198,7 @@ def _unprivileged():
     try:
         yield
     finally:
-        os.seteuid(0)
+        os.seteuid(before)
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows keeps no such modes")

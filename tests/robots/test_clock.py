@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import time
+from pathlib import Path
 
 import pytest
 
+import realitygap
 from realitygap.robots import SystemClock
 from realitygap.robots import _clock as module
 
@@ -39,3 +41,11 @@ def test_ctrl_c_that_comes_just_before_a_wait_is_heard_soon(monkeypatch):
     with pytest.raises(KeyboardInterrupt):
         SystemClock().sleep(60.0)
     assert time.monotonic() - since < 30.0
+
+
+def test_nothing_that_drives_robots_depends_on_the_time_of_day():
+    """The computer's clock can jump while a robot drives; the monotonic clock cannot."""
+    packages = Path(realitygap.__file__).parent
+    for package in ("robots", "emulator", "trials"):
+        for path in (packages / package).rglob("*.py"):
+            assert "time.time(" not in path.read_text("utf-8"), path

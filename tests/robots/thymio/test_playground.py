@@ -183,6 +183,27 @@ def test_a_playground_that_answers_late_cannot_place_a_driving_robot(driving, mo
         driving.place(wanted)
 
 
+def test_second_program_is_refused_and_the_first_drives_on():
+    # in a playground of its own, which may crash when it finds the second connection closed
+    with Playground(speed=SPEED) as own, Thymio(own.port) as robot:
+        robot.drive(Command(0.0, 0.5))
+        with pytest.raises(RobotError, match="does no other program use it"):
+            Thymio(own.port)
+        turned = own.pose()
+        robot.drive(Command(0.0, 0.5))
+        robot.observe()
+        assert own.pose() != turned
+
+
+def test_speeds_are_0_when_the_robot_stands(playground):
+    with Thymio(playground.port) as robot:
+        robot.drive(Command(0.0, 0.5))
+    until = time.monotonic() + 10
+    while playground.motors() != (0.0, 0.0):
+        assert time.monotonic() < until, playground.motors()
+        time.sleep(0.02)
+
+
 def test_the_clock_is_that_of_the_simulated_robot(playground):
     with Thymio(playground.port) as robot:
 

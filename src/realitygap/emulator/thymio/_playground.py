@@ -291,7 +291,12 @@ class Playground(ClosedOnExit):
         return f"playground {self._arena.name} {hashlib.sha256(self._scene.encode()).hexdigest()[:12]}"
 
     def motors(self) -> tuple[float, float]:
-        """Return the speeds of the wheels between the last two points of the path, left and right [m/s]."""
+        """Return the speeds of the wheels between the last two points of the path, left and right [m/s]; 0 at rest."""
+        with self._lock:
+            now = (time.monotonic() - self._began) * self._speed
+            last = self._points[-1]
+            if now - last[0] > 2 * SAMPLE_S and self.pose() == Pose(*last[1:]):
+                return 0.0, 0.0
         (before, x1, y1, heading), (after, x2, y2, turned) = [*self._points, *self._points][-2:]
         seconds = max(after - before, SAMPLE_S)
         ahead = ((x2 - x1) * np.cos(heading) + (y2 - y1) * np.sin(heading)) / seconds

@@ -7,7 +7,7 @@ import pytest
 from PIL import Image
 
 from realitygap.errors import DescriptionError
-from realitygap.vision import arena_of_map, read_map, save_map
+from realitygap.vision import _ros_map, arena_of_map, read_map, save_map
 from realitygap.world import Arena, Grid, Obstacle, Pose, arena_names, is_inside, load_arena, paper_arena
 
 PIXEL = 0.05
@@ -313,3 +313,25 @@ def test_a_map_that_cannot_be_an_arena_has_one_message(tmp_path):
         save_map(paper_arena(), tmp_path / "out.yaml", resolution=1e-4)
     with pytest.raises(DescriptionError, match="a wall covers the start"):
         save_map(paper_arena(), tmp_path / "out.yaml", resolution=1.0)
+
+
+def test_map_of_noise_is_refused_before_it_is_traced(tmp_path, monkeypatch):
+    monkeypatch.setattr(_ros_map, "_MOST_SPACES", 90)
+    gray = room()
+    gray[6:26:2, 6:26:2] = 0
+    with pytest.raises(DescriptionError, match=r"has 10\d separate spaces, expected at most 90"):
+        arena_of_map(write_map(tmp_path, gray))
+    gray = np.zeros((40, 60))
+    gray[6:26:2, 6:26:2] = 254
+    with pytest.raises(DescriptionError, match="has 101 separate spaces, expected at most 90"):
+        arena_of_map(write_map(tmp_path, gray))
+
+
+def test_large_map_has_the_walls_of_a_small_one(tmp_path, monkeypatch):
+    gray = room()
+    gray[10:20, 20:30] = 0
+    path = write_map(tmp_path, gray)
+    expected = arena_of_map(path)
+    monkeypatch.setattr(_ros_map, "_LARGE", 100)
+    assert corners(arena_of_map(path)) == corners(expected)
+    assert arena_of_map(path).start == expected.start

@@ -48,8 +48,12 @@ _MARGIN = 4
 _TOLERANCE = 1.5
 """Distance of a wall from the border if none is given [px]: the steps of a sloping line are up to 1.41 px from it."""
 
-_FINE = 4
+_FINE, _FINE_IF_LARGE = 4, 2
 """Parts of a pixel to which the border of free space is traced."""
+_LARGE = 1 << 24
+"""Pixels of a map that is traced in fewer parts, so that memory stays below 1 GB."""
+_MOST_SPACES = 200_000
+"""Separate spaces, free or occupied, of a map at most: noise has thousands."""
 
 _BAND = 256
 """Rows of an image whose occupancy is computed together, so that memory does not grow with the image."""
@@ -178,7 +182,8 @@ def arena_of_map(
             sloping line straight.
 
     Raises:
-        DescriptionError: The map has no free space, the start is not in it, or there are more than 2,048 walls.
+        DescriptionError: The map has no free space, the start is not in it, or there are more than 2,048 walls or
+            200,000 separate spaces.
         MissingExtraError: The extra `ros` is not installed.
     """
     cv2 = from_extra("cv2", "ros")
@@ -190,9 +195,13 @@ def arena_of_map(
         raise DescriptionError(
             f"The map {grid.name} has no free pixel. Check negate and free_thresh in its YAML file."
         )
-    _, marks, sizes, _ = cv2.connectedComponentsWithStats(grid.free.astype(np.uint8), connectivity=4)
+    marks, n_spaces = _spaces(cv2, grid.free, 4, grid.name)
     if start is None:
-        space = marks == 1 + int(np.argmax(sizes[1:, cv2.CC_STAT_AREA]))
+        sizes = np.zeros(n_spaces, np.int64)
+        for pixels in marks:
+            sizes += np.bincount(pixels, minlength=n_spaces)
+        space = marks == 1 + int(np.argmax(sizes[1:]))
+        del marks  # so that there is room for what follows
         row, column = divmod(int(np.argmax(_room(cv2, space))), space.shape[1])
         (x, y), *_ = grid.to_map(np.array([column + 0.5]), np.array([row + 0.5])).tolist()
         pose = Pose(round(x, 4), round(y, 4), 0.0)
@@ -206,6 +215,7 @@ def arena_of_map(
                 "or leave it out."
             )
         space = marks == marks[row, column]
+        del marks
     walls = _walls(cv2, grid, space, tolerance)
     if len(walls) > MOST_WALLS:
         raise DescriptionError(
@@ -215,9 +225,26 @@ def arena_of_map(
     return Arena.from_file(ArenaFile(name=grid.name[:80], wall=walls, start=list(pose)))
 
 
+def _spaces(
+    cv2: Any, pixels: NDArray[np.bool_], connectivity: int, name: str
+) -> tuple[NDArray[np.int32], int]:
+    """Return (h, w) marks of separate spaces, 0 outside them, and their number with the outside.
+
+    Raises:
+        DescriptionError: There are too many.
+    """
+    n_spaces, marks = cv2.connectedComponents(pixels.view(np.uint8), connectivity=connectivity)
+    if n_spaces > _MOST_SPACES:
+        raise DescriptionError(
+            f"The map {name} has {n_spaces:,} separate spaces, expected at most {_MOST_SPACES:,}. Remove noise "
+            "from its image."
+        )
+    return marks, n_spaces
+
+
 def _room(cv2: Any, space: NDArray[np.bool_]) -> NDArray[np.float32]:
     """Return the distance of each pixel from what is not free [px]; the border of the image counts as such."""
-    around = np.pad(space.astype(np.uint8), 1)
+    around = np.pad(space.view(np.uint8), 1)
     room: NDArray[np.float32] = cv2.distanceTransform(around, cv2.DIST_L2, 5)
     return room[1:-1, 1:-1]
 
@@ -228,17 +255,19 @@ def _walls(cv2: Any, grid: OccupancyMap, space: NDArray[np.bool_], tolerance: fl
     top, left = int(rows[0]), int(columns[0])
     part = space[top : rows[-1] + 1, left : columns[-1] + 1]
     # what is solid holds together at corners of pixels, so that lines one pixel wide have no gaps
-    solid = np.pad(~part, 1, constant_values=True).astype(np.uint8)
-    fine = np.kron(solid, np.ones((_FINE, _FINE), np.uint8))
+    solid = np.pad(~part, 1, constant_values=True)
+    _spaces(cv2, solid, 8, grid.name)  # so many borders at most
+    n_parts = _FINE if solid.size <= _LARGE else _FINE_IF_LARGE
+    fine = solid.view(np.uint8).repeat(n_parts, 0).repeat(n_parts, 1)
     borders, tree = cv2.findContours(fine, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
     walls = []
     for border, (_, _, _, parent) in zip(borders, tree[0], strict=True):
         if parent < 0 and not border.min():
             continue  # the edge of the picture
-        corners = cv2.approxPolyDP(border, tolerance / grid.resolution * _FINE, closed=True)[:, 0, :]
+        corners = cv2.approxPolyDP(border, tolerance / grid.resolution * n_parts, closed=True)[:, 0, :]
         if len(corners) < 2:
             continue  # smaller than the tolerance
-        places = np.rint((corners + 0.5) / _FINE) - 1.0  # the corners of pixels
+        places = np.rint((corners + 0.5) / n_parts) - 1.0  # the corners of pixels
         points = grid.to_map(places[:, 0] + left, places[:, 1] + top).round(4).tolist()
         ends = [*points[1:], points[0]] if len(points) > 2 else points[1:]
         walls += [[*one, *other] for one, other in zip(points, ends, strict=False) if one != other]

@@ -123,6 +123,22 @@ def test_several_logs_of_one_robot_are_its_trials(log, tmp_path):
     assert "is a folder without a log" in refused("import", tmp_path / "empty", "-o", out)
 
 
+def test_folder_is_one_log_if_the_mapping_names_its_files(log, tmp_path):
+    folder = tmp_path / "parts"
+    folder.mkdir()
+    table = rows(*drive(60))
+    write(folder / "told.csv", table[:, :3], "t,left,right")
+    write(folder / "seen.csv", table[:, [0, 3, 4, 5]], "t,x,y,heading")
+    shared = tmp_path / "parts.toml"
+    shared.write_text(
+        MAP.replace('{ time = "t", left', '{ file = "told.csv", time = "t", left').replace(
+            '{ time = "t", x', '{ file = "seen.csv", time = "t", x'
+        ),
+        "utf-8",
+    )
+    assert "1 trial, 60 steps" in run("import", folder, "--map", shared, "-o", tmp_path / "trials.jsonl")
+
+
 def test_import_and_calibrate_count_the_same_trials(log, tmp_path):
     commands, poses = drive(300)
     poses[60:70] = poses[180:190] = np.nan

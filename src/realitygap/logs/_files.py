@@ -55,7 +55,10 @@ def mapped_logs(
         LogError: A mapping has mistakes, or the logs are not of one robot.
     """
     logs = []
-    for path in log_files([names] if isinstance(names, str | Path) else names):
+    given = [names] if isinstance(names, str | Path) else names
+    names_files = map_file is not None and any(part.file for part in load_log_map(map_file).parts.values())
+    # a mapping that names the files of its parts makes one log of a folder
+    for path in map(Path, given) if names_files else log_files(given):
         log_map, origin = mapping_of(path, map_file, draft=draft)
         if step_s is not None:
             log_map = log_map.model_copy(update={"step_s": step_s})

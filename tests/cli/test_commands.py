@@ -100,6 +100,16 @@ def test_unknown_command_names_a_similar_one():
     assert "report" in done.stderr
 
 
+def test_unknown_option_names_similar_ones_only():
+    """The two dashes made --run similar to --out."""
+    for words, expected in (("report x --run 1", None), ("report x --figurs png", "--figures")):
+        done = started(*words.split())
+        assert done.returncode == 2
+        assert "No such option" in done.stderr
+        assert (expected or "") in done.stderr
+        assert expected is not None or "--out" not in done.stderr
+
+
 def test_help_has_an_example_and_the_python_twin():
     for command in COMMANDS:
         done = CliRunner().invoke(app, [command, "--help"])

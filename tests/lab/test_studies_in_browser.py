@@ -53,6 +53,20 @@ def test_a_study_made_with_the_form_is_carried_out_on_a_phone(lab, visit):
 
 
 @pytest.mark.slow
+def test_name_of_a_condition_follows_its_noise_until_it_is_changed(lab, visit):
+    """Noise 7 began a condition called coverage-10."""
+    page = visit("new")
+    names, noises = page.get_by_label("Name", exact=True), page.get_by_label("Noise", exact=True)
+    noises.first.fill("7")
+    page.wait_for_function("[...document.querySelectorAll('input')].some(box => box.value == 'coverage-700')")
+    names.nth(1).fill("loud")
+    page.wait_for_timeout(600)  # a field waits a moment for more letters
+    noises.first.fill("0.5")
+    page.wait_for_timeout(600)
+    assert names.nth(1).input_value() == "loud"
+
+
+@pytest.mark.slow
 def test_a_study_from_a_file_is_carried_out_and_extended_and_survives_the_lab(lab, visit):
     page = visit("new", forgive=OUTAGE)
     start(page, TINY)

@@ -99,6 +99,10 @@ def test_a_row_of_other_settings_is_noticed():
     row = run_replicates(condition, 0, 1).row(30, named=True)
     with pytest.raises(RecordError, match="replicate 0, generation 3, individual 6"):
         replay(Condition(name="a", jyro={"steps": 20, "turn_per_step": 0.9}), row)
+    with pytest.raises(RecordError, match=r"belongs to condition 'a', and the condition is 'b'"):
+        replay(Condition(name="b", noise=0.1), row)
+    with pytest.raises(RecordError, match="Or the row does not belong to this condition"):
+        replay(Condition(name="a", controller={"inputs": ["obstacle", "bias"]}), row)
 
 
 @pytest.fixture(scope="module")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import functools
 import itertools
 import math
@@ -43,8 +44,18 @@ class _RootGroup(TyperGroup):
                 error.message += f", got {error.__cause__.errors()[0]['input']!r}"
             raise
         except Exception as error:
+            _drop_far_suggestions(error)
             _refer_to_the_study_file(error)
             raise
+
+
+def _drop_far_suggestions(error: Any) -> None:
+    """Keep only similar options among suggestions. Typer counts the dashes, by which --run is like --out."""
+    if getattr(error, "possibilities", None) and getattr(error, "option_name", None):
+        near = difflib.get_close_matches(
+            error.option_name.lstrip("-"), [name.lstrip("-") for name in error.possibilities]
+        )
+        error.possibilities = [name for name in error.possibilities if name.lstrip("-") in near] or None
 
 
 def _refer_to_the_study_file(error: Any) -> None:

@@ -61,13 +61,23 @@ def replay(condition: Condition | Mapping[str, Any], row: Mapping[str, Any]) -> 
             raise TypeError(
                 f"condition is {condition!r}, expected a Condition, or its settings as in study.json."
             )
-        condition = Condition.from_settings(row["condition"], dict(condition.get("settings", condition)))
+        named_in = condition.get("name", row["condition"]) if "settings" in condition else row["condition"]
+        condition = Condition.from_settings(named_in, dict(condition.get("settings", condition)))
+    if condition.name != row["condition"]:
+        raise RecordError(
+            f"The row belongs to condition {row['condition']!r}, and the condition is {condition.name!r}. Give "
+            "the one of the row."
+        )
     if condition.arena.networks == "each" and not row.get("partners"):
         raise RecordError("The row lacks partners: expected a row with the genomes of the other robots.")
+    try:
+        genome = genome_of(condition, row)
+    except RecordError as error:
+        raise RecordError(f"{error} Or the row does not belong to this condition.") from error
     trajectory = trace_genome(
         condition.on,
         condition.arena.arena(),
-        genome_of(condition, row),
+        genome,
         noise=condition.noise,
         noise_key=NoiseKey(row["key"], row["replicate"], row["generation"], row["individual"]),
         inputs=condition.network_inputs,

@@ -312,15 +312,21 @@ class _Page:
 
     def _show_condition(self, number: int, condition: dict[str, Any]) -> None:
         label = f"Condition {number + 1}"
+        names: dict[int, Any] = {}
         with ui.element("div").classes("lab-condition").props(f'role="group" aria-label="{label}"'):
             for field in condition_fields():
                 key = field.place.partition(".")[2]
 
                 def put(value: Any, key: str = key) -> None:
+                    name = self._own_name(condition)
                     condition.pop(key, None) if value is None else condition.__setitem__(key, value)
+                    if name is not None and key != "name" and (renamed := _usual_name(condition)):
+                        names[number].set_value(renamed)
 
                 place = f"condition[{number + 1}].{key}"
-                self._input(field, place, _COLUMNS[key], condition.get(key), put, is_short=True)
+                entry = self._input(field, place, _COLUMNS[key], condition.get(key), put, is_short=True)
+                if key == "name":
+                    names[number] = entry
             ui.button("Remove", on_click=lambda: self._remove(number)).props(
                 f'flat no-caps aria-label="Remove condition {number + 1}"'
             )
@@ -329,8 +335,8 @@ class _Page:
 
     def _input(
         self, field: Field, key: str, label: str, value: Any, put: Any, *, is_short: bool = False
-    ) -> None:
-        """Add the field of one setting."""
+    ) -> Any:
+        """Add the field of one setting, and return it."""
         has_default = field.default not in ("", '""')
         default = f" Default: {field.default}." if has_default and not is_short else ""
         explanation = "" if is_short else f"{field.description}{default}"
@@ -344,7 +350,7 @@ class _Page:
             )
             chosen.props("clearable")
             chosen.on_value_change(lambda event: self._enter(field, key, event.value, put))
-            return
+            return chosen
         text = self._unread.get(key, "" if value is None else _as_entered(field, value))
         placeholder = field.default.strip('"') if field.kind == "text" else field.default
         written = self._form.text(
@@ -357,6 +363,7 @@ class _Page:
         )
         written.props("debounce=300")
         written.on_value_change(lambda event: self._enter(field, key, event.value, put))
+        return written
 
     def _enter(self, field: Field, key: str, text: Any, put: Any) -> None:
         """Put what was entered into the draft; a text that is no value stays in the field, which is marked."""
@@ -368,6 +375,12 @@ class _Page:
             put(entered(field, text))
         except ValueError:
             self._unread[key] = text
+
+    def _own_name(self, condition: dict[str, Any]) -> str | None:
+        """Return the name of a condition if it only describes its settings, and nothing else in the file uses it."""
+        name = condition.get("name")
+        is_own = name is not None and name == _usual_name(condition)
+        return name if is_own and written_form(self._draft.data).count(f'"{name}"') == 1 else None
 
     def _add_condition(self) -> None:
         listed = self._draft.data["condition"]
@@ -572,6 +585,16 @@ def _parsed(field: Field, text: str) -> Any:
 
 def _as_entered(field: Field, value: Any) -> str:
     return value if field.kind == "text" and isinstance(value, str) else toml_value(value)
+
+
+def _usual_name(condition: dict[str, Any]) -> str | None:
+    """Return a name such as coverage-10, of the search and the noise [%]; None if one of them is missing."""
+    selection, noise = condition.get("selection"), condition.get("noise")
+    return (
+        f"{selection}-{100 * noise:g}"
+        if isinstance(selection, str) and isinstance(noise, float | int)
+        else None
+    )
 
 
 def _of(key: str) -> int:

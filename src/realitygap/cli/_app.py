@@ -109,6 +109,8 @@ class _GroupedCommand(TyperCommand):
 
     def _refuse_second_values(self, ctx: Any, args: list[str]) -> None:
         """Raise an error if an option that takes one value has two. Typer takes the last one, and says nothing."""
+        if ctx.resilient_parsing:  # a shell asks for completions
+            return
         order: list[Any] = self.make_parser(ctx).parse_args(args=list(args))[2]
         for parameter in order:
             is_option = parameter.param_type_name == "option"

@@ -1,13 +1,15 @@
 """`realitygap gap` and `realitygap plan` as a user meets them."""
 
+import html
 import json
+import re
 import sys
 import warnings
 
 import pytest
 
 from realitygap.cli import main
-from realitygap.gap import MEASURES
+from realitygap.gap import MEASURES, SHOWN
 from tests.cli.test_commands import realitygap
 
 pytestmark = pytest.mark.slow
@@ -74,6 +76,28 @@ def test_the_table_ends_with_the_verdict(command):
     code, out, err = command("gap", "sim", "sim", "--n-controllers", "5", "--trials", "2")
     assert (code, err) == (0, "")
     assert out.rstrip().splitlines()[-1].startswith("Between SIM sim and SIM sim, ")
+
+
+NUMBER = re.compile(r"[-−]?\d\.\d{3}")
+
+
+def test_terminal_and_report_state_the_same_estimates_intervals_and_p(printed, command):
+    """Each measure has one estimate, one interval, and one p, wherever it is shown."""
+    folder, _ = printed
+    out = command(*SMALL, "--margin", "0.05", "--observe", "track", "-o", "trials.jsonl", cwd=folder)[1]
+    page = (folder / "gap.html").read_text("utf-8")
+    words = html.unescape(re.sub("<[^>]+>", " ", page))
+    rows = {line[2:34].strip(): line[34:] for line in out.splitlines() if line.startswith("  ")}
+    assert re.search("p [=<] ", rows["energy distance of cells"])
+    for measure in SHOWN:
+        cells = re.search(rf'<th scope="row">{re.escape(measure.title)}</th>(.*?)<td class="text', page)[1]
+        there = re.sub("<[^>]+>", " ", cells)
+        shown = NUMBER.findall(rows[measure.row.strip()])
+        assert shown == NUMBER.findall(there), measure.title
+    p = re.search(r"p [=<] \d\.\d+", rows["energy distance of cells"])[0]
+    caption = re.search(r"Energy distance of visited cells ([^(]*) \(([^)]*)\)", words)
+    assert caption[2].startswith(p)
+    assert NUMBER.findall(caption[1]) == NUMBER.findall(rows["energy distance of cells"])[:3]
 
 
 @pytest.mark.parametrize(

@@ -25,7 +25,7 @@ def test_its_mean_over_controllers_has_an_interval_at_each_step():
     spread = 2.571 * off.std(ddof=1) / np.sqrt(6)  # t with 5 degrees of freedom
     assert found.at_end.n == 6
     assert found.at_end.estimate == pytest.approx(off.mean())
-    assert found.at_end.high == pytest.approx(off.mean() + spread, rel=1e-3)
+    assert found.at_end.high == pytest.approx(off.mean() * np.exp(spread / off.mean()), rel=1e-3)
     told = found.to_dict()
     assert told["trials"] == 12
     assert told["distance"]["estimate"] == pytest.approx([0.0] + 3 * [off.mean()])

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from realitygap._wording import p_equation
 from realitygap.errors import StudyError
 
 from ._camera import CAMERA_HELP, under_camera
@@ -265,7 +266,7 @@ def _print_row(title: str, found: Estimate) -> None:
     number = "-" if found.estimate is None else f"{found.estimate:.3f}"
     ends = "" if found.low is None else f"[{found.low:.3f}, {found.high:.3f}]"
     p = found.more.get("p")
-    more = "" if p is None else f"p = {p:.3f}" if p >= 0.001 else "p < 0.001"
+    more = "" if p is None else p_equation(p)
     typer.echo(f"  {title:32}{number:>8}  {ends:17} {more}".rstrip())
     if found.refused:
         typer.echo(f"    {found.refused}")

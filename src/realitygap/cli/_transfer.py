@@ -165,6 +165,7 @@ def _print(result: TransferResult) -> None:
         quality, regret = map(_with_interval, (row.quality, row.regret))
         simulated = "-" if row.simulated is None else f"{row.simulated:.3f}"
         typer.echo(f"{row.strategy:16}{row.budget:>7}{quality:>24}{regret:>24}{simulated:>15}")
+    typer.echo(f"Regret is to {result.best_in_words}.")
     if result.replicates == 1:
         typer.echo(
             "Intervals are over the fresh trials of one champion. To compare strategies, add --replicates."

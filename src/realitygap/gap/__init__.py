@@ -4,6 +4,7 @@
 """
 
 from ._bootstrap import SMALLEST_N, bootstrap, interval, resampled, shrunk_means
+from ._bounded import bounded_interval, range_of_differences
 from ._card import gap_card, pairs_picture
 from ._correlation import attenuated, reliability, spearman, trials_for_reliability
 from ._coverage_map import CoverageMaps, coverage_maps
@@ -84,6 +85,8 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     # means of a few
     "mean_of",
     "difference_of_groups",
+    "bounded_interval",
+    "range_of_differences",
     # resampling
     "SMALLEST_N",
     "resampled",

@@ -11,6 +11,7 @@ import numpy as np
 from realitygap import _special as special
 from realitygap.errors import check_finite
 
+from ._bounded import UNBOUNDED, Range, bounded_interval, distance_on_scale, range_of_differences
 from ._side import Values
 
 ALPHA = 0.05
@@ -42,12 +43,16 @@ class Equivalence:
     needed: int | None
 
 
-def prove_equivalence(differences: Values, margin: float | None) -> Equivalence:
+def prove_equivalence(
+    differences: Values, margin: float | None, score_range: Range = UNBOUNDED
+) -> Equivalence:
     """Test whether the mean of differences, one of each controller, lies within the margin on both sides.
 
     Args:
         differences: (c,) differences of means, target minus source; c is at least 2.
         margin: Margin above 0, in the unit of the values; None for the interval alone.
+        score_range: Range of the values whose differences these are. The interval ends within the range of their
+            differences, and p has the same scale (`bounded_interval`).
 
     Raises:
         ValueError: One controller, or a margin that is not above 0.
@@ -62,19 +67,20 @@ def prove_equivalence(differences: Values, margin: float | None) -> Equivalence:
         raise ValueError(f"margin is {margin}, expected a number above 0, such as 0.05.")
     mean, spread = float(differences.mean()), float(differences.std(ddof=1))
     error = spread / math.sqrt(n)
-    reach = float(special.stdtrit(n - 1, 1 - ALPHA)) * error
-    low, high = mean - reach, mean + reach
+    within = range_of_differences(score_range)
+    reach = float(special.stdtrit(n - 1, 1 - ALPHA))
+    low, high = map(float, bounded_interval(mean, error, reach, within))
     if margin is None:
         return Equivalence(mean, low, high, math.nan, None, math.nan, None)
-    p = _p(mean, error, margin, n)
+    p = _p(mean, error, margin, n, within)
     power = equivalence_power(margin, spread, n)
     return Equivalence(mean, low, high, p, p < ALPHA, power, controllers_for_margin(margin, spread))
 
 
-def _p(mean: float, error: float, margin: float, n: int) -> float:
-    if error == 0:
+def _p(mean: float, error: float, margin: float, n: int, within: Range) -> float:
+    if error == 0 or margin >= within[1]:
         return 0.0 if abs(mean) < margin else 1.0
-    return float(special.stdtr(n - 1, (abs(mean) - margin) / error))
+    return float(special.stdtr(n - 1, -distance_on_scale(abs(mean), margin, within) / error))
 
 
 def equivalence_power(margin: float, spread: float, n: int, difference: float = 0.0) -> float:

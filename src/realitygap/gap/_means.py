@@ -1,4 +1,4 @@
-"""Means with intervals by t, for a handful of values."""
+"""Means with intervals by t within the range of the values, for a handful of values."""
 
 from __future__ import annotations
 
@@ -7,24 +7,31 @@ import math
 from realitygap import _special as special
 
 from ._bootstrap import SMALLEST_N
+from ._bounded import UNBOUNDED, Range, bounded_interval, range_of_differences
 from ._estimate import CONFIDENCE, Estimate
 from ._side import Values
 
 
-def mean_of(values: Values) -> Estimate:
-    """Return the mean of (n,) values and its interval by t; no interval below 5."""
+def mean_of(values: Values, within: Range = UNBOUNDED) -> Estimate:
+    """Return the mean of (n,) values and its interval by t, within the range of the values; no interval below 5."""
     n = len(values)
     mean = float(values.mean())
     if n < SMALLEST_N:
         return Estimate(
             mean, None, None, n, f"{n} values are too few for an interval; at least {SMALLEST_N} are needed."
         )
-    reach = _t(n - 1) * float(values.std(ddof=1)) / math.sqrt(n)
-    return Estimate(mean, mean - reach, mean + reach, n)
+    error = float(values.std(ddof=1)) / math.sqrt(n)
+    low, high = bounded_interval(mean, error, _t(n - 1), within)
+    return Estimate(mean, float(low), float(high), n)
 
 
-def difference_of_groups(one: Values, other: Values) -> Estimate:
+def difference_of_groups(one: Values, other: Values, within: Range = UNBOUNDED) -> Estimate:
     """Return the mean of the other group less that of the one, with its interval; n is the smaller group's.
+
+    Args:
+        one: (n,) values.
+        other: (m,) values.
+        within: Range of the values, in whose differences the interval ends.
 
     Source: Welch (1947), Biometrika 34(1-2), 28-35.
     """
@@ -45,8 +52,8 @@ def difference_of_groups(one: Values, other: Values) -> Estimate:
     freedom = total**2 / sum(
         part**2 / (len(each) - 1) for part, each in zip(parts, (one, other), strict=True)
     )
-    reach = _t(freedom) * math.sqrt(total)
-    return Estimate(difference, difference - reach, difference + reach, n)
+    ends = bounded_interval(difference, math.sqrt(total), _t(freedom), range_of_differences(within))
+    return Estimate(difference, float(ends[0]), float(ends[1]), n)
 
 
 def _t(freedom: float) -> float:

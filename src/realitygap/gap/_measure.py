@@ -9,6 +9,7 @@ import numpy as np
 
 from . import _bootstrap
 from ._bootstrap import SMALLEST_N, bootstrap, bootstrap_mean, interval
+from ._bounded import range_of_differences
 from ._correlation import reliability, spearman, trials_for_reliability
 from ._energy import ALPHA, energy_distances, energy_test, smallest_energy_p
 from ._equivalence import POWER, prove_equivalence
@@ -63,6 +64,11 @@ def measure_gap(
         raise ValueError(
             f"{source.name} has {source.n} controllers and {target.name} {target.n}, expected the same ones."
         )
+    if source.score_range != target.score_range:
+        raise ValueError(
+            f"{source.name} has scores from {source.score_range[0]:g} to {source.score_range[1]:g} and {target.name} "
+            f"from {target.score_range[0]:g} to {target.score_range[1]:g}, expected the same score."
+        )
     if margin is not None and not (math.isfinite(margin) and margin > 0):
         raise ValueError(f"margin is {margin}, expected a number above 0, such as 0.05.")
     work = _Work(source, target, resamples, np.random.default_rng(seed))
@@ -94,6 +100,7 @@ class _Work:
     def __init__(self, source: GapSide, target: GapSide, n_resamples: int, rng: np.random.Generator) -> None:
         self.source, self.target, self.n = source, target, source.n
         self.n_resamples, self.rng = n_resamples, rng
+        self.differences = range_of_differences(source.score_range)
         self.pair = source.values[None], target.values[None]
         self.fewest = min(source.trials, target.trials)
         self.alike = [side.name for side in (source, target) if np.ptp(side.means) == 0]
@@ -134,7 +141,9 @@ class _Work:
     # level
 
     def level(self) -> Estimate:
-        return self._estimate(float(mean_difference(*self.pair)[0]), self.drawn["level"])
+        # lengthened residuals may leave the range that a difference can have
+        drawn = np.clip(self.drawn["level"], *self.differences)
+        return self._estimate(float(mean_difference(*self.pair)[0]), drawn)
 
     def rms(self) -> Estimate:
         if self.fewest < 2:
@@ -149,7 +158,10 @@ class _Work:
         value = float(rms_of(squares.mean()))
         resampled = bootstrap_mean(squares, self.n_resamples, self.rng.spawn(1)[0])
         return self._with_ends(
-            value, *rms_interval(self.target.means - self.source.means, squares, resampled)
+            value,
+            *rms_interval(
+                self.target.means - self.source.means, squares, resampled, most=self.differences[1]
+            ),
         )
 
     def a12(self) -> Estimate:
@@ -266,7 +278,7 @@ class _Work:
                 "With one controller, the spread of differences is unknown. At least 5 are needed.",
                 margin=margin,
             )
-        found = prove_equivalence(self.target.means - self.source.means, margin)
+        found = prove_equivalence(self.target.means - self.source.means, margin, self.source.score_range)
         more = {"margin": margin, "equivalent": found.equivalent}
         why = ""
         if margin is None:

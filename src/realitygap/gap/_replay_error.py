@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -39,23 +39,23 @@ class ReplayError:
     @property
     def at_end(self) -> Estimate:
         """Mean distance at the end of a trial [m], over controllers."""
-        return self._mean(self.distance[:, -1])
+        return self._mean(self.distance[:, -1], np.inf)
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain values: after each step, the mean over controllers with its interval."""
         values: dict[str, Any] = {"trials": self.n, "n": len(np.unique(self.controllers))}
         for name in ("distance", "heading", "noise_distance", "noise_heading"):
-            found = [self._mean(step) for step in getattr(self, name).T]
+            most = np.pi if "heading" in name else np.inf
+            found = [self._mean(step, most) for step in getattr(self, name).T]
             values[name] = {
                 end: [getattr(each, end) for each in found] for end in ("estimate", "low", "high")
             }
         return values
 
-    def _mean(self, values: Values) -> Estimate:
-        """Return the mean of (m,) values of at least 0; trials of one controller count as one."""
+    def _mean(self, values: Values, most: float) -> Estimate:
+        """Return the mean of (m,) values from 0 to `most`; trials of one controller count as one."""
         _, which, n = np.unique(self.controllers, return_inverse=True, return_counts=True)
-        found = mean_of(np.bincount(which, values) / n)
-        return found if found.low is None else replace(found, low=max(found.low, 0.0))
+        return mean_of(np.bincount(which, values) / n, (0.0, most))
 
 
 def replay_error(

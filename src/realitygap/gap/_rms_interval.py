@@ -20,6 +20,7 @@ def rms_interval(
     resampled: Values,
     *,
     more_variance: float = 0.0,
+    most: float = math.inf,
     confidence: float = CONFIDENCE,
 ) -> tuple[float, float] | tuple[None, None]:
     """Return the interval of the RMS gap; none below 5 controllers.
@@ -35,10 +36,11 @@ def rms_interval(
         squares: (c,) unbiased squares of the true differences (`square_differences`).
         resampled: (b,) mean of the squares of resampled controllers.
         more_variance: Variance of the mean square that controllers do not show, such as that of a fit's draws.
+        most: Largest difference that there can be. The upper end is at most this, because the RMS gap is.
         confidence: Probability, between 0 and 1.
 
     Returns:
-        Both ends, at least 0.
+        Both ends, from 0 to `most`.
     """
     c = len(squares)
     low, _ = interval(resampled, c, confidence)
@@ -49,7 +51,8 @@ def rms_interval(
         for variance in (float(squares.var(ddof=1)), _variance_if_normal(differences))
     ]
     reach = float(special.stdtrit(c - 1, (1 + confidence) / 2))
-    return math.sqrt(max(low, 0.0)), math.sqrt(_upper_end(float(squares.mean()), max(errors), reach))
+    high = math.sqrt(_upper_end(float(squares.mean()), max(errors), reach))
+    return math.sqrt(max(low, 0.0)), min(high, most)
 
 
 def _variance_if_normal(differences: Values) -> float:

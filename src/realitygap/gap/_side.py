@@ -7,9 +7,13 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from realitygap import _special as special
 from realitygap.errors import finite_numbers
 
-Values = NDArray[np.float64]
+from ._bounded import UNBOUNDED, Range, Values, bounded_interval
+from ._estimate import CONFIDENCE
+
+__all__ = ["GapSide", "Values"]
 
 
 @dataclass(frozen=True)
@@ -22,6 +26,8 @@ class GapSide:
         values: (c, r) quality of each trial, such as coverage 0..1.
         cells: (c, r, n_cells) bool, True for the cells that each trial crossed; no rows if they are unknown.
         ends: (c, r, 2) final position of each trial [m]; no rows if they are unknown.
+        score_range: Minimum and maximum of the quality, 0 and 1 of coverage; infinite without a limit. Intervals
+            end within it.
     """
 
     name: str
@@ -29,6 +35,7 @@ class GapSide:
     values: Values
     cells: NDArray[np.bool_] = field(default_factory=lambda: np.empty((0, 0, 0), np.bool_))
     ends: Values = field(default_factory=lambda: np.empty((0, 0, 2)))
+    score_range: Range = UNBOUNDED
 
     def __post_init__(self) -> None:
         if self.values.ndim != 2 or 0 in self.values.shape:
@@ -37,6 +44,13 @@ class GapSide:
                 "each."
             )
         finite_numbers(f"values of {self.name}", self.values)
+        low, high = self.score_range
+        least, most = float(self.values.min()), float(self.values.max())
+        if not low <= least <= most <= high:
+            raise ValueError(
+                f"values of {self.name} are from {least:g} to {most:g}, expected numbers in the score range, "
+                f"{low:g} to {high:g}."
+            )
         for name, array in (("cells", self.cells), ("ends", self.ends)):
             if len(array) and array.shape[:2] != self.values.shape:
                 raise ValueError(
@@ -57,6 +71,11 @@ class GapSide:
     def means(self) -> Values:
         """Return the mean quality of each controller, (c,)."""
         return np.asarray(self.values.mean(axis=1))
+
+    def intervals(self, confidence: float = CONFIDENCE) -> tuple[Values, Values]:
+        """Return both ends of the interval of each controller's mean by t, (c,); the means if there is one trial."""
+        reach = float(special.stdtrit(max(self.trials - 1, 1), (1 + confidence) / 2))
+        return bounded_interval(self.means, np.sqrt(self.noise), reach, self.score_range)
 
     @property
     def noise(self) -> Values:

@@ -146,7 +146,9 @@ def _rms(value: float, differences: Values, squares: Values, drawn: Values) -> E
     """Return an RMS gap, of (1 + d, c) as in `explain_gap` and (b,) mean squares of its resamples."""
     draws = squares[1:].mean(axis=1)
     more_variance = float(draws.var(ddof=1)) if len(draws) > 1 else 0.0
-    ends = rms_interval(differences[0], squares[0], drawn, more_variance=more_variance)
+    ends = rms_interval(
+        differences[0], squares[0], drawn, more_variance=more_variance, most=1.0
+    )  # differences in coverage
     return _with_ends(value, ends, squares.shape[1])
 
 

@@ -6,10 +6,7 @@ import threading
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from realitygap import _special as special
-from realitygap.gap import Estimate
+from realitygap.gap import SHOWN, Estimate
 from realitygap.report import write_gap_report
 from realitygap.study import GapStudy, gap_between
 
@@ -18,12 +15,7 @@ from ._pulse import Pulse
 
 _TOLD_S = 0.2
 """Time between two messages on the progress [s]."""
-MEASURES = {
-    "rms": "RMS gap",
-    "level": "Bias",
-    "srcc": "Rank correlation",
-    "noise_ceiling": "Ceiling of the rank correlation",
-}
+MEASURES = ("rms", "level", "srcc", "noise_ceiling")
 """Measures that the page shows above the report."""
 
 
@@ -46,7 +38,9 @@ def _measure(channel: Channel, values: dict[str, Any], page: Path, kept: Path) -
         found = gap_between(**values, trials=trials, results=kept, pulse=pulse.tell, tell=told.show)
         write_gap_report(found, page)
         result = found.study.result
-        measures = [(title, _words(getattr(result, name))) for name, title in MEASURES.items()]
+        measures = [
+            (each.title, _words(getattr(result, each.name))) for each in SHOWN if each.name in MEASURES
+        ]
         rms = None if result.rms.low is None else [result.rms.estimate, result.rms.low, result.rms.high]
         channel.say(
             "measured",
@@ -59,14 +53,9 @@ def _measure(channel: Channel, values: dict[str, Any], page: Path, kept: Path) -
 
 
 def pairs_of(gap: GapStudy) -> dict[str, Any]:
-    """Return the mean score of each controller on both sides, with half its interval of 95 %."""
+    """Return the mean score of each controller on both sides, with its interval of 95 %."""
     sides = (gap.source, gap.target)
-    reaches = [
-        float(special.stdtrit(side.trials - 1, 0.975)) * np.sqrt(side.noise)
-        if side.trials > 1
-        else np.zeros(side.n)
-        for side in sides
-    ]
+    ends = [side.intervals() for side in sides]
     return {
         "sides": [f"{side.name} ({side.label})" for side in sides],
         "score": gap.result.score,
@@ -75,7 +64,7 @@ def pairs_of(gap: GapStudy) -> dict[str, Any]:
                 "name": each.name,
                 "isChampion": each.kind == "champion",
                 "means": [float(side.means[k]) for side in sides],
-                "reaches": [float(reach[k]) for reach in reaches],
+                "ends": [[float(low[k]), float(high[k])] for low, high in ends],
             }
             for k, each in enumerate(gap.controllers)
         ],

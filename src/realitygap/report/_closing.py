@@ -8,6 +8,7 @@ from typing import Any
 
 from realitygap._numbers import fixed
 from realitygap._version import __version__
+from realitygap._wording import p_equation
 from realitygap.records import write_whole
 from realitygap.report._closing_figures import draw_closing, words_of
 from realitygap.report._placed import FigureOnPage, hover_content, number_figures
@@ -105,7 +106,7 @@ def why_table(summary: Mapping[str, Any]) -> Table:
                         goal["name"],
                         each["twin"],
                         _plain(goal, each["figure"]),
-                        "–" if p is None else f"{p:.3f}",
+                        "–" if p is None else p_equation(p).removeprefix("p ").removeprefix("= "),
                         ", ".join(each.get("at_prior_end", [])) or "–",
                     )
                 )

@@ -15,6 +15,7 @@ import polars as pl
 from realitygap import _special as special
 from realitygap._medians import CONFIDENCE, Interval
 from realitygap._wording import p_in_words, signed, span
+from realitygap.gap import bounded_interval
 from realitygap.report._champions import FRESH_TRIALS, Champions
 from realitygap.report._effects import (
     BCA_SMALLEST_N,
@@ -290,9 +291,10 @@ class Samples:
         parts = np.array([group.var(ddof=1) / len(group) for group in groups])
         shares = parts / parts.sum() if parts.any() else parts
         freedom = 1 / max(sum(shares**2 / [len(group) - 1 for group in groups]), 1e-9)
-        reach = float(special.stdtrit(freedom, 1 - ALPHA)) * math.sqrt(parts.sum())
+        reach, error = float(special.stdtrit(freedom, 1 - ALPHA)), math.sqrt(parts.sum())
         difference = float(self.one.mean() - self.other.mean())
-        return Interval(difference - reach, difference + reach, "t")
+        low, high = bounded_interval(difference, error, reach, (-1.0, 1.0))
+        return Interval(float(low), float(high), "t")
 
 
 def paired_values(tally: Tally, one: str, other: str) -> Samples:

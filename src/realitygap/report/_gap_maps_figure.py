@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from realitygap._wording import p_equation
 from realitygap.drawing import Ink
 from realitygap.report._drawing import Drawing, draw_wide, new_figure, place_axes, shorten
 from realitygap.report._marks import Panel, Series
@@ -29,11 +30,7 @@ def draw_gap_maps(gap: GapStudy) -> Drawing | None:
     most = max(float(maps.source.max()), float(maps.target.max()), 0.01)
     apart = max(float(abs(maps.difference).max()), 0.01)
     p = energy.more.get("p")
-    words = (
-        ""
-        if p is None
-        else f" (p {'< 0.002' if p < 0.002 else f'= {p:.3f}'} by permutation within controllers)"
-    )
+    words = "" if p is None else f" ({p_equation(p)} by permutation within controllers)"
     caption = (
         f"Share of trials that cross each cell: {source.n} controllers, {source.trials} trials each on {source.name} "
         f"({source.label}) and {target.trials} on {target.name} ({target.label}); full color is {most:.2f}. Right: "

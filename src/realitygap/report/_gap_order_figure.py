@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from realitygap import _special as special
 from realitygap.drawing import Ink
 from realitygap.gap import GapSide
 from realitygap.report._drawing import (
@@ -52,7 +51,7 @@ def draw_gap_pairs(gap: GapStudy) -> Drawing:
         axes.set_ylim(*ends)
         draw_line(axes, ends, ends, color=Ink.RULE, linewidth=1.0, zorder=1)
         kinds: list[str] = [each.kind for each in gap.controllers]
-        across, up = _reaches(source), _reaches(target)
+        across, up = (np.column_stack(side.intervals()) for side in (source, target))
         for kind, color, marker in (("random", Ink.PUBLISHED, "s"), ("champion", Ink.OURS, "o")):
             rows = [k for k, each in enumerate(kinds) if each == kind]
             if rows:
@@ -81,10 +80,8 @@ def _marks_of_pairs(gap: GapStudy) -> tuple[Panel, ...]:
 
 def _draw_pairs(axes: Axes, x: Any, y: Any, across: Any, up: Any, color: str, marker: str) -> None:
     for k in range(len(x)):
-        draw_line(
-            axes, [x[k] - across[k], x[k] + across[k]], [y[k], y[k]], color=color, linewidth=0.7, alpha=0.6
-        )
-        draw_line(axes, [x[k], x[k]], [y[k] - up[k], y[k] + up[k]], color=color, linewidth=0.7, alpha=0.6)
+        draw_line(axes, across[k], [y[k], y[k]], color=color, linewidth=0.7, alpha=0.6)
+        draw_line(axes, [x[k], x[k]], up[k], color=color, linewidth=0.7, alpha=0.6)
     draw_line(
         axes, x, y, color=color, marker=marker, linestyle="", markersize=4.2, markeredgewidth=0, zorder=5
     )
@@ -118,7 +115,7 @@ def draw_gap_differences(gap: GapStudy) -> Drawing:
     source, target, level = gap.source, gap.target, gap.result.level
     score = gap.result.score
     differences = target.means - source.means
-    reach = np.hypot(_reaches(source), _reaches(target))
+    lower, upper = _ends_of_differences(source, target)
     order = np.argsort(differences)
     margin = gap.result.equivalence.more.get("margin")
     band = f" The gray band is the margin of equivalence, ±{margin:g}." if margin else ""
@@ -135,7 +132,7 @@ def draw_gap_differences(gap: GapStudy) -> Drawing:
         axes = place_axes(figure, 0.6, 0.12, width - 0.68, 2.1)
         axes.set_gid("differences")
         n = source.n
-        most = 1.08 * float(np.abs(differences).max() + reach.max())
+        most = 1.08 * float(np.abs([lower, upper]).max())
         axes.set_xlim(-0.7, n - 0.3)
         axes.set_ylim(-max(most, 0.02), max(most, 0.02))
         if margin:
@@ -145,8 +142,7 @@ def draw_gap_differences(gap: GapStudy) -> Drawing:
             axes.axhspan(level.low, level.high, color=Ink.BAND, alpha=0.5, linewidth=0)
         axes.axhline(level.estimate or 0.0, color=Ink.OURS, linewidth=1.2)
         for place, k in enumerate(order):
-            ends = [differences[k] - reach[k], differences[k] + reach[k]]
-            draw_line(axes, [place, place], ends, color=Ink.RUN, linewidth=0.8)
+            draw_line(axes, [place, place], [lower[k], upper[k]], color=Ink.RUN, linewidth=0.8)
         draw_dots(axes, np.arange(n), differences[order], 3.4, color=Ink.TEXT)
         axes.set_xticks([])
         axes.set_xlabel("controllers in order", labelpad=3)
@@ -156,8 +152,8 @@ def draw_gap_differences(gap: GapStudy) -> Drawing:
     ordered = differences[order]
     decimals = decimals_for(differences)
     labels = tuple(
-        f"{gap.controllers[k].name}: {differences[k]:.{decimals}f} [{differences[k] - reach[k]:.{decimals}f}, "
-        f"{differences[k] + reach[k]:.{decimals}f}]"
+        f"{gap.controllers[k].name}: {differences[k]:.{decimals}f} [{lower[k]:.{decimals}f}, "
+        f"{upper[k]:.{decimals}f}]"
         for k in order
     )
     series = Series("{label}", np.column_stack([np.arange(source.n), ordered]), labels=labels)
@@ -165,16 +161,20 @@ def draw_gap_differences(gap: GapStudy) -> Drawing:
     return draw_wide(draw, "gap-differences", caption, alt, marks=(panel,))
 
 
-def _reaches(side: GapSide) -> Any:
-    """Return half the interval of each mean, (c,); 0 for one trial."""
-    if side.trials < 2:
-        return np.zeros(side.n)
-    return float(special.stdtrit(side.trials - 1, 0.975)) * np.sqrt(side.noise)
+def _ends_of_differences(source: GapSide, target: GapSide) -> tuple[Any, Any]:
+    """Return both ends of the interval of each difference, (c,), from those of both means.
+
+    Source: Zou & Donner (2008), Statistics in Medicine 27(10), 1693-1702. No end leaves the range of differences.
+    """
+    (low, high), (low_there, high_there) = source.intervals(), target.intervals()
+    differences = target.means - source.means
+    lower = differences - np.hypot(target.means - low_there, high - source.means)
+    return lower, differences + np.hypot(high_there - target.means, source.means - low)
 
 
 def _ends(source: GapSide, target: GapSide, low: float, high: float) -> tuple[float, float]:
     """The ends of both axes: at tenths of the scale beyond the intervals, and within the score's range."""
-    sides = [(side.means - _reaches(side), side.means + _reaches(side)) for side in (source, target)]
+    sides = [side.intervals() for side in (source, target)]
     least, most = min(float(each.min()) for each, _ in sides), max(float(each.max()) for _, each in sides)
     least = min(least, low if math.isfinite(low) else 0.0)
     tenth = 0.1 if high <= 1 else max(most - least, 1e-9) / 10

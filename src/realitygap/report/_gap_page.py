@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from realitygap._version import __version__
+from realitygap._wording import p_equation
 from realitygap.errors import RecordError
 from realitygap.gap import SHOWN, Estimate, GapResult
 from realitygap.records import is_special, refuse_results, write_whole
@@ -139,6 +140,6 @@ def _row(result: GapResult, name: str, title: str, meaning: str) -> dict[str, An
         "estimate": "–" if found.estimate is None else f"{found.estimate:.3f}",
         "interval": "–" if found.low is None else f"{found.low:.3f} to {found.high:.3f}",
         "n": found.n,
-        "p": "" if p is None else f"{p:.3f}",
+        "p": "" if p is None else p_equation(p).removeprefix("p ").removeprefix("= "),
         "refused": found.refused,
     }

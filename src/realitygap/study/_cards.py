@@ -68,7 +68,7 @@ def transfer_card(result: TransferResult) -> Card:
     return Card(
         f"Transfer: {result.study} ({result.condition}) → {result.target}",
         [result.label],
-        f"{result.replicates} replicates, {result.fresh_trials} fresh trials of each champion. The best known "
-        f"champion has {result.best_known:.3f}. Brackets are intervals of 95 %.",
+        f"{result.replicates} replicates, {result.fresh_trials} fresh trials of each champion. Regret is to "
+        f"{result.best_in_words}. Brackets are intervals of 95 %.",
         parts=[Table(heads, rows)],
     )

@@ -12,7 +12,7 @@ class Scatter(Element, component="scatter.js"):
     """Mean score of each controller on the simulator and on the target.
 
     Args:
-        points: Name, kind, means, and half the intervals of each controller.
+        points: Name, kind, means, and intervals of each controller.
         sides: Names of the simulator and the target.
         score: Name of the score.
     """

@@ -1,7 +1,7 @@
 // Mean score of each controller on two platforms, with intervals; values on hover, tap, or arrow keys.
 export default {
   props: {
-    points: Array, // name, isChampion, means: two numbers, reaches: half the interval of each
+    points: Array, // name, isChampion, means: two numbers, ends: the interval of each
     sides: Array, // names of the platforms: across, up
     score: String,
   },
@@ -38,7 +38,7 @@ export default {
   computed: {
     name() { return `Scatter of ${this.points.length} controllers: ${this.score} on ${this.sides[0]} and on ${this.sides[1]}.`; },
     ends() { // at tenths of the scale, with all intervals inside
-      const values = this.points.flatMap(({ means, reaches }) => means.flatMap((mean, k) => [mean - reaches[k], mean + reaches[k]]));
+      const values = this.points.flatMap(({ ends }) => ends.flat());
       return [Math.floor(Math.max(Math.min(...values), 0) * 10) / 10, Math.ceil(Math.max(...values, 0.1) * 10) / 10];
     },
     ticks() {
@@ -49,8 +49,9 @@ export default {
     at() { return this.points[this.mark]; },
     words() {
       if (!this.at) return "Point at a mark to read its values.";
-      const { name, means, reaches } = this.at;
-      const value = (k) => `${means[k].toFixed(3)}${reaches[k] ? ` ± ${reaches[k].toFixed(3)}` : ""} on ${this.sides[k]}`;
+      const { name, means, ends } = this.at;
+      const within = ([low, high]) => low < high ? ` [${low.toFixed(3)}, ${high.toFixed(3)}]` : "";
+      const value = (k) => `${means[k].toFixed(3)}${within(ends[k])} on ${this.sides[k]}`;
       return `${name}: ${value(0)}, ${value(1)}`;
     },
   },
@@ -58,8 +59,8 @@ export default {
     x(value) { return this.left + this.share(value) * (this.size - this.left - this.right); },
     y(value) { return this.size - this.bottom - this.share(value) * (this.size - this.top - this.bottom); },
     share(value) { return (Math.min(Math.max(value, this.ends[0]), this.ends[1]) - this.ends[0]) / (this.ends[1] - this.ends[0]); },
-    cross({ means: [a, b], reaches: [across, up] }) {
-      return `M${this.x(a - across)} ${this.y(b)}H${this.x(a + across)}M${this.x(a)} ${this.y(b - up)}V${this.y(b + up)}`;
+    cross({ means: [a, b], ends: [across, up] }) {
+      return `M${this.x(across[0])} ${this.y(b)}H${this.x(across[1])}M${this.x(a)} ${this.y(up[0])}V${this.y(up[1])}`;
     },
     point(event) {
       const box = event.currentTarget.getBoundingClientRect(), scale = this.size / box.width;

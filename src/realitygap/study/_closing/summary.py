@@ -12,6 +12,7 @@ import numpy as np
 
 from realitygap import _special as special
 from realitygap._version import __version__
+from realitygap.gap import bounded_interval
 from realitygap.records import read_object
 from realitygap.world import Fitted
 
@@ -211,7 +212,10 @@ def _strategies(twins: Sequence[Row]) -> list[Row]:
     for twin in twins:
         for row in twin.get("transfer", []):
             found.setdefault(row["strategy"], []).append(row["quality"]["estimate"])
-    return [{"strategy": name, "n": len(values), **_mean_interval(values)} for name, values in found.items()]
+    return [
+        {"strategy": name, "n": len(values), **_mean_interval(values, (0.0, 1.0))}
+        for name, values in found.items()
+    ]
 
 
 # goals
@@ -256,7 +260,7 @@ def _goals_of_platform(plan: ClosingPlan, family: str, twins: Sequence[Row], bud
             yield _goal(name, figure, len(at), FALLS[observe], "at least", [])
         order = [after["gap"]["srcc_disattenuated"] for _, after in at]
         known = [value for value in order if value is not None]
-        figure = _mean_interval(known)
+        figure = _mean_interval(known, (-1.0, 1.0))
         yield _goal(f"disattenuated SRCC, {title}", figure, len(known), LEAST_SRCC, "at least", [])
 
 
@@ -442,16 +446,17 @@ def pooled_fall(before: Sequence[float], after: Sequence[float]) -> Row:
     return found
 
 
-def _mean_interval(values: Sequence[float]) -> Row:
-    """Return the mean, with Student's 95 % interval."""
+def _mean_interval(values: Sequence[float], within: tuple[float, float]) -> Row:
+    """Return the mean, with Student's 95 % interval within the range of the values."""
     n = len(values)
     if not n:
         return {"estimate": None, "low": None, "high": None}
     mean = float(np.mean(values))
     if n < 2:
         return {"estimate": mean, "low": None, "high": None}
-    reach = float(special.stdtrit(n - 1, 0.975)) * float(np.std(values, ddof=1)) / math.sqrt(n)
-    return {"estimate": mean, "low": mean - reach, "high": mean + reach}
+    error = float(np.std(values, ddof=1)) / math.sqrt(n)
+    low, high = bounded_interval(mean, error, float(special.stdtrit(n - 1, 0.975)), within)
+    return {"estimate": mean, "low": float(low), "high": float(high)}
 
 
 def share_interval(successes: float, n: int) -> tuple[float | None, float | None]:

@@ -118,13 +118,15 @@ class ClosingTwin:
         for k, trials in enumerate(judged["cells"]):
             for j, cells in enumerate(trials):
                 crossed[k, j, cells] = True
-        return GapSide(f"twin {self.name}", judged["label"], crossed.mean(axis=2), crossed)
+        return GapSide(
+            f"twin {self.name}", judged["label"], crossed.mean(axis=2), crossed, score_range=(0.0, 1.0)
+        )
 
     def _in_simulation(self, condition: Condition) -> GapSide:
         n = self.plan.trials
         keys = [NoiseKey(condition.key, self.name.seed, 0, k) for k in range(len(self.genomes))]
         crossed = crossed_cells(try_repeatedly(condition, self.genomes, keys, range(n))[0], n)
-        return GapSide(condition.name, condition.label, crossed.mean(axis=2), crossed)
+        return GapSide(condition.name, condition.label, crossed.mean(axis=2), crossed, score_range=(0.0, 1.0))
 
     def _gap(self, target: Target, observe: str, budget: int) -> dict[str, Any]:
         """Measure the gap to the uncalibrated simulator, or to the calibration with this number of trials."""
@@ -228,7 +230,7 @@ class ClosingTwin:
 
 def _part(side: GapSide, part: slice) -> GapSide:
     """Return a side of the gap with a part of its controllers."""
-    return GapSide(side.name, side.label, side.values[part], side.cells[part])
+    return GapSide(side.name, side.label, side.values[part], side.cells[part], score_range=side.score_range)
 
 
 def held_out(n: int, study: str, seed: int, *, are_founders: bool) -> list[Genome]:

@@ -22,6 +22,7 @@ from realitygap.gap import (
     difference_of_groups,
     mean_of,
     measure_gap,
+    range_of_differences,
     replay_error,
 )
 from realitygap.platforms import SimTarget, split_spec
@@ -270,7 +271,7 @@ def side_of(platform: Target, trials: Sequence[TrialRecord], n: int, task: Task)
         ends = np.array([trial.poses[-1, :2] for trial in ordered]).reshape(n, -1, 2)
     scores = score_observed(task, ordered, platform.arena)
     crossed = cells.reshape(n, -1, n_cells) if len(cells) else np.empty((0, 0, 0), np.bool_)
-    return GapSide(platform.name, platform.label, scores.reshape(n, -1), crossed, ends)
+    return GapSide(platform.name, platform.label, scores.reshape(n, -1), crossed, ends, task.score_range)
 
 
 def _replay(source: Target, observed: Sequence[TrialRecord], n: int, tell: Tell | None) -> ReplayError | None:
@@ -313,7 +314,7 @@ def _luck(controllers: Sequence[Controller], task: Task) -> Estimate:
     ]
     if not lost:
         return Estimate.refusal(0, "No controller was selected for its score where it can be tried again.")
-    return mean_of(np.array(lost))
+    return mean_of(np.array(lost), range_of_differences(task.score_range))
 
 
 def _reevolved(
@@ -344,4 +345,4 @@ def _reevolved(
         )
     here = in_source.means[[k for k, _ in champions]]
     there = side_of(target, on_target, len(reevolved), task).means
-    return difference_of_groups(here, there)
+    return difference_of_groups(here, there, task.score_range)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from realitygap import _special as special
 from realitygap.drawing import card_of
-from realitygap.gap import CONFIDENCE, COVERAGE, Estimate
+from realitygap.gap import CONFIDENCE, COVERAGE, Estimate, bounded_interval
 
 
 @dataclass(frozen=True)
@@ -91,6 +91,13 @@ class TransferResult:
     champions: tuple[Transferred, ...]
     score: str = COVERAGE
 
+    @property
+    def best_in_words(self) -> str:
+        """The champion to which regret is measured, in words."""
+        return (
+            f"the best known champion ({self.best_known:.3f}). It was selected by these trials, so luck is part of it"
+        )
+
     def __repr__(self) -> str:
         n = len({each.strategy for each in self.strategies})
         counts = f"{n} strateg{'y' if n == 1 else 'ies'}, {self.replicates} replicates"
@@ -160,5 +167,6 @@ def estimate_mean(values: NDArray[np.float64], within: tuple[float, float] = (0.
         return Estimate(mean, None, None, r)
     of_trials = float(values.var(axis=1, ddof=1).mean()) / (r * t) if t > 1 else 0.0
     variance = max(float(means.var(ddof=1)) / r, of_trials) if r > 1 else of_trials
-    reach = float(special.stdtrit((r if r > 1 else t) - 1, (1 + CONFIDENCE) / 2)) * math.sqrt(variance)
-    return Estimate(mean, max(mean - reach, within[0]), min(mean + reach, within[1]), r)
+    reach = float(special.stdtrit((r if r > 1 else t) - 1, (1 + CONFIDENCE) / 2))
+    low, high = bounded_interval(mean, math.sqrt(variance), reach, within)
+    return Estimate(mean, float(low), float(high), r)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 
 from realitygap.errors import StudyError
-from realitygap.lab._files import LONGEST_TEXT, refuse_files_outside, refuse_outside, refuse_port
+from realitygap.lab._files import LONGEST_TEXT, files_outside, refuse_outside, refuse_port
+from realitygap.lab._form import written_form
 
 
 @pytest.mark.parametrize(
@@ -58,22 +59,32 @@ def test_names_and_files_inside_are_not(tmp_path, name):
     refuse_outside(tmp_path, name)
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        '[arena]\nfile = "/etc/passwd"',
-        '[[condition]]\nplatform = "sim:../../fit.toml"',
-        '[task]\nkind = "python:/tmp/evil.py:run"',
-        '[[condition]]\n[condition.sim]\nrobot = "/elsewhere/robot.toml"',
-        "not toml [",
-        "a = 1\n" * LONGEST_TEXT,
-        "a = " + "[" * 5000,
-    ],
-)
-def test_study_files_that_name_others_are_refused(tmp_path, text):
+def test_all_files_outside_that_a_study_names_are_mistakes_with_their_places(tmp_path):
+    text = """
+[arena]
+file = "/etc/passwd"
+[task]
+kind = "python:/tmp/evil.py:run"
+[[condition]]
+platform = "sim:inside.toml"
+[[condition]]
+platform = "sim:../../fit.toml"
+[condition.sim]
+robot = "/elsewhere/robot.toml"
+"""
+    mistakes, allowed = files_outside(tmp_path, text)
+    places = [each.partition(": ")[0] for each in mistakes]
+    assert places == ["arena.file", "task.kind", "condition[2].platform", "condition[2].sim.robot"]
+    assert allowed["condition"][0]["platform"] == "sim:inside.toml"
+    assert files_outside(tmp_path, str(written_form(allowed)))[0] == []
+
+
+@pytest.mark.parametrize("text", ["not toml [", "a = 1\n" * LONGEST_TEXT, "a = " + "[" * 5000])
+def test_text_that_is_no_study_file_is_refused(tmp_path, text):
     with pytest.raises(StudyError):
-        refuse_files_outside(tmp_path, text)
+        files_outside(tmp_path, text)
 
 
 def test_titles_and_notes_may_hold_anything(tmp_path):
-    refuse_files_outside(tmp_path, '[study]\ntitle = "/etc/passwd: a study"\nnote = "../.."')
+    text = '[study]\ntitle = "/etc/passwd: a study"\nnote = "../.."'
+    assert files_outside(tmp_path, text)[0] == []

@@ -163,7 +163,7 @@ def _run(plan: ClosingPlan, folder: Path, processes: int | None, *, as_json: boo
 
 
 def _print(summary: dict[str, Any]) -> None:
-    from realitygap.report import goal_table, not_counted
+    from realitygap.report import SELECTION_NOTE, goal_table, not_counted
 
     of, label = len(summary["twins"]), summary["label"]
     if summary["plan"]["platforms"]:
@@ -178,6 +178,8 @@ def _print(summary: dict[str, Any]) -> None:
         typer.echo(f"{name:52}{wanted:>16}{figure:>9}{span:>18}{n:>9}  {verdict}")
     for sentence in not_counted(summary):
         typer.echo(sentence)
+    if not summary["plan"]["platforms"]:
+        typer.echo(SELECTION_NOTE)
 
 
 def _listed(text: str, option: str, known: Any) -> tuple[str, ...]:

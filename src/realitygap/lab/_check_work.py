@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import queue
+import re
 import time
 import tomllib
 from pathlib import Path
@@ -13,8 +14,8 @@ from realitygap.errors import RealityGapError
 from realitygap.study import Study, StudyFileError, estimate_seconds, parse_study, physical_conditions
 
 from ._channel import LOOK_S, Channel, Message
-from ._files import refuse_code, refuse_files_outside
-from ._form import read_form
+from ._files import files_outside, refuse_code
+from ._form import read_form, written_form
 
 IDLE_S = 300.0
 """How long the process waits for a file [s]; the next check then starts another process."""
@@ -64,10 +65,13 @@ def _estimate(study: Study) -> float | None:
 
 
 def _check(root: Path, text: str, *, allow_code: bool) -> tuple[dict[str, Any], Study | None]:
-    """Return the name and size of the study, and the study; or the mistakes in its file, and None."""
+    """Return the name and size of the study, and the study; or all mistakes in its file, and None."""
+    outside: list[str] = []
     try:
-        refuse_files_outside(root, text)
-        study = parse_study(text, str(root / "study.toml"))
+        outside, allowed = files_outside(root, text)
+        study = parse_study(written_form(allowed) if outside else text, str(root / "study.toml"))
+        if outside:
+            raise StudyFileError("", ())
         refuse_code(study, allow_code)
         replicates = study.about.replicates
         trials = sum(each.neat.population * each.neat.generations for each in physical_conditions(study))
@@ -78,8 +82,15 @@ def _check(root: Path, text: str, *, allow_code: bool) -> tuple[dict[str, Any], 
         }
         return {"name": study.about.name, **sizes}, study
     except StudyFileError as error:
-        return {"mistakes": "\n".join(error.mistakes), "places": list(error.mistakes)}, None
+        places = {_place_of(each) for each in outside}
+        mistakes = [*outside, *(each for each in error.mistakes if _place_of(each) not in places)]
+        return {"mistakes": "\n".join(mistakes), "places": mistakes}, None
     except RealityGapError as error:
-        return {"mistakes": str(error)}, None
+        return {"mistakes": "\n".join([*outside, str(error)]), "places": outside}, None
     except tomllib.TOMLDecodeError as error:
         return {"mistakes": f"This is not TOML: {error}."}, None
+
+
+def _place_of(mistake: str) -> str:
+    """Return the place of a mistake, without the name of its condition."""
+    return re.sub(r"(condition\[\d+\]) '[^']*'", r"\1", mistake).partition(": ")[0]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import re
 import stat
-from collections.abc import Collection, Iterator
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 from urllib.parse import parse_qsl
@@ -52,11 +52,11 @@ def plain_files(folder: Path, endings: Collection[str]) -> list[Path]:
     return [path for _, path in sorted(found)]
 
 
-def refuse_files_outside(root: Path, text: str) -> None:
-    """Refuse the text of a study file that names a file outside a folder, or is far too long.
+def files_outside(root: Path, text: str) -> tuple[list[str], dict[str, Any]]:
+    """Return a mistake for each file outside a folder that a study file names, and its values without these files.
 
     Raises:
-        StudyError: It does, it is, or it is not TOML.
+        StudyError: The text is far too long, or not TOML.
     """
     if len(text) > LONGEST_TEXT:
         raise StudyError(
@@ -66,8 +66,8 @@ def refuse_files_outside(root: Path, text: str) -> None:
         data = parse_toml(text)
     except ValueError as error:
         raise StudyError(f"This is not TOML: {error}. Expected a study file.") from error
-    for value in _texts(data):
-        refuse_outside(root, value)
+    mistakes: list[str] = []
+    return mistakes, _without_outside(root, data, "", mistakes)
 
 
 def refuse_code(study: Study, allow_code: bool) -> None:
@@ -152,16 +152,27 @@ def refuse_platform(root: Path, platform: str) -> None:
         refuse_outside(root, platform)
 
 
-def _texts(value: Any) -> Iterator[str]:
+def _without_outside(root: Path, value: Any, place: str, mistakes: list[str]) -> Any:
+    """Return a value with empty texts in place of files outside a folder; add a mistake for each."""
     if isinstance(value, dict):
-        for key, each in value.items():
-            if key not in _PROSE:
-                yield from _texts(each)
-    elif isinstance(value, list):
-        for each in value:
-            yield from _texts(each)
-    elif isinstance(value, str):
-        yield value
+        return {
+            key: each
+            if key in _PROSE
+            else _without_outside(root, each, f"{place}.{key}" if place else key, mistakes)
+            for key, each in value.items()
+        }
+    if isinstance(value, list):
+        return [
+            _without_outside(root, each, f"{place}[{number}]", mistakes)
+            for number, each in enumerate(value, 1)
+        ]
+    if isinstance(value, str):
+        try:
+            refuse_outside(root, value)
+        except StudyError as error:
+            mistakes.append(f"{place}: {error}")
+            return ""
+    return value
 
 
 def _is_within(root: Path, part: str) -> bool:

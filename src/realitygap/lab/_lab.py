@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -27,7 +27,7 @@ from ._identify_job import IdentifyJob
 from ._job import Job
 from ._live_job import LiveJob
 from ._photos import Photos
-from ._problem import FieldError, in_field
+from ._problem import Mistakes
 from ._standing import Standing, standing_of
 from ._studies import Studies, used_by
 from ._study_job import StudyJob
@@ -49,6 +49,18 @@ class Visitor:
 
 
 _NAME_RULE = "Use letters, digits, '.', '-', and '_'. Start with a letter or digit."
+
+
+def _is_name(text: str) -> bool:
+    """Return True if files of the lab can have this name."""
+    return re.fullmatch(NAME_PATTERN, text) is not None and len(text) <= 80
+
+
+def _check_name(text: str) -> None:
+    """Raise a StudyError if files of the lab cannot have this name."""
+    if not _is_name(text):
+        raise StudyError(f"{_NAME_RULE} You entered {shown(text)}.")
+
 
 MOST_REPORTS = 50
 """Number of reports of gaps that a page lists."""
@@ -156,6 +168,20 @@ class Lab:
                 self._photos[name] = Photos(path, self.root, self.changed)
             return self._photos[name]
 
+    def video_mistakes(self, values: Mapping[str, Any]) -> Mistakes:
+        """Return what is wrong in the fields of a video to track; a field that is missing is not checked."""
+        mistakes = Mistakes()
+        if "video" in values and values["video"] not in videos_in(self.root):
+            with mistakes.in_field("video"):
+                refuse_outside(self.root, values["video"])
+                raise StudyError(
+                    f"There is no video {values['video']!r} in the lab's folder. Put it there; its name ends in "
+                    f"{', '.join(ENDINGS)}."
+                )
+        with mistakes.in_field("tags"):
+            refuse_camera(self.root, f"?{values.get('tags') or ''}")
+        return mistakes
+
     def track(self, name: str, spec: str, trials: Sequence[int]) -> None:
         """Look for trials of a study in a video.
 
@@ -167,19 +193,22 @@ class Lab:
         Raises:
             StudyError: There is no such study or video, no trial is named, or a video is being tracked already.
         """
-        folder, video = self.studies.path(name), spec.partition("?")[0]
-        refuse_camera(self.root, spec)
+        folder, (video, _, tags) = self.studies.path(name), spec.partition("?")
+        self.video_mistakes({"video": video, "tags": tags}).refuse()
         if not trials:
             raise StudyError("There are no trials to score from a video. Drive a trial first.")
-        if video not in videos_in(self.root):
-            raise StudyError(
-                f"There is no video {video!r} in the lab's folder. Put it there; its name ends in {', '.join(ENDINGS)}."
-            )
         with self._lock:
             if any(not each.is_over for each in self.videos.values()):
                 raise StudyError("A video is being tracked. Wait until it is complete, or stop it.")
             self.videos[name] = VideoJob(folder, self.root, spec, trials, self.changed)
         self.changed()
+
+    def live_mistakes(self, values: Mapping[str, Any]) -> Mistakes:
+        """Return what is wrong in the fields of a live drive."""
+        mistakes, platform = Mistakes(), str(values.get("platform") or "")
+        with mistakes.in_field("platform"):
+            refuse_port(self.root, platform) if "://" in platform else refuse_outside(self.root, platform)
+        return mistakes
 
     def drive_live(self, name: str, wish: dict[str, Any]) -> None:
         """Have a network of a study drive a robot that everyone at its page sees.
@@ -191,9 +220,8 @@ class Lab:
         Raises:
             StudyError: There is no such study, or a file outside the lab's folder is named.
         """
-        folder, platform = self.studies.path(name), str(wish.get("platform") or "")
-        with in_field("platform"):
-            refuse_port(self.root, platform) if "://" in platform else refuse_outside(self.root, platform)
+        folder = self.studies.path(name)
+        self.live_mistakes(wish).refuse()
         with self._lock:
             before = self.lives.pop(name, None)
             if before is not None:
@@ -229,6 +257,13 @@ class Lab:
             folder = self.studies.new_path(name)
             self._begin(name, {"work": "study", "folder": str(folder), "text": text})
 
+    def name_mistakes(self, name: str) -> Mistakes:
+        """Return what is wrong in the name of a new study."""
+        mistakes = Mistakes()
+        with mistakes.in_field("study.name"):
+            self.studies.new_path(name)
+        return mistakes
+
     def go_on(self, name: str, **options: Any) -> StudyJob:
         """Resume a study.
 
@@ -246,12 +281,22 @@ class Lab:
             if said := used_by(folder):
                 raise StudyError(f"{name!r} is in use: {said} writes to it. Wait until it ends, or stop it.")
             if options.get("port"):
-                with in_field("port"):
-                    refuse_port(self.root, options["port"])
-                with in_field("camera"):
-                    refuse_camera(self.root, str(options.get("camera") or ""))
+                self.sitting_mistakes(options).refuse()
                 self.refuse_second_robot()
             return self._begin(name, {"work": "study", "folder": str(folder), **options})
+
+    def sitting_mistakes(self, values: Mapping[str, Any]) -> Mistakes:
+        """Return what is wrong in the fields of trials on a robot; a field that is missing is not checked."""
+        mistakes = Mistakes()
+        if "port" in values:
+            with mistakes.in_field("port"):
+                refuse_port(self.root, values["port"])
+        with mistakes.in_field("camera"):
+            camera = str(values.get("camera") or "")
+            refuse_camera(self.root, camera)
+            if values.get("counts") == "camera" and not camera:
+                raise StudyError("Enter the number of the camera that scores, such as 0.")
+        return mistakes
 
     def _begin(self, name: str, order: dict[str, Any]) -> StudyJob:
         order["allow_code"] = self.allow_code
@@ -296,23 +341,11 @@ class Lab:
             visitor: Operator of the robot, if the target is one.
 
         Raises:
-            FieldError: A name or a platform that cannot be used.
+            FormError: Names or platforms that cannot be used.
             StudyError: A gap is being measured, or the robot is in use.
         """
-        page = self.gap_page(name)
-        if page is None:
-            raise FieldError("name", f"{_NAME_RULE} You entered {shown(name)}.")
-        for key, spec in {"sim": values["sim"], "target": values["target"]}.items():
-            with in_field(key):
-                refuse_platform(self.root, spec)
-        with in_field("controllers"):
-            refuse_outside(self.root, values["controllers"])
-        if not values.get("witness") and platform_of(values["target"]).needs_person:
-            raise FieldError(
-                "target",
-                "In the lab, a gap needs a target without an operator. For an emulator in another program, enter its "
-                "witness. For a robot, use the command: realitygap gap",
-            )
+        self.gap_mistakes({**values, "name": name}).refuse()
+        page = self.root / "gaps" / f"{name}.html"
         with self._lock:
             if self.gap is not None and not self.gap.is_over:
                 raise StudyError("A gap is being measured. Wait until it is complete, or stop it.")
@@ -327,11 +360,29 @@ class Lab:
             self._note_user(self.gap)
         self.changed()
 
+    def gap_mistakes(self, values: Mapping[str, Any]) -> Mistakes:
+        """Return what is wrong in the fields of a gap; a field that is missing is not checked."""
+        mistakes = Mistakes()
+        if "name" in values:
+            with mistakes.in_field("name"):
+                _check_name(values["name"])
+        for key in ("sim", "target"):
+            if key in values:
+                with mistakes.in_field(key):
+                    refuse_platform(self.root, values[key])
+                    is_led = key == "target" and not values.get("witness")
+                    if is_led and platform_of(values["target"]).needs_person:
+                        raise StudyError(
+                            "In the lab, a gap needs a target without an operator. For an emulator in another program, "
+                            "enter its witness. For a robot, use the command: realitygap gap"
+                        )
+        with mistakes.in_field("controllers"):
+            refuse_outside(self.root, str(values.get("controllers") or ""))
+        return mistakes
+
     def gap_page(self, name: str) -> Path | None:
         """Return the file of a gap's report; None if a gap cannot have this name."""
-        if not re.fullmatch(NAME_PATTERN, name) or len(name) > 80:
-            return None
-        return self.root / "gaps" / f"{name}.html"
+        return self.root / "gaps" / f"{name}.html" if _is_name(name) else None
 
     def gap_reports(self) -> list[str]:
         """Return the names of the reports of gaps, the last one first."""
@@ -349,19 +400,12 @@ class Lab:
             visitor: Operator of the robot, if the platform is one.
 
         Raises:
-            FieldError: A name, a platform, or a file that cannot be used.
+            FormError: Names, platforms, or files that cannot be used.
             StudyError: A calibration is running, or the robot is in use.
         """
-        if not re.fullmatch(NAME_PATTERN, name) or len(name) > 80:
-            raise FieldError("name", f"{_NAME_RULE} You entered {shown(name)}.")
+        self.calibration_mistakes({**values, "name": name}).refuse()
         out = self.root / f"{name}.toml"
-        if out.exists() and not out.with_suffix(".trials.jsonl").exists():
-            raise FieldError("name", f"There is another file {out.name}. Choose another name.")
         refuse_links(self.root, out, out.with_suffix(".trials.jsonl"), out.with_suffix(".svg"))
-        with in_field("base"):
-            refuse_outside(self.root, values["base"])
-        with in_field("platform"):
-            refuse_platform(self.root, values["platform"])
         is_robot = names_a_port(values["platform"])
         with self._lock:
             if self.calibration is not None and not self.calibration.is_over:
@@ -373,6 +417,22 @@ class Lab:
             self.calibration = CalibrationJob(order, self.root, self.changed)
             self._note_user(self.calibration)
         self.changed()
+
+    def calibration_mistakes(self, values: Mapping[str, Any]) -> Mistakes:
+        """Return what is wrong in the fields of a calibration; a field that is missing is not checked."""
+        mistakes = Mistakes()
+        if "name" in values:
+            with mistakes.in_field("name"):
+                _check_name(values["name"])
+                out = self.root / f"{values['name']}.toml"
+                if out.exists() and not out.with_suffix(".trials.jsonl").exists():
+                    raise StudyError(f"There is another file {out.name}. Choose another name.")
+        with mistakes.in_field("base"):
+            refuse_outside(self.root, str(values.get("base") or ""))
+        if "platform" in values:
+            with mistakes.in_field("platform"):
+                refuse_platform(self.root, values["platform"])
+        return mistakes
 
     # the robot
 
@@ -394,10 +454,12 @@ class Lab:
         Raises:
             StudyError: No port is named, or a robot is in use.
         """
-        if not port:
-            raise FieldError("port", "This field is empty. Enter a port such as /dev/rfcomm0 or COM3.")
-        with in_field("port"):
+        mistakes = Mistakes()
+        with mistakes.in_field("port"):
+            if not port:
+                raise StudyError("This field is empty. Enter a port such as /dev/rfcomm0 or COM3.")
             refuse_port(self.root, port)
+        mistakes.refuse()
         with self._lock:
             self.refuse_second_robot()
             if self._is_identifying(port):

@@ -29,6 +29,7 @@ from realitygap.report._choices_figure import Choice, compare_choices, draw_choi
 from realitygap.report._closing import (
     FAMILY_HEAD,
     GOAL_HEAD,
+    SELECTION_NOTE,
     STRATEGY_HEAD,
     TWIN_HEAD,
     WHY_HEAD,
@@ -89,6 +90,7 @@ __all__ = [
     "FAMILY_HEAD",
     "GOAL_HEAD",
     "NARROW",
+    "SELECTION_NOTE",
     "STRATEGY_HEAD",
     "SUMMARY_SCHEMA",
     "TASK_SCHEMA",

@@ -30,6 +30,13 @@ TWIN_HEAD = ("twin", "RMS gap as it is", "standard error", "counts")
 STRATEGY_HEAD = ("strategy", "twins", "coverage on the twin", "95 % interval")
 _RATIOS = ("SRCC", "MMRV")
 
+SELECTION_NOTE = (
+    "These twins were selected by their gap before calibration, so luck is part of its fall. The table of families has "
+    "the median RMS gap over all twins. The smallest fall of a family is the smallest of several, so luck is part of "
+    "it too."
+)
+"""Limit of goals whose twins a measured gap selected."""
+
 Table = list[tuple[str, ...]]
 
 
@@ -52,6 +59,7 @@ def write_closing_page(summary: Mapping[str, Any], out: str | Path) -> Path:
         "n_counted": summary["n_counted"],
         "n_twins": len(summary["twins"]),
         "words": words_of(summary),
+        "selection_note": SELECTION_NOTE,
         "is_of_twins": not summary["plan"].get("platforms"),
         "goal_head": GOAL_HEAD,
         "goals": goal_table(summary),

@@ -209,7 +209,9 @@ class _Page:
                 )
 
         async def start() -> None:
-            if not await form.submit(begin) and any(self._form.is_wrong(key) for key in _OF_ROBOT):
+            if not await form.submit(begin, self._lab.calibration_mistakes) and any(
+                self._form.is_wrong(key) for key in _OF_ROBOT
+            ):
                 self._show_stage("Robot")
 
         def begin(values: dict[str, Any]) -> None:
@@ -223,9 +225,10 @@ class _Page:
             ui.button("Back", on_click=lambda: self._show_stage("Robot")).props("flat no-caps")
         self._show_stage("Robot")
 
-    def _go_to_kinds(self) -> None:
+    async def _go_to_kinds(self) -> None:
         """Go on to the kinds of calibration if the robot and the name can be used."""
-        problems = {key: text for key, text in self._form.problems().items() if key in _OF_ROBOT}
+        found = await self._form.all_problems(self._lab.calibration_mistakes)
+        problems = {key: text for key, text in found.items() if key in _OF_ROBOT}
         self._form.show_problems(problems)
         if not problems:
             self._show_stage("What")

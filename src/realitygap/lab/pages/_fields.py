@@ -11,10 +11,12 @@ from typing import Any
 from nicegui import run, ui
 from nicegui.elements.mixins.value_element import ValueElement
 
-from realitygap.lab._problem import FieldError
+from realitygap.lab._problem import FormError, Mistakes
 from realitygap.settings import shown
 
 from ._notices import WRONG
+
+FindMistakes = Callable[[dict[str, Any]], Mistakes]
 
 
 @dataclass
@@ -158,19 +160,17 @@ class Form:
 
     # mistakes
 
-    def values(self) -> dict[str, Any]:
-        """Return what was entered, by key.
+    async def all_problems(self, find: FindMistakes | None) -> dict[str, str]:
+        """Return what is wrong, by key in the order of the form: in each field, and by a check of several fields.
 
-        Raises:
-            FieldError: A value cannot be used; the first one is named.
+        Args:
+            find: Finds mistakes in the values of those fields that are not wrong by themselves, in a thread.
         """
-        found = {}
-        for key, field in self._fields.items():
-            try:
-                found[key] = field.check()
-            except ValueError as error:
-                raise FieldError(key, str(error)) from error
-        return found
+        problems = self.problems()
+        usable = {key: field.check() for key, field in self._fields.items() if key not in problems}
+        if find is not None and (found := await run.io_bound(find, usable)) is not None:
+            problems |= found.problems
+        return {key: problems[key] for key in (*self._fields, *problems) if key in problems}
 
     def problems(self) -> dict[str, str]:
         """Return what is wrong in each field, by key; empty if nothing is."""
@@ -192,22 +192,23 @@ class Form:
         """Forget all fields, because others will be added."""
         self._fields.clear()
 
-    async def submit(self, act: Callable[[dict[str, Any]], Any]) -> bool:
-        """Pass what was entered to a function, in a thread; show mistakes at their fields.
+    async def submit(self, act: Callable[[dict[str, Any]], Any], find: FindMistakes | None = None) -> bool:
+        """Pass what was entered to a function, in a thread; show all mistakes at their fields.
 
         Args:
-            act: Takes the values by key; raises a FieldError for a mistake in one field.
+            act: Takes the values by key; raises FormError for mistakes in fields.
+            find: As in `all_problems`. Without it, mistakes that only `act` finds come after the others.
 
         Returns:
             Whether it succeeded.
         """
         with ui.context.client:  # the button that was pressed may be gone by then
-            problems = self.problems()
+            problems = await self.all_problems(find)
             if not problems:
                 try:
-                    await run.io_bound(act, self.values())
-                except FieldError as error:
-                    problems = {error.field: str(error)}
+                    await run.io_bound(act, {key: field.check() for key, field in self._fields.items()})
+                except FormError as error:
+                    problems = error.problems
                 except WRONG as error:
                     problems = {"": str(error)}
             self.show_problems(problems)

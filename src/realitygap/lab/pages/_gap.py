@@ -169,7 +169,7 @@ class _Page:
 
     async def _submit(self) -> None:
         self._button.disable()  # a second press would only find that the first one has begun
-        await self._form.submit(self._measure)
+        await self._form.submit(self._measure, self._lab.gap_mistakes)
         self._button.enable()
 
     def _measure(self, entered: dict[str, Any]) -> None:

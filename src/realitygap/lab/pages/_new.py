@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import re
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import resources
 from typing import Any, Literal
@@ -62,6 +63,7 @@ PAUSE_S = 1.5
 LEAST_S = 5.0
 """Shortest computing time that is told [s]: starting a process takes some seconds, too."""
 
+_NONE: Mapping[str, str] = {}
 _BASICS = {
     "study.name": "Name",
     "study.title": "Title",
@@ -428,27 +430,36 @@ class _Page:
 
     async def _checked(self) -> dict[str, Any] | None:
         """Check what was entered; None if there are mistakes, which are shown."""
-        problems = {} if self._is_text else self._form.problems()
-        if problems:
-            self._form.show_problems(problems)
-            return None
+        problems = await self._problems_of_form()
         text = self._whole()
-        summary = self._summary_of(text)
+        summary = self._summary_of("" if self._has_unread else text)
         found = await self._ask("check", text)
-        if "name" not in found:
-            self._show_mistakes(found)
+        if "name" not in found or problems:
+            self._show_mistakes(found, problems)
             return None
         self._form.show_problems({})
         summary.is_checked, summary.is_due = True, False
         self._size.text = self._summary.words
         return {**found, "text": text}
 
-    def _show_mistakes(self, found: dict[str, Any]) -> None:
+    async def _problems_of_form(self) -> dict[str, str]:
+        """Return what is wrong in fields by themselves, and in the name if a study has it."""
+        if self._is_text:
+            return {}
+        problems = self._form.problems()
+        name = self._draft.value("study.name")
+        if "study.name" not in problems and isinstance(name, str) and name:
+            taken = await run.io_bound(self._lab.name_mistakes, name)
+            problems |= {} if taken is None else taken.problems
+        return problems
+
+    def _show_mistakes(self, found: dict[str, Any], problems: Mapping[str, str] = _NONE) -> None:
+        """Show the mistakes in the study, and those in fields of the form: each text that is no value."""
         places = found.get("places")
-        if not places or self._is_text:
-            self._form.show_problems({"": str(found["mistakes"])})
+        if self._is_text or ("mistakes" in found and not places):
+            self._form.show_problems({"": str(found["mistakes"]), **problems})
             return
-        self._form.show_problems(dict(_problem_of(each) for each in places))
+        self._form.show_problems({**dict(_problem_of(each) for each in places or ()), **problems})
 
     async def _check_only(self) -> None:
         await self._checked()

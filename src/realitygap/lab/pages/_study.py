@@ -591,7 +591,9 @@ class _Page:
                 options=self._platforms(),
                 explanation="For example sim, jyro, or twin:FILE. Default: the platform of the condition.",
             )
-        ui.button("Drive live", on_click=lambda: form.submit(drive)).props("outline no-caps")
+        ui.button("Drive live", on_click=lambda: form.submit(drive, self._lab.live_mistakes)).props(
+            "outline no-caps"
+        )
         self._live = Part(self._live_state, self._show_live)
         self._live.show()
 

@@ -14,7 +14,6 @@ from realitygap.lab._counted import counted
 from realitygap.lab._counts import Counts
 from realitygap.lab._lab import Lab, Visitor
 from realitygap.lab._photos import Photos
-from realitygap.lab._problem import FieldError
 from realitygap.lab._study_job import StudyJob
 from realitygap.report import measure_agreement
 from realitygap.robots import list_ports
@@ -361,14 +360,12 @@ class _Page:
         form.summary()
 
         def begin(values: dict[str, Any]) -> None:
-            if values["counts"] == "camera" and not values["camera"]:
-                raise FieldError("camera", "Enter the number of the camera that scores, such as 0.")
             self._lab.go_on(self._name, **values)
             self._lab.take_robot(self._visitor)
 
         def emulate() -> Any:
             port.value = self._emulated
-            return form.submit(begin)
+            return form.submit(begin, self._lab.sitting_mistakes)
 
         with ui.element("div").classes("lab-form"):
             port = form.text(
@@ -381,9 +378,9 @@ class _Page:
             )
             with ui.row().classes("lab-row"):
                 text = "Reconnect" if is_lost else "Connect robot"
-                ui.button(text, on_click=lambda: form.submit(begin)).props("unelevated no-caps").classes(
-                    "lab-primary"
-                )
+                ui.button(text, on_click=lambda: form.submit(begin, self._lab.sitting_mistakes)).props(
+                    "unelevated no-caps"
+                ).classes("lab-primary")
                 ui.button("Use an emulated robot", on_click=emulate).props("outline no-caps")
             with ui.expansion("Advanced").classes("lab-expansion"):
                 form.choice("counts", "Scored by", _SCORERS, before.get("counts") or "page")

@@ -106,4 +106,6 @@ class Videos:
             spec, trial = f"{values['video']}?{values['tags']}", values["trial"]
             self._lab.track(self._counts.name, spec, [trial] if trial else self._waiting())
 
-        ui.button("Track video", on_click=lambda: form.submit(track)).props("unelevated no-caps")
+        ui.button("Track video", on_click=lambda: form.submit(track, self._lab.video_mistakes)).props(
+            "unelevated no-caps"
+        )

@@ -94,9 +94,8 @@ class TransferResult:
     @property
     def best_in_words(self) -> str:
         """The champion to which regret is measured, in words."""
-        return (
-            f"the best known champion ({self.best_known:.3f}). It was selected by these trials, so luck is part of it"
-        )
+        known = f"the best known champion ({self.best_known:.3f})"
+        return f"{known}. It was selected by these trials, so luck is part of it"
 
     def __repr__(self) -> str:
         n = len({each.strategy for each in self.strategies})

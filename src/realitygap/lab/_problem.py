@@ -32,7 +32,7 @@ class Mistakes:
 
     @contextlib.contextmanager
     def in_field(self, field: str) -> Iterator[None]:
-        """Take a StudyError as the mistake of this field, and go on."""
+        """Take a StudyError as the mistake of this field, and continue."""
         try:
             yield
         except StudyError as error:

@@ -8,7 +8,6 @@ from typing import Any
 
 from realitygap._numbers import fixed
 from realitygap._version import __version__
-from realitygap._wording import p_equation
 from realitygap.records import write_whole
 from realitygap.report._closing_figures import draw_closing, words_of
 from realitygap.report._placed import FigureOnPage, hover_content, number_figures
@@ -114,7 +113,7 @@ def why_table(summary: Mapping[str, Any]) -> Table:
                         goal["name"],
                         each["twin"],
                         _plain(goal, each["figure"]),
-                        "–" if p is None else p_equation(p).removeprefix("p ").removeprefix("= "),
+                        "–" if p is None else "< 0.001" if p < 0.001 else f"{p:.3f}",
                         ", ".join(each.get("at_prior_end", [])) or "–",
                     )
                 )

@@ -258,10 +258,11 @@ class Lab:
             self._begin(name, {"work": "study", "folder": str(folder), "text": text})
 
     def name_mistakes(self, name: str) -> Mistakes:
-        """Return what is wrong in the name of a new study."""
+        """Return whether a study has this name already; a check of the study finds other mistakes in a name."""
         mistakes = Mistakes()
         with mistakes.in_field("study.name"):
-            self.studies.new_path(name)
+            if _is_name(name):
+                self.studies.new_path(name)
         return mistakes
 
     def go_on(self, name: str, **options: Any) -> StudyJob:

@@ -24,7 +24,7 @@ GENOME = {
     "source": [0],
     "target": [3],
     "weight": [0.5],
-    "enabled": [1],
+    "enabled": [True],
 }
 
 
@@ -106,7 +106,7 @@ def test_a_torn_ledger_is_told_each_time_until_it_is_whole(folder, counts):
     whole = path.read_bytes()
     path.write_bytes(whole[:4096] + b"\0" * (len(whole) - 4096))
     for _ in range(2):
-        with pytest.raises(LedgerError, match="is torn"):
+        with pytest.raises(LedgerError, match="is damaged"):
             counts.look()
     path.write_bytes(whole)
     assert len(counts.look()) == 2

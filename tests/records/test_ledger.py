@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import _thread
 import random
 import shutil
 import sqlite3
@@ -193,18 +194,101 @@ def test_rows_have_no_coverage_of_ends_that_nobody_saw(ledger):
     assert ledger_frame(ledger, "a")["coverage_ends"].to_list() == [None, None]
 
 
-def test_rows_of_a_damaged_individual_are_refused(ledger):
-    for number in (1, 2):
-        drive(ledger, number)
-    ledger.close_generation("a", 0, 0, [0.5, 0.25], [None, None])
+def changed_schema(ledger, name, old, new):
+    """Change the SQL of a table or trigger, as only somebody who means harm does."""
     with sqlite3.connect(ledger.path) as other:
-        other.execute("DROP TRIGGER closed_individuals_stay")
-        other.execute("UPDATE individuals SET genome = '{}'")
+        (sql,) = other.execute("SELECT sql FROM sqlite_schema WHERE name = ?", (name,)).fetchone()
+        assert old in sql
+        other.execute("PRAGMA writable_schema = ON")
+        other.execute("UPDATE sqlite_schema SET sql = ? WHERE name = ?", (sql.replace(old, new, 1), name))
     other.close()
-    with pytest.raises(
-        LedgerError, match="is damaged: an individual of condition 'a' is not as it was written"
-    ):
-        ledger_frame(ledger, "a")
+
+
+SLOW = "(instr(hex(zeroblob(60000000)), '1') = 0)"
+
+
+def test_foreign_schema_is_refused_before_any_row_is_read(tmp_path):
+    """Each would run with the first query, or let through what ours refuses."""
+    changes = {
+        "a generated column": ("conditions", "label TEXT", f"more INT AS ({SLOW}), label TEXT"),
+        "a CHECK constraint": ("conditions", "hash TEXT NOT NULL", f"hash TEXT NOT NULL CHECK {SLOW}"),
+        "a default": ("conditions", "label TEXT", "label TEXT DEFAULT 'REAL'"),
+        "a collation": ("conditions", "name TEXT", "name TEXT COLLATE NOCASE"),
+        "no constraint": ("trials", " CHECK (state IN ('planned', 'running', 'driven', 'scored', 'void'))", ""),
+        "a comment of another form": ("notes", "text TEXT", f"text TEXT /* -- */ CHECK {SLOW} /*\n*/"),
+        "a comment in a text": ("trials", "'planned'", "'plan--' OR 1 OR '\nned'"),
+        "a space of another kind": ("notes", "text TEXT", "text\xa0TEXT"),
+        "another trigger": ("closed_generations_stay", "OLD.closed IS NOT NULL", "0"),
+    }
+    more = {
+        "a table": "CREATE TABLE more (id)",
+        "a view": "CREATE VIEW more AS SELECT 1",
+        "an index": f"CREATE INDEX more ON conditions ({SLOW})",
+        "a trigger": "CREATE TRIGGER more AFTER INSERT ON notes BEGIN SELECT 1; END",
+        "a missing trigger": "DROP TRIGGER notes_stay",
+    }
+    for name in (*changes, *more):
+        folder = tmp_path / name
+        folder.mkdir()
+        with new_ledger(folder) as ledger:
+            if name in changes:
+                changed_schema(ledger, *changes[name])
+            else:
+                with sqlite3.connect(ledger.path) as other:
+                    other.execute(more[name])
+                other.close()
+        for writable in (True, False):
+            with pytest.raises(LedgerError, match="realitygap did not make|is missing"):
+                Ledger.open(ledger.path, writable=writable)
+
+
+def test_ledger_opens_whose_comments_and_spaces_are_those_of_an_earlier_version(ledger):
+    changed_schema(ledger, "conditions", "from its first trial on", "from its first sitting on, 'or later'")
+    changed_schema(ledger, "scores", "at quarters of steps", "at the ends of steps")
+    changed_schema(ledger, "notes", "    id INTEGER", "\n\tid   INTEGER")
+    with Ledger.open(ledger.path) as again:
+        assert len(again.trials()) == 2
+
+
+ENDLESS = "WITH RECURSIVE n(k) AS (SELECT 1 UNION ALL SELECT k + 1 FROM n) SELECT count(*) FROM n"
+
+
+def test_query_ends_at_the_deadline_and_with_ctrl_c(ledger, monkeypatch):
+    timer = threading.Timer(0.2, _thread.interrupt_main)
+    timer.start()
+    with pytest.raises(KeyboardInterrupt):
+        ledger._all(ENDLESS)
+    timer.join()
+    monkeypatch.setattr(_ledger_file, "MOST_READING_S", 0.1)
+    with pytest.raises(LedgerError, match="cannot be read within"):
+        ledger._all(ENDLESS)
+    monkeypatch.undo()
+    assert len(ledger.trials()) == 2, "the next query has time again"
+    ledger.note("and may write", "anna")
+
+
+def test_checks_end_at_the_deadline(ledger, monkeypatch):
+    with sqlite3.connect(ledger.path) as other:
+        other.executemany(
+            "INSERT INTO notes (text, who, time) VALUES (?, 'anna', '')", [("x" * 100,)] * 20_000
+        )
+    other.close()
+    monkeypatch.setattr(_ledger_file, "MOST_READING_S", -1.0)
+    monkeypatch.setattr(_ledger_file, "_N_OPERATIONS", 1000)
+    with pytest.raises(LedgerError, match="cannot be read within"):
+        Ledger.open(ledger.path, writable=False)
+
+
+def test_ledger_is_checked_once_until_it_changes(ledger, monkeypatch):
+    n_checks = []
+    monkeypatch.setattr(_ledger_file, "check_ledger", lambda *_: n_checks.append(1))
+    monkeypatch.setattr(_ledger_file, "_SETTLED_S", -10.0)
+    for _ in range(3):
+        Ledger.open(ledger.path).close()
+    assert len(n_checks) == 1
+    ledger.note("the floor was wet", "anna")
+    Ledger.open(ledger.path).close()
+    assert len(n_checks) == 2
 
 
 def test_tables_are_listed_by_name_with_what_makes_them(ledger):
@@ -222,7 +306,7 @@ def test_tables_are_listed_by_name_with_what_makes_them(ledger):
 
 
 def test_a_ledger_that_cannot_be_made_leaves_no_file(tmp_path, monkeypatch):
-    monkeypatch.setattr(_ledger_file, "TABLES", "no SQL")
+    monkeypatch.setattr(_ledger_file, "SCHEMA", "no SQL")
     with pytest.raises(LedgerError, match="syntax error"):
         Ledger.create(tmp_path / "ledger.sqlite")
     assert list(tmp_path.iterdir()) == []
@@ -397,7 +481,7 @@ def test_a_ledger_cut_off_is_refused(tmp_path):
     path = tmp_path / "ledger.sqlite"
     data = path.read_bytes()
     path.write_bytes(data[: len(data) // 2])
-    with pytest.raises(LedgerError, match="is torn"):
+    with pytest.raises(LedgerError, match="is damaged"):
         Ledger.open(path)
 
 
@@ -433,7 +517,7 @@ def test_text_that_is_no_json_is_a_torn_ledger(ledger, changed):
     drive(ledger, 1)
     with sqlite3.connect(ledger.path) as other:
         other.execute("UPDATE scores SET cells = CAST(? AS TEXT)", (changed,))
-    with pytest.raises(LedgerError, match=r"is torn .*, and was not changed\. Restore"):
+    with pytest.raises(LedgerError, match=r"is damaged .*, and was not changed\. Restore"):
         Ledger.open(ledger.path)
 
 

@@ -113,9 +113,13 @@ def _of_version_2(data: bytes) -> bytes:
     ("change", "kind", "said"),
     [
         (_of_version_2, RecordVersionError, "format 2; this realitygap reads format 1"),
-        (lambda data: data[: len(data) // 2], LedgerError, "is torn"),
-        (lambda data: data[:8192] + random.Random(1).randbytes(4096) + data[12288:], LedgerError, "is torn"),
-        (lambda data: random.Random(1).randbytes(9000), LedgerError, "is torn"),
+        (lambda data: data[: len(data) // 2], LedgerError, "is damaged"),
+        (
+            lambda data: data[:8192] + random.Random(1).randbytes(4096) + data[12288:],
+            LedgerError,
+            "is damaged",
+        ),
+        (lambda data: random.Random(1).randbytes(9000), LedgerError, "is damaged"),
     ],
 )
 def test_ledger_that_cannot_be_trusted_is_one_message_and_left_as_it_was(tmp_path, change, kind, said):

@@ -12,7 +12,7 @@ from typing import Any
 
 from realitygap.errors import LedgerError
 from realitygap.platforms import emulated_robots, is_physical
-from realitygap.records import LEDGER_NAME, Ledger, Score, ScoreRole, Trial
+from realitygap.records import LEDGER_NAME, Ledger, Score, ScoreRole, Trial, ledger_stamp
 from realitygap.runs import Condition
 from realitygap.world import Arena
 
@@ -20,8 +20,6 @@ from ._drawn import FOLDER, Draft, forget_draft, keep_draft, read_draft, read_dr
 from ._proposals import Proposal, read_proposals
 
 LONGEST_NOTE = 2000
-_INDEX_HEAD = 48
-"""Bytes at the beginning of the index of what was written lately, which differ after each change."""
 
 
 @dataclass(frozen=True)
@@ -126,7 +124,7 @@ class Counts:
         """
         with self._looking:
             path = self._folder / LEDGER_NAME
-            stamp = _stamp(path)
+            stamp = ledger_stamp(path)
             if stamp and stamp != self._stamp:
                 with Ledger.open(path, writable=False) as ledger:
                     self._found = self._read(ledger)
@@ -280,20 +278,3 @@ def _changed(folder: Path) -> int:
         return folder.stat().st_mtime_ns
     except OSError:
         return 0
-
-
-def _stamp(path: Path) -> tuple[Any, ...]:
-    """Return a value that changes with the readable part of the ledger; empty if there is no ledger.
-
-    Files change before what was written to them can be read, by as long as the disk takes to keep it: so the head of
-    the index is looked at, which SQLite writes last, and by which it knows itself that there is something new
-    (sqlite.org/walformat.html, section 2.1).
-    """
-    found: list[Any] = []
-    for ending in ("", "-wal"):
-        with contextlib.suppress(OSError):
-            status = path.with_name(path.name + ending).stat()
-            found.append((ending, status.st_dev, status.st_ino, status.st_mtime_ns, status.st_size))
-    with contextlib.suppress(OSError), path.with_name(path.name + "-shm").open("rb") as index:
-        found.append(index.read(_INDEX_HEAD))
-    return tuple(found)

@@ -26,6 +26,8 @@ from ._figure_cache import has_thumbnail, read_rows
 LABELS = ("SIM", "TWIN", "EMULATED", "REAL")
 LATELY_S = 0.8
 """Largest age of the state that pages show [s]."""
+PATIENCE_S = 3.0
+"""Maximum time that a page waits for the state of one study [s]. A file of somebody else may take longer to read."""
 _HOLDER = re.compile(r"process (\d{1,9}) on (.+)")
 _LONGEST_HOLDER = 1000
 """Largest size of a lock's text [bytes]."""
@@ -88,7 +90,7 @@ class Studies:
     def __init__(self, root: Path) -> None:
         self.root = root
         self._open: dict[str, ResultsFolder] = {}
-        self._seen: dict[str, tuple[float, StudyState]] = {}
+        self._looks: dict[str, _Look] = {}
         self._lock = threading.Lock()
         self._looking = threading.Lock()
 
@@ -161,22 +163,54 @@ class Studies:
         return [self.lately(name) for name in self.names()]
 
     def lately(self, name: str) -> StudyState:
-        """Return the recent state of a study; all pages share one look at its folder."""
+        """Return the recent state of a study; all pages share one look at its folder.
+
+        A study whose folder takes long to read gets its last known state, so that no other study waits for it.
+        """
         with self._looking:
-            when, state = self._seen.get(name, (-LATELY_S, None))
-            if state is None or time.monotonic() - when >= LATELY_S:
-                state = self.state(name)
-                self._seen[name] = (time.monotonic(), state)
-            return state
+            look = self._looks.get(name)
+            if look is None or look.is_old:
+                look = self._looks[name] = _Look(self, name, look.state if look is not None else None)
+        look.is_over.wait(PATIENCE_S)
+        return look.state
 
     def forget(self, name: str) -> None:
         """Forget the state of a study, so that its folder is read again."""
         with self._looking:
-            self._seen.pop(name, None)
+            self._looks.pop(name, None)
 
     def nearest(self, name: str) -> list[str]:
         """Return the names that are most like a name, at most three."""
         return difflib.get_close_matches(name, self.names(), n=3, cutoff=0.0)
+
+
+class _Look:
+    """One look at the folder of a study, in a thread of its own.
+
+    Attributes:
+        state: The state; the one before while the folder is being read.
+        is_over: Set when the state is that of the folder.
+    """
+
+    def __init__(self, studies: Studies, name: str, before: StudyState | None) -> None:
+        self.state = before or StudyState(
+            name,
+            title=name,
+            problem="This study is still being read. Wait, or restore its ledger from a copy.",
+        )
+        self.is_over = threading.Event()
+        self._ended = 0.0
+        threading.Thread(target=self._read, args=(studies, name), daemon=True).start()
+
+    def _read(self, studies: Studies, name: str) -> None:
+        self.state = studies.state(name)
+        self._ended = time.monotonic()
+        self.is_over.set()
+
+    @property
+    def is_old(self) -> bool:
+        """True if it is time for another look."""
+        return self.is_over.is_set() and time.monotonic() - self._ended >= LATELY_S
 
 
 def _changed(path: Path) -> float | None:

@@ -26,7 +26,7 @@ from realitygap.records._inbox import Delivery, MissingInboxError, deliver
 from realitygap.records._inside import refuse_links, refuse_links_in
 from realitygap.records._json_file import read_object
 from realitygap.records._ledger import Ledger
-from realitygap.records._ledger_file import ledger_tables
+from realitygap.records._ledger_file import ledger_stamp
 from realitygap.records._ledger_kinds import (
     PATH_PARTS,
     ROBOT,
@@ -41,6 +41,7 @@ from realitygap.records._ledger_kinds import (
 )
 from realitygap.records._ledger_reader import LedgerReader
 from realitygap.records._ledger_rows import complete_runs, ledger_frame
+from realitygap.records._ledger_schema import ledger_tables
 from realitygap.records._listing import LEDGER_NAME
 from realitygap.records._observations_file import (
     Observations,
@@ -95,6 +96,7 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     "complete_runs",
     "ledger_frame",
     "LEDGER_NAME",
+    "ledger_stamp",
     "ledger_tables",
     # what an observer sees of trials one by one
     "TrialRecord",

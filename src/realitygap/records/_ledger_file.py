@@ -3,171 +3,44 @@
 from __future__ import annotations
 
 import contextlib
-import functools
 import os
 import secrets
 import sqlite3
+import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 from realitygap._limits import MOST_TEXT_BYTES
-from realitygap.errors import LedgerError, RecordVersionError
+from realitygap.errors import LedgerError
 from realitygap.records._files import sync_folder
 from realitygap.records._inside import refuse_links, refuse_other_names
-
-LEDGER_FORMAT = 1
-"""Raised whenever the tables change; a ledger of another format is refused."""
+from realitygap.records._ledger_check import check_ledger, damaged
+from realitygap.records._ledger_schema import APPLICATION, LEDGER_FORMAT, SCHEMA
 
 _ENDINGS = ("", "-wal", "-shm", "-journal")
 """Endings of the names of a ledger and of the files that SQLite writes next to it."""
 
-_APPLICATION = 0x52474C31
-"""Marks the file as a ledger of ours ("RGL1"), in SQLite's `application_id`."""
-
 _PATIENCE_S = 10.0
 """Maximum time to wait for another program that writes."""
 
+MOST_READING_S = 20.0
+"""Maximum time for a query, and for all checks of a ledger. A ledger of 1,000 trials needs less than a second."""
+
+_N_OPERATIONS = 100_000
+"""Number of operations of SQLite, some milliseconds, between two looks at the time and at Ctrl-C."""
+
+_SETTLED_S = 2.0
+"""Age of the last change [s] from which the times of files prove that nothing changed since."""
+
+_INDEX_HEAD = 48
+"""Bytes at the beginning of the index of recent writes, which differ after each change."""
+
+_checked: dict[Path, tuple[tuple[Any, ...], LedgerError | None]] = {}
+"""Result of the last check of each ledger, with the state of its files."""
+
 SYNCHRONOUS = "FULL"
 """Time at which SQLite waits for the disk: at every commit."""
-
-TABLES = """
-CREATE TABLE conditions (  -- a condition on a robot, as resolved
-    name TEXT PRIMARY KEY,
-    hash TEXT NOT NULL,
-    results_version INTEGER NOT NULL,
-    settings TEXT NOT NULL,  -- JSON
-    n_generations INTEGER NOT NULL,  -- of a whole run
-    n_cells INTEGER NOT NULL,  -- reachable ones
-    label TEXT  -- EMULATED or REAL, from its first trial on
-);
-CREATE TABLE sittings (  -- from opening a robot's port to closing it
-    id INTEGER PRIMARY KEY,
-    began TEXT NOT NULL,  -- UTC
-    ended TEXT,
-    label TEXT NOT NULL,
-    port TEXT NOT NULL,
-    robot TEXT NOT NULL,  -- JSON: model, fluke, name and versions
-    preflight TEXT NOT NULL  -- JSON
-);
-CREATE TABLE generations (
-    condition TEXT NOT NULL REFERENCES conditions(name),
-    replicate INTEGER NOT NULL,
-    generation INTEGER NOT NULL,
-    planned TEXT NOT NULL,  -- UTC
-    closed TEXT,  -- UTC; from then on its scores are frozen
-    PRIMARY KEY (condition, replicate, generation)
-);
-CREATE TABLE individuals (
-    condition TEXT NOT NULL,
-    replicate INTEGER NOT NULL,
-    generation INTEGER NOT NULL,
-    individual INTEGER NOT NULL,
-    species INTEGER NOT NULL,
-    parents TEXT NOT NULL,  -- JSON list
-    nodes INTEGER NOT NULL,  -- of the genome
-    genome TEXT NOT NULL,  -- JSON, the fields of the records' genome
-    key TEXT NOT NULL,  -- of the random numbers, as decimal digits
-    fitness REAL,  -- what selection used; with the next ones written when the generation is closed
-    novelty REAL,
-    trial INTEGER,  -- the trial whose score counted
-    score INTEGER,  -- that score
-    PRIMARY KEY (condition, replicate, generation, individual),
-    FOREIGN KEY (condition, replicate, generation) REFERENCES generations(condition, replicate, generation)
-);
-CREATE TABLE trials (
-    id INTEGER PRIMARY KEY,
-    condition TEXT NOT NULL,
-    replicate INTEGER NOT NULL,
-    generation INTEGER NOT NULL,
-    individual INTEGER NOT NULL,
-    attempt INTEGER NOT NULL,  -- 0, and one more for each trial that was void
-    place INTEGER NOT NULL,  -- when its turn comes: ascending
-    sheet INTEGER NOT NULL,  -- of paper
-    pen INTEGER NOT NULL,  -- on the sheet
-    code TEXT NOT NULL UNIQUE,  -- what the operator knows it by when scoring is blind
-    state TEXT NOT NULL CHECK (state IN ('planned', 'running', 'driven', 'scored', 'void')),
-    reason TEXT,  -- why it is void
-    end TEXT,  -- why it ended
-    problem TEXT,  -- what was said of it
-    n_steps INTEGER,
-    stalls INTEGER,
-    sitting INTEGER REFERENCES sittings(id),
-    started TEXT,  -- UTC
-    driven TEXT,  -- UTC
-    UNIQUE (condition, replicate, generation, individual, attempt),
-    FOREIGN KEY (condition, replicate, generation, individual)
-        REFERENCES individuals(condition, replicate, generation, individual)
-);
-CREATE TABLE steps (  -- a row is one command
-    trial INTEGER NOT NULL REFERENCES trials(id),
-    step INTEGER NOT NULL,
-    time REAL NOT NULL,  -- since the trial began [s]
-    raw TEXT NOT NULL,  -- JSON list, the robot's readings as they came
-    readings TEXT NOT NULL,  -- JSON list, scaled to 0..1
-    stalled INTEGER NOT NULL,
-    move REAL NOT NULL,
-    turn REAL NOT NULL,
-    PRIMARY KEY (trial, step)
-) WITHOUT ROWID;
-CREATE TABLE scores (  -- cells as somebody entered them
-    id INTEGER PRIMARY KEY,
-    trial INTEGER NOT NULL REFERENCES trials(id),
-    cells TEXT NOT NULL,  -- JSON list
-    n_ends INTEGER,  -- cells in which steps end, where something saw them
-    path TEXT,  -- JSON list of x [m], y [m], heading [rad] at quarters of steps, where something saw it
-    role TEXT NOT NULL CHECK (role IN ('score', 'second', 'correction')),
-    who TEXT NOT NULL,
-    time TEXT NOT NULL,  -- UTC
-    undone TEXT  -- UTC
-);
-CREATE TABLE notes (
-    id INTEGER PRIMARY KEY,
-    trial INTEGER REFERENCES trials(id),
-    text TEXT NOT NULL,
-    who TEXT NOT NULL,
-    time TEXT NOT NULL  -- UTC
-);
-CREATE TABLE events (  -- everything that changed a trial, in order
-    id INTEGER PRIMARY KEY,
-    time TEXT NOT NULL,  -- UTC
-    trial INTEGER REFERENCES trials(id),
-    what TEXT NOT NULL,
-    details TEXT NOT NULL  -- JSON
-);
-"""
-
-_NAMES = (
-    "conditions", "sittings", "generations", "individuals", "trials", "steps", "scores", "notes", "events"
-)  # fmt: skip
-
-_JSON = {
-    "conditions": ("settings",),
-    "sittings": ("robot", "preflight"),
-    "individuals": ("parents", "genome"),
-    "steps": ("raw", "readings"),
-    "scores": ("cells", "path"),
-    "events": ("details",),
-}
-"""Columns with JSON, which SQLite's own check does not look into."""
-
-_NO_DELETING = "".join(
-    f"CREATE TRIGGER {name}_stay BEFORE DELETE ON {name} "
-    "BEGIN SELECT RAISE(ABORT, 'nothing is ever deleted from a ledger'); END;\n"
-    for name in _NAMES
-)
-
-_FROZEN = """
-CREATE TRIGGER closed_generations_stay BEFORE UPDATE ON generations WHEN OLD.closed IS NOT NULL
-BEGIN SELECT RAISE(ABORT, 'the generation is closed'); END;
-CREATE TRIGGER closed_individuals_stay BEFORE UPDATE ON individuals WHEN OLD.fitness IS NOT NULL
-BEGIN SELECT RAISE(ABORT, 'the generation is closed'); END;
-"""
-
-
-def ledger_tables() -> dict[str, str]:
-    """Return the SQL of each table, with remarks on columns that need one."""
-    parts = [part.strip() + ";" for part in TABLES.split(";\n") if part.strip()]
-    return {part.split()[2]: part for part in parts}
 
 
 def create_file(path: Path) -> None:
@@ -186,8 +59,8 @@ def create_file(path: Path) -> None:
             connection = sqlite3.connect(temporary, isolation_level=None)
             try:
                 connection.executescript(
-                    f"PRAGMA synchronous = {SYNCHRONOUS}; PRAGMA application_id = {_APPLICATION}; "
-                    f"PRAGMA user_version = {LEDGER_FORMAT};\nBEGIN;{TABLES}{_NO_DELETING}{_FROZEN}COMMIT;"
+                    f"PRAGMA synchronous = {SYNCHRONOUS}; PRAGMA application_id = {APPLICATION}; "
+                    f"PRAGMA user_version = {LEDGER_FORMAT};\nBEGIN;{SCHEMA}COMMIT;"
                 )
                 connection.execute("PRAGMA journal_mode = WAL")
             finally:
@@ -222,13 +95,53 @@ def connect(path: Path, *, writable: bool) -> sqlite3.Connection:
             connection.row_factory = sqlite3.Row
             connection.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, MOST_TEXT_BYTES)
             connection.execute("PRAGMA trusted_schema = OFF")
-            _check(connection, path)
+            _check_once(connection, path)
             connection.execute("PRAGMA foreign_keys = ON")
             connection.execute(f"PRAGMA synchronous = {SYNCHRONOUS}")
         except BaseException:
             connection.close()
             raise
     return connection
+
+
+def ledger_stamp(path: Path) -> tuple[Any, ...]:
+    """Return a value that changes with the readable part of the ledger; empty if there is no ledger.
+
+    Files change before what was written to them can be read, by as long as the disk takes to keep it: so the head of
+    the index is looked at, which SQLite writes last, and by which it knows itself that there is something new
+    (sqlite.org/walformat.html, section 2.1).
+    """
+    found: list[Any] = []
+    for ending in ("", "-wal"):
+        with contextlib.suppress(OSError):
+            status = path.with_name(path.name + ending).stat()
+            found.append((ending, status.st_dev, status.st_ino, status.st_mtime_ns, status.st_size))
+    with contextlib.suppress(OSError), path.with_name(path.name + "-shm").open("rb") as index:
+        found.append(index.read(_INDEX_HEAD))
+    return tuple(found)
+
+
+def _check_once(connection: sqlite3.Connection, path: Path) -> None:
+    """Check a ledger unless this program has checked it since its last change.
+
+    Raises:
+        LedgerError: It is foreign or damaged, or its checks take too long.
+    """
+    stamp = ledger_stamp(path)
+    known, error = _checked.get(path, ((), None))
+    if known != stamp:
+        error = None
+        try:
+            with speaking(path, connection):
+                check_ledger(connection, path)
+        except LedgerError as raised:
+            if isinstance(raised.__cause__, sqlite3.Error):  # such as a lock, which may be gone the next time
+                raise
+            error = raised
+        if time.time() - path.stat().st_mtime > _SETTLED_S:
+            _checked[path] = (stamp, error)
+    if error is not None:
+        raise type(error)(str(error))
 
 
 def _address(path: Path, *, writable: bool) -> str:
@@ -241,84 +154,36 @@ def _address(path: Path, *, writable: bool) -> str:
     return path.resolve().as_uri() + "?mode=ro"
 
 
-def _check(connection: sqlite3.Connection, path: Path) -> None:
-    (application,) = connection.execute("PRAGMA application_id").fetchone()
-    (version,) = connection.execute("PRAGMA user_version").fetchone()
-    if application != _APPLICATION:
-        raise LedgerError(
-            f"{path} is {'empty' if not path.stat().st_size else 'not a ledger of realitygap'}, and was not "
-            "changed. Restore the ledger from a copy, or move the file elsewhere."
-        )
-    if version != LEDGER_FORMAT:
-        raise RecordVersionError(
-            f"{path} is a ledger of format {version}; this realitygap reads format {LEDGER_FORMAT}. Use the version "
-            "that wrote it."
-        )
-    (said,) = connection.execute("PRAGMA quick_check(1)").fetchone()
-    if said != "ok":
-        raise LedgerError(_torn(path, str(said)))
-    _check_schema(connection, path)
-    _check_types(connection, path)
-    _check_json(connection, path)
-
-
-def _check_schema(connection: sqlite3.Connection, path: Path) -> None:
-    """Refuse what could run when the ledger is read or written: views, virtual tables and foreign triggers."""
-    ours = {part.strip() for part in (_NO_DELETING + _FROZEN).split("END;")}
-    for kind, name, sql in connection.execute("SELECT type, name, sql FROM sqlite_schema"):
-        is_table = kind == "table" and not str(sql).upper().startswith("CREATE VIRTUAL")
-        is_our_trigger = kind == "trigger" and str(sql).removesuffix("END").strip() in ours
-        if not (is_table or is_our_trigger or kind == "index"):
-            raise LedgerError(_torn(path, f"it has a {kind} {str(name)[:60]!r} that realitygap did not make"))
-
-
-def _check_json(connection: sqlite3.Connection, path: Path) -> None:
-    """Refuse texts that are no JSON."""
-    for table, columns in _JSON.items():
-        broken = " OR ".join(f"NOT json_valid(coalesce({column}, 'null'))" for column in columns)
-        if connection.execute(f"SELECT 1 FROM {table} WHERE {broken} LIMIT 1").fetchone():
-            raise LedgerError(_torn(path, f"a text in its table {table} is not JSON, or is too deep"))
-
-
-def _check_types(connection: sqlite3.Connection, path: Path) -> None:
-    """Refuse values of another type than their columns have, which SQLite itself allows."""
-    for table, types in _types().items():
-        wrong = " OR ".join(f"typeof({name}) NOT IN ('{kind}', 'null')" for name, kind in types.items())
-        if connection.execute(f"SELECT 1 FROM {table} WHERE {wrong} LIMIT 1").fetchone():
-            raise LedgerError(_torn(path, f"a value in its table {table} is of another type than its column"))
-
-
-@functools.cache
-def _types() -> dict[str, dict[str, str]]:
-    """Return the type of each column of each table, as SQLite calls those of values."""
-    with contextlib.closing(sqlite3.connect(":memory:")) as connection:
-        connection.executescript(TABLES)
-        columns = {name: connection.execute(f"PRAGMA table_info({name})").fetchall() for name in _NAMES}
-    return {table: {row[1]: str(row[2]).lower() for row in rows} for table, rows in columns.items()}
-
-
-def _torn(path: Path, said: str) -> str:
-    return (
-        f"{path} is torn ({said.strip()}), and was not changed. Restore it, with the files {path.name}-wal and "
-        f"{path.name}-shm next to it, from a copy; `sqlite3 {path} .recover` saves the readable part."
-    )
-
-
 @contextlib.contextmanager
-def speaking(path: Path) -> Iterator[None]:
-    """Turn what SQLite and the system say of a ledger into one message.
+def speaking(path: Path, connection: sqlite3.Connection | None = None) -> Iterator[None]:
+    """Turn errors of SQLite and the system into one message.
+
+    Args:
+        path: The ledger.
+        connection: Connection that only reads in the block, and therefore ends after `MOST_READING_S`, or with Ctrl-C.
 
     Raises:
+        KeyboardInterrupt: Ctrl-C ended a query.
         LedgerError: in place of an `sqlite3.Error` or an `OSError`.
     """
+    ends = time.monotonic() + MOST_READING_S
+    if connection is not None:
+        connection.set_progress_handler(lambda: time.monotonic() > ends, _N_OPERATIONS)
     try:
         yield
     except sqlite3.IntegrityError as error:
         raise LedgerError(f"{path} does not allow that: {error}. Nothing was changed.") from error
     except sqlite3.OperationalError as error:
+        if _name_of(error) == "SQLITE_INTERRUPT":
+            if time.monotonic() <= ends:  # Python dropped the exception that came out of the handler
+                raise KeyboardInterrupt from None
+            raise LedgerError(
+                f"{path} cannot be read within {MOST_READING_S:.0f} s, expected less than a second. Is it somebody "
+                "else's file? Move it elsewhere, or restore it from a copy."
+            ) from None
         raise LedgerError(_explain(path, error)) from error
     except (sqlite3.DatabaseError, UnicodeDecodeError) as error:
-        raise LedgerError(_torn(path, str(error))) from error
+        raise LedgerError(damaged(path, str(error))) from error
     except OverflowError as error:
         raise LedgerError(
             f"{path} cannot hold a number beyond 64 bits ({error}). Nothing was changed."
@@ -327,10 +192,14 @@ def speaking(path: Path) -> Iterator[None]:
         raise LedgerError(
             f"Could not write {path}: {error.strerror or error}. Earlier data are safe."
         ) from error
+    finally:
+        if connection is not None:
+            with contextlib.suppress(sqlite3.ProgrammingError):  # it is closed
+                connection.set_progress_handler(None, 0)
 
 
 def _explain(path: Path, error: sqlite3.OperationalError) -> str:
-    name = getattr(error, "sqlite_errorname", "")
+    name = _name_of(error)
     safe = "All that was written before is safe"
     if name.startswith(("SQLITE_BUSY", "SQLITE_LOCKED")):
         return (
@@ -345,5 +214,10 @@ def _explain(path: Path, error: sqlite3.OperationalError) -> str:
     if name.startswith(("SQLITE_READONLY", "SQLITE_CANTOPEN", "SQLITE_PERM")):
         return f"Could not write {path}: {error}. {safe}. Make the folder writable for this account."
     if name.startswith(("SQLITE_CORRUPT", "SQLITE_NOTADB")) or "Could not decode" in str(error):
-        return _torn(path, str(error))
+        return damaged(path, str(error))
     return f"{path}: {error}. {safe}."
+
+
+def _name_of(error: sqlite3.Error) -> str:
+    """Return SQLite's name of an error; empty if Python raised it itself."""
+    return str(getattr(error, "sqlite_errorname", ""))

@@ -24,10 +24,11 @@ from realitygap.records._trial_record import TrialRecord
 from realitygap.settings import shown
 
 _TRIALS = """
-SELECT trials.*, generations.closed IS NOT NULL AS is_closed, (
-    SELECT cells FROM scores WHERE trial = trials.id AND role = 'score' AND undone IS NULL ORDER BY id DESC LIMIT 1
-) AS cells
+SELECT trials.*, generations.closed IS NOT NULL AS is_closed, counted.cells
 FROM trials JOIN generations USING (condition, replicate, generation)
+    LEFT JOIN (
+        SELECT trial, cells, max(id) FROM scores WHERE role = 'score' AND undone IS NULL GROUP BY trial
+    ) AS counted ON counted.trial = trials.id
 """
 
 
@@ -216,12 +217,12 @@ class LedgerReader(ClosedOnExit, ShownAsCard):
         return self._connection.execute(command, values).rowcount
 
     def _one(self, query: str, *values: Any) -> sqlite3.Row | None:
-        with speaking(self.path):
+        with speaking(self.path, self._connection):
             row: sqlite3.Row | None = self._connection.execute(query, values).fetchone()
             return row
 
     def _all(self, query: str, *values: Any) -> list[sqlite3.Row]:
-        with speaking(self.path):
+        with speaking(self.path, self._connection):
             return self._connection.execute(query, values).fetchall()
 
     def _trial(self, row: sqlite3.Row) -> Trial:

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-import shutil
 import sqlite3
-import warnings
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -20,7 +18,7 @@ from realitygap.errors import LedgerError, RealityGapError
 from realitygap.lab._counts import Counts
 from realitygap.lab._studies import Studies
 from realitygap.records import LEDGER_NAME, Ledger, ResultsFolder, Score, ledger_tables
-from realitygap.report import summarize, write_report
+from realitygap.report import summarize
 from realitygap.report._driven import describe_driven, driven_paths, read_driven
 from realitygap.study import run_study
 from realitygap.study._trial_bags import _driven, _trial
@@ -109,7 +107,7 @@ def mutants(rows: Rows) -> Iterator[tuple[str, Rows]]:
 def read_everywhere(study: Path) -> None:
     """Read the ledger as commands and pages do. Each ends in success, or in one of our errors."""
     for what, *options in (("list",), ("list", "--json"), ("agreement",)):
-        done = CliRunner().invoke(TRIALS, [what, str(study), *options])
+        done = CliRunner().invoke(TRIALS, ["trials", what, str(study), *options])
         if done.exception is not None and not isinstance(done.exception, RealityGapError):
             raise done.exception
     folder = ResultsFolder.open(study)

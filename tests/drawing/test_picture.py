@@ -49,7 +49,7 @@ def test_lines_can_be_closed_filled_and_dashed():
 def test_hostile_text_stays_text():
     evil = "<script>\"'& \x07 \ud800"
     root = ET.fromstring(picture(Text(0, 0, evil), title=evil, description=evil).to_svg())
-    assert root.find(f"{SVG}text").text == "<script>\"'&  "
+    assert root.find(f"{SVG}text").text == "<script>\"'& \ufffd \ufffd"
     assert not [each for each in root.iter() if each.tag.endswith("script")]
 
 

@@ -214,7 +214,11 @@ def test_foreign_schema_is_refused_before_any_row_is_read(tmp_path):
         "a CHECK constraint": ("conditions", "hash TEXT NOT NULL", f"hash TEXT NOT NULL CHECK {SLOW}"),
         "a default": ("conditions", "label TEXT", "label TEXT DEFAULT 'REAL'"),
         "a collation": ("conditions", "name TEXT", "name TEXT COLLATE NOCASE"),
-        "no constraint": ("trials", " CHECK (state IN ('planned', 'running', 'driven', 'scored', 'void'))", ""),
+        "no constraint": (
+            "trials",
+            " CHECK (state IN ('planned', 'running', 'driven', 'scored', 'void'))",
+            "",
+        ),
         "a comment of another form": ("notes", "text TEXT", f"text TEXT /* -- */ CHECK {SLOW} /*\n*/"),
         "a comment in a text": ("trials", "'planned'", "'plan--' OR 1 OR '\nned'"),
         "a space of another kind": ("notes", "text TEXT", "text\xa0TEXT"),

@@ -13,6 +13,7 @@ import warnings
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
+from realitygap._foreign_text import printable
 from realitygap._interrupts import kept_interrupts
 from realitygap._stack import on_wide_stack
 from realitygap._version import __version__
@@ -43,13 +44,9 @@ def __getattr__(name: str) -> Any:
 
 
 def _print_error(message: str) -> None:
-    """Print a message; what files put into it cannot control the terminal."""
-    message = "".join(
-        letter if letter == "\n" or letter.isprintable() else letter.encode("unicode_escape").decode()
-        for letter in message
-    )
+    """Print a message."""
     with contextlib.suppress(OSError, ValueError, AttributeError):  # closed, or None
-        print(f"realitygap: {message}", file=sys.stderr, flush=True)
+        print(f"realitygap: {printable(message)}", file=sys.stderr, flush=True)  # noqa: T201
 
 
 def _show_warning(message: Warning | str, *_: object, **__: object) -> None:
@@ -151,10 +148,10 @@ def _run_command() -> None:
             words = os.environ.get("COMP_WORDS") or os.environ.get("_TYPER_COMPLETE_ARGS") or ""
             app_to_complete(words.split()[1:])()
         if not arguments or arguments in (["-h"], ["--help"]):
-            print(root_help(shutil.get_terminal_size().columns), end="")
+            print(root_help(shutil.get_terminal_size().columns), end="")  # noqa: T201
             sys.exit(0 if arguments else 2)
         if arguments == ["--version"]:
-            print(f"realitygap {__version__}")
+            print(f"realitygap {__version__}")  # noqa: T201
             return
         from ._app import app_for
 

@@ -14,6 +14,8 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperCommand, TyperGroup
 
+from realitygap._foreign_text import printable
+from realitygap._terminal import echo
 from realitygap._version import __version__
 from realitygap.kernels.compile.progress import report_compiling
 
@@ -42,10 +44,12 @@ class _RootGroup(TyperGroup):
 
             if isinstance(error.__cause__, ValidationError):
                 error.message += f", got {error.__cause__.errors()[0]['input']!r}"
+            _make_printable(error)
             raise
         except Exception as error:
             _drop_far_suggestions(error)
             _refer_to_the_study_file(error)
+            _make_printable(error)
             raise
 
 
@@ -66,6 +70,12 @@ def _refer_to_the_study_file(error: Any) -> None:
             f"No such option: {error.option_name}. It is a setting of the study file. Copy one and change it: "
             "realitygap new-study my-study.toml --from paper"
         )
+
+
+def _make_printable(error: Any) -> None:
+    """Let no argument control the terminal; a shell may have completed it from the names of files."""
+    if hasattr(error, "format_message"):
+        error.message = printable(str(error.message))
 
 
 def _example_of(command: Any) -> str:
@@ -184,7 +194,7 @@ def app_to_complete(words: Sequence[str]) -> typer.Typer:
 
 def _version(wanted: bool) -> None:
     if wanted:
-        typer.echo(f"realitygap {__version__}")
+        echo(f"realitygap {__version__}")
         raise typer.Exit
 
 
@@ -194,4 +204,4 @@ def _root(
     ] = False,
 ) -> None:
     if sys.stderr is not None and sys.stderr.isatty():
-        report_compiling(functools.partial(typer.echo, err=True))
+        report_compiling(functools.partial(echo, err=True))

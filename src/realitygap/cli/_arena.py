@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 
+from realitygap._terminal import echo
 from realitygap.errors import StudyError
 
 _ONLY_FROM_MAP = "Only from a map"
@@ -92,7 +93,7 @@ def arena(
     found = arena_of_map(source, _pose(start), tolerance=tolerance) if is_map else load_arena(source)
     if is_to_map:
         image = save_map(found, out, **({} if resolution is None else {"resolution": resolution}))
-        typer.echo(f"Written: {out} and {image.name}")
+        echo(f"Written: {out} and {image.name}")
         return
     try:
         text = found.to_toml()
@@ -100,7 +101,7 @@ def arena(
         raise StudyError(str(error)) from None
     write_whole(out, text.encode())
     x, y, heading = found.start
-    typer.echo(
+    echo(
         f"Written: {out} ({len(found.walls)} walls, start {x:.3g}, {y:.3g} m, {math.degrees(heading):.3g} degrees). "
         f"Draw it: realitygap show arena {shlex.quote(str(out))} -o {shlex.quote(str(out.with_suffix('.svg')))}"
     )

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from realitygap._terminal import echo
+
 from ._json import print_json
 
 if TYPE_CHECKING:
@@ -50,20 +52,19 @@ def audit_results(
 def _tell(progress: AuditProgress) -> None:
     """Print a line for each two conditions of a table that takes its time."""
     if progress.n_runs >= MANY_RUNS:
-        typer.echo(f"Comparing pair {progress.n_done + 1} of {progress.n_pairs} ...", err=True)
+        echo(f"Comparing pair {progress.n_done + 1} of {progress.n_pairs} ...", err=True)
 
 
 def _print(audit: Audit, path: Path) -> None:
-    from rich.console import Console
-
+    from realitygap._console import PlainConsole
     from realitygap.report import audit_notes
 
     from ._audit_tables import conditions_table, doubtful_table, pairs_table
 
-    console = Console()
+    console = PlainConsole()
     console.print(conditions_table(audit, str(path)))
     if audit.doubtful:
         console.print(doubtful_table(audit))
     console.print(pairs_table(audit))
     for note in audit_notes(audit):
-        typer.echo(note)
+        echo(note)

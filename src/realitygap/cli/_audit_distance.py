@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 
 import typer
 
+from realitygap._terminal import echo
 from realitygap.errors import RealityGapError
 
 from ._json import print_json
@@ -77,6 +78,6 @@ def audit_distance(
     else:
         width = min(shutil.get_terminal_size().columns, WIDEST)
         for note in distance_notes(audit):
-            typer.echo(textwrap.fill(note, width, subsequent_indent="  ", break_on_hyphens=False))
+            echo(textwrap.fill(note, width, subsequent_indent="  ", break_on_hyphens=False))
         if path is not None:
-            typer.echo(f"Written: {path}")
+            echo(f"Written: {path}")

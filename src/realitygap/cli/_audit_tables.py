@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from rich.table import Table
-from rich.text import Text
 
 from realitygap._numbers import significant
 
@@ -95,4 +94,4 @@ def _columns(table: Table, words: list[str], numbers: list[str]) -> None:
 
 
 def _row(table: Table, *cells: str) -> None:
-    table.add_row(*(Text(cell) for cell in cells))
+    table.add_row(*cells)

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 import typer
 
 from realitygap._limits import parse_toml
+from realitygap._terminal import echo
 from realitygap.errors import StudyError, did_you_mean
 
 from ._json import print_json
@@ -179,15 +180,15 @@ def _bench_task(
         "mean_generalization": "mean generalization, of 625",
         "sd_generalization": "its standard deviation",
     }
-    typer.echo(f"{task}, {figures['settings']}, seed {seed}")
-    typer.echo(f"{'':28} {'ours':>10} {'published':>10}")
+    echo(f"{task}, {figures['settings']}, seed {seed}")
+    echo(f"{'':28} {'ours':>10} {'published':>10}")
     ours = f"{figures['solved']} of {seeds}"
     source = f"{published['solved']} of {published['n']}"
-    typer.echo(f"{'solved':28} {ours:>10} {source:>10}")
+    echo(f"{'solved':28} {ours:>10} {source:>10}")
     for key, name in names.items():
         if key in figures:
-            typer.echo(f"{name:28} {_shown(key, figures[key]):>10} {_shown(key, published.get(key)):>10}")
-    typer.echo(f"Published: {published['source']}.")
+            echo(f"{name:28} {_shown(key, figures[key]):>10} {_shown(key, published.get(key)):>10}")
+    echo(f"Published: {published['source']}.")
 
 
 def _bench_maze(
@@ -211,10 +212,8 @@ def _bench_maze(
         return
     columns = [figures["novelty"], figures["novelty"]["published"]]
     columns += [figures["objective"], figures["objective"]["published"]]
-    typer.echo(f"{task}, {figures['settings']}, seed {seed}; at most {figures['limit']:,} evaluations a run")
-    typer.echo(
-        f"{'':20}" + "".join(f"{name:>12}" for name in ("novelty", "published", "objective", "published"))
-    )
+    echo(f"{task}, {figures['settings']}, seed {seed}; at most {figures['limit']:,} evaluations a run")
+    echo(f"{'':20}" + "".join(f"{name:>12}" for name in ("novelty", "published", "objective", "published")))
     names = {
         "solved": "solved",
         "seeds": "of so many runs",
@@ -223,8 +222,8 @@ def _bench_maze(
         "sd_evaluations": "standard deviation",
     }
     for key, name in names.items():
-        typer.echo(f"{name:20}" + "".join(f"{_shown(key, column.get(key)):>12}" for column in columns))
-    typer.echo(f"Published: {figures['source']}.")
+        echo(f"{name:20}" + "".join(f"{_shown(key, column.get(key)):>12}" for column in columns))
+    echo(f"Published: {figures['source']}.")
 
 
 def _shown(key: str, value: float | None) -> str:
@@ -245,11 +244,11 @@ def _bench_realism(seconds: float, *, as_json: bool) -> None:
         "pressed": "pressed into walls",
         "boxes": "avoiding, two boxes",
     }
-    typer.echo(f"{'one core':28} {'robot-steps/s':>14} {'per GFlop':>12} {'stalled':>8}")
+    echo(f"{'one core':28} {'robot-steps/s':>14} {'per GFlop':>12} {'stalled':>8}")
     for key, name in names.items():
         stalled, per_gflop = figures["stalled"][key], figures["per_gflop"][key]
-        typer.echo(f"{name:28} {figures[key]:>14,.0f} {per_gflop:>12,.0f} {stalled:>8.1%}")
-    typer.echo(_PEAK.format(figures["peak_gflops"]))
+        echo(f"{name:28} {figures[key]:>14,.0f} {per_gflop:>12,.0f} {stalled:>8.1%}")
+    echo(_PEAK.format(figures["peak_gflops"]))
 
 
 def _bench_speed(seconds: float, *, as_json: bool) -> None:
@@ -268,12 +267,10 @@ def _bench_speed(seconds: float, *, as_json: bool) -> None:
     }
     for key, name in names.items():
         one, all_cores = figures[key]["per_core"], figures[key]["all_cores"]
-        typer.echo(
-            f"{name:38} {one:14,.0f} a core {all_cores:14,.0f} on all {figures['machine']['processors']}"
-        )
-    typer.echo(f"{'robot-steps per GFlop of peak':38} {figures['robot_steps_per_gflop']:14,.0f} a core")
-    typer.echo(_PEAK.format(figures["peak_gflops"]))
-    typer.echo(f"{figures['neat_share']:.0%} of a paper run is NEAT and records, the rest its trials")
-    typer.echo(
+        echo(f"{name:38} {one:14,.0f} a core {all_cores:14,.0f} on all {figures['machine']['processors']}")
+    echo(f"{'robot-steps per GFlop of peak':38} {figures['robot_steps_per_gflop']:14,.0f} a core")
+    echo(_PEAK.format(figures["peak_gflops"]))
+    echo(f"{figures['neat_share']:.0%} of a paper run is NEAT and records, the rest its trials")
+    echo(
         f"{figures['machine']['processor']}; " + ", ".join(f"{k} {v}" for k, v in figures["versions"].items())
     )

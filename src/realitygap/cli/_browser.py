@@ -5,7 +5,7 @@ from __future__ import annotations
 import webbrowser
 from pathlib import Path
 
-import typer
+from realitygap._terminal import echo
 
 
 def show_page(path: Path) -> None:
@@ -16,4 +16,4 @@ def show_page(path: Path) -> None:
     except (webbrowser.Error, OSError):
         opened = False
     if not opened:
-        typer.echo(f"realitygap: note: no browser could be opened here. The page is at {address}", err=True)
+        echo(f"realitygap: note: no browser could be opened here. The page is at {address}", err=True)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from realitygap._terminal import draw, echo
 from realitygap.errors import DescriptionError, StudyError
 
 from ._camera import CAMERA_HELP, under_camera
@@ -383,10 +384,10 @@ def _measured(
                 tell=None if quiet or operator is not None else _tell,
             )
     except StoppedByPerson:
-        typer.echo(again, err=True)
+        echo(again, err=True)
         raise typer.Exit(0) from None
     except KeyboardInterrupt:
-        typer.echo(f"Interrupted. {again}", err=True)
+        echo(f"Interrupted. {again}", err=True)
         raise typer.Exit(130) from None
 
 
@@ -399,7 +400,8 @@ def _is_led(robot: str, witness: str | None) -> bool:
 
 def _tell(done: int, n: int) -> None:
     if sys.stderr.isatty():
-        typer.echo(f"\r{done} of {n} trials", nl=done == n, err=True)
+        draw("\r", err=True)
+        echo(f"{done} of {n} trials", nl=done == n, err=True)
 
 
 def _print(made: Calibration, out: Path, figure: Path | None, *, as_json: bool) -> None:
@@ -415,16 +417,16 @@ def _print(made: Calibration, out: Path, figure: Path | None, *, as_json: bool) 
     if made.held_out:
         console.print(held_out_table(made.held_out, made.label))
     for note in made.remarks:
-        console.print(note, highlight=False, markup=False)
+        console.print(note)
     if made.misspecified:
         p = f" (p {made.misspecification_p:.3f})" if made.misspecification_p < 1 else ""
-        typer.echo(
+        echo(
             f"The simulator cannot make what was observed{p}: what was fitted is the nearest that it can do."
         )
     for line in sorted(
         {f"{each.name.rpartition('.')[2]}: {each.advice}" for each in made.fitted if each.advice}
     ):
-        typer.echo(f"Not identified: {line}")
+        echo(f"Not identified: {line}")
     if figure is not None:
-        typer.echo(f"Figure: {figure}")
-    typer.echo(f"Written: {out}. Simulate it with platform sim:{shlex.quote(str(out))}")
+        echo(f"Figure: {figure}")
+    echo(f"Written: {out}. Simulate it with platform sim:{shlex.quote(str(out))}")

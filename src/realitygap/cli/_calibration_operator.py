@@ -6,8 +6,7 @@ import sys
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-import typer
-
+from realitygap._terminal import echo
 from realitygap.errors import StudyError
 from realitygap.trials import Operator
 
@@ -37,7 +36,7 @@ class CalibrationOperator(Operator):
         robot: RobotModel,
         *,
         ask: Callable[[str], str] | None = None,
-        say: Callable[[str], None] = typer.echo,
+        say: Callable[[str], None] = echo,
     ) -> None:
         super().__init__()
         self._arena = arena
@@ -104,5 +103,5 @@ def _ask_at_terminal(question: str) -> str:
             "There is no terminal in which to lead you through the trials. Name the witness of an emulator (--witness "
             "HOST:PORT), or fit what was recorded before (--from FILE)."
         )
-    typer.echo(question, nl=False)
+    echo(question, nl=False)
     return read_line()

@@ -6,8 +6,7 @@ import contextlib
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-import typer
-
+from realitygap._terminal import echo
 from realitygap.errors import StudyError
 
 if TYPE_CHECKING:
@@ -78,7 +77,7 @@ def operated_under_camera(spec: str | None, study: Study, operator: Operator) ->
     arena = physical_conditions(study)[0].arena.arena()
     number, marks = parse_camera(spec, arena)
     with LiveTrack(CameraDevice(number), marks) as live:
-        operator.observer = CameraObserver(live, arena, say=lambda text: typer.echo(text, err=True))
+        operator.observer = CameraObserver(live, arena, say=lambda text: echo(text, err=True))
         yield operator
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from realitygap._terminal import echo
 from realitygap.errors import StudyError, did_you_mean
 
 from ._json import print_json
@@ -140,7 +141,7 @@ def _run(plan: ClosingPlan, folder: Path, processes: int | None, *, as_json: boo
         # a line each minute, or where much is done
         if progress.n_done != told[1] and (progress.seconds - told[0] >= 60 or told[1] < 0):
             told[:] = [progress.seconds, progress.n_done]
-            typer.echo(
+            echo(
                 f"{progress.n_done} of {progress.n_units} parts are done, after {progress.seconds / 60:.0f} minutes.",
                 err=True,
             )
@@ -148,14 +149,14 @@ def _run(plan: ClosingPlan, folder: Path, processes: int | None, *, as_json: boo
     try:
         summary = closing_the_gap(folder, plan, processes=processes, tell=tell)
     except KeyboardInterrupt:
-        typer.echo("Interrupted. Finished parts are saved. Run the same command to resume.", err=True)
+        echo("Interrupted. Finished parts are saved. Run the same command to resume.", err=True)
         raise typer.Exit(130) from None
     page = write_closing_page(summary, folder / "report.html")
     if as_json:
         print_json({**summary, "folder": folder, "report": page})
     else:
         _print(summary)
-        typer.echo(f"Results: {folder}   report: {page}")
+        echo(f"Results: {folder}   report: {page}")
     if open_page:
         from ._browser import show_page
 
@@ -167,19 +168,19 @@ def _print(summary: dict[str, Any]) -> None:
 
     of, label = len(summary["twins"]), summary["label"]
     if summary["plan"]["platforms"]:
-        typer.echo(f"{of} sitting{'s' * (of != 1)} ({label}), each with its own held-out controllers")
+        echo(f"{of} sitting{'s' * (of != 1)} ({label}), each with its own held-out controllers")
     else:
-        typer.echo(
+        echo(
             f"{of} twins ({label}), of which {summary['n_counted']} differ from the simulator (SIM) by more than three "
             "standard errors"
         )
-    typer.echo(f"{'goal':52}{'wanted':>16}{'figure':>9}{'95 % interval':>18}{'n':>9}  verdict")
+    echo(f"{'goal':52}{'wanted':>16}{'figure':>9}{'95 % interval':>18}{'n':>9}  verdict")
     for name, wanted, figure, span, n, verdict in goal_table(summary):
-        typer.echo(f"{name:52}{wanted:>16}{figure:>9}{span:>18}{n:>9}  {verdict}")
+        echo(f"{name:52}{wanted:>16}{figure:>9}{span:>18}{n:>9}  {verdict}")
     for sentence in not_counted(summary):
-        typer.echo(sentence)
+        echo(sentence)
     if not summary["plan"]["platforms"]:
-        typer.echo(SELECTION_NOTE)
+        echo(SELECTION_NOTE)
 
 
 def _listed(text: str, option: str, known: Any) -> tuple[str, ...]:

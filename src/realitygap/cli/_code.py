@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from realitygap._terminal import echo
 from realitygap.errors import TaskError
 
 from ._keys import read_line
@@ -74,13 +75,13 @@ def _ask(task: PythonTask) -> None:
 
     # `splitlines` also splits at letters that do not end a line of Python.
     lines = task.source.removesuffix("\n").split("\n")
-    typer.echo(
+    echo(
         f"This study runs {task.function_name} of {visible(task.file)}, which you have not allowed before:\n",
         err=True,
     )
     for number, line in enumerate(lines, 1):
-        typer.echo(f"{number:5d}  {visible(line)}", err=True)
-    typer.echo(
+        echo(f"{number:5d}  {visible(line)}", err=True)
+    echo(
         f"\n{visible(task.file)}: {len(lines)} lines, SHA-256 {task.sha256}\nThis code, and the modules that "
         "it imports, can do everything on this machine that you can do.\nRun it? [y/N] ",
         err=True,
@@ -91,4 +92,4 @@ def _ask(task: PythonTask) -> None:
     try:
         remember_allowed(task.sha256, task.file)
     except (OSError, RuntimeError) as error:
-        typer.echo(f"realitygap: note: the answer cannot be saved: {error}.", err=True)
+        echo(f"realitygap: note: the answer cannot be saved: {error}.", err=True)

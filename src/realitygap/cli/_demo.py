@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 
 from realitygap._how_to_run import launcher
+from realitygap._terminal import echo
 from realitygap.errors import StudyError
 
 from ._browser import show_page
@@ -39,17 +40,17 @@ def demo(
     """
     folder = _made(out)
     steps = _steps(folder)
-    typer.echo(f"The results go to {folder}.")
+    echo(f"The results go to {folder}.")
     try:
         for number, (purpose, commands) in enumerate(steps, 1):
-            typer.echo(f"\nStep {number} of {len(steps)}: {purpose}")
+            echo(f"\nStep {number} of {len(steps)}: {purpose}")
             for words in commands:
-                typer.echo(f"$ realitygap {shlex.join(words)}")
+                echo(f"$ realitygap {shlex.join(words)}")
                 _run(words)
     except KeyboardInterrupt:
-        typer.echo(f"Interrupted. The results of the finished commands are in {folder}.", err=True)
+        echo(f"Interrupted. The results of the finished commands are in {folder}.", err=True)
         raise typer.Exit(130) from None
-    typer.echo(
+    echo(
         f"\nThe results of this tour are in {folder}:\n"
         "  paper/report.html   report of the study: figures, tables, and trials to play\n"
         "  champion.gif        film of the controller in simulation\n"

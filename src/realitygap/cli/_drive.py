@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from realitygap._terminal import echo
+
 from ._browser import show_page
 from ._camera import CAMERA_HELP, operated_under_camera
 from ._code import ALLOW_CODE_HELP, code_permission
@@ -99,7 +101,7 @@ def drive(
                 resolved, port, path, operator=looking, allow_code=code_permission(allow_code)
             )
     except KeyboardInterrupt:
-        typer.echo("Interrupted. Scored trials are saved. Run the same command to resume.", err=True)
+        echo("Interrupted. Scored trials are saved. Run the same command to resume.", err=True)
         raise typer.Exit(130) from None
     print_result(result, as_json=as_json)
     if open_page:

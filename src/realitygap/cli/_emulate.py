@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from realitygap._terminal import echo
 from realitygap.errors import RobotError
 
 if TYPE_CHECKING:
@@ -176,12 +177,12 @@ def _emulate_thymio(
         PlaygroundServer(playground, witness) as server,
         _ended_by_signals(server),
     ):
-        typer.echo(f"thymio:{playground.port}")
+        echo(f"thymio:{playground.port}")
         if server.witness_address:
-            typer.echo(f"witness {server.witness_address}")
+            echo(f"witness {server.witness_address}")
         sys.stdout.flush()
         if not quiet:
-            typer.echo(LACKS, err=True)
+            echo(LACKS, err=True)
         server.run()
 
 
@@ -208,9 +209,9 @@ def _serve(
         stack.enter_context(server)
         if command is None:
             stack.enter_context(_ended_by_signals(server))
-        typer.echo(server.name)
+        echo(server.name)
         if server.witness_address:
-            typer.echo(f"witness {server.witness_address}")
+            echo(f"witness {server.witness_address}")
         sys.stdout.flush()
         if command is not None:
             raise typer.Exit(_run(server, command))

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
+from realitygap._terminal import echo
 from realitygap.errors import RealityGapError, StudyError
 
 if TYPE_CHECKING:
@@ -94,7 +95,7 @@ def export(
             path = export_individual(what, out, **cast("Any", which | numbers))
     except ValueError as error:
         raise RealityGapError(str(error)) from error
-    typer.echo(f"Written: {path}")
+    echo(f"Written: {path}")
 
 
 def _folder(what: str, name: str | None, numbers: Mapping[str, object]) -> str:

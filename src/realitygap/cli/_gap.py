@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from realitygap._terminal import echo
 from realitygap._wording import p_equation
 from realitygap.errors import StudyError
 
@@ -207,14 +208,14 @@ def gap(
             if out
             else "Nothing was saved. To save trials, add -o FILE."
         )
-        typer.echo(f"Interrupted. {kept}", err=True)
+        echo(f"Interrupted. {kept}", err=True)
         raise typer.Exit(130) from None
     result = found.study.result
     if report is not None:
         from realitygap.report import write_gap_report
 
         write_gap_report(found, report)
-        typer.echo(f"Written: {report}", err=True)
+        echo(f"Written: {report}", err=True)
     if as_json:
         values: dict[str, Any] = result.to_dict() | {"report": report}
         for name, part in (("replay", found.study.replay), ("why", found.why)):
@@ -225,7 +226,7 @@ def gap(
     if found.why is not None:
         _print_why(found.why)
     if report is None and sys.stdout.isatty():
-        typer.echo("With --report gap.html, the command also writes these numbers and figures as a page.")
+        echo("With --report gap.html, the command also writes these numbers and figures as a page.")
 
 
 def _observer(target: str, witness: str | None) -> PortObserver | None:
@@ -243,7 +244,7 @@ def _print(result: GapResult, replay: ReplayError | None) -> None:
     from realitygap.gap import SHOWN
 
     one, other = result.trials
-    typer.echo(
+    echo(
         f"The transfer gap from {result.source} ({result.labels[0]}) to {result.target} ({result.labels[1]}): "
         f"{result.level.n} controllers, {one} and {other} trials each, {result.score}"
     )
@@ -251,15 +252,15 @@ def _print(result: GapResult, replay: ReplayError | None) -> None:
         _print_row(measure.row, getattr(result, measure.name))
     if replay is not None:
         _print_row("replays off at their end [m]", replay.at_end)
-    typer.echo("Separate from the transfer gap:")
+    echo("Separate from the transfer gap:")
     _print_row("re-evolved gap", result.reevolved)
     _print_row("luck of selection", result.luck)
     if result.misspecified is not None:
         says = "cannot" if result.misspecified else "can"
-        typer.echo(f"The simulator {says} reproduce the observations of its calibration.")
+        echo(f"The simulator {says} reproduce the observations of its calibration.")
     for note in result.notes:
-        typer.echo(note)
-    typer.echo(result.verdict)
+        echo(note)
+    echo(result.verdict)
 
 
 def _print_row(title: str, found: Estimate) -> None:
@@ -267,21 +268,21 @@ def _print_row(title: str, found: Estimate) -> None:
     ends = "" if found.low is None else f"[{found.low:.3f}, {found.high:.3f}]"
     p = found.more.get("p")
     more = "" if p is None else p_equation(p)
-    typer.echo(f"  {title:32}{number:>8}  {ends:17} {more}".rstrip())
+    echo(f"  {title:32}{number:>8}  {ends:17} {more}".rstrip())
     if found.refused:
-        typer.echo(f"    {found.refused}")
+        echo(f"    {found.refused}")
 
 
 def _print_why(why: Why) -> None:
-    typer.echo(
+    echo(
         f"Why: RMS gap {why.before} with the robot's defaults, {why.after} with the fit. Contributions to the "
         "fall:"
     )
     for k in why.order:
         fall, n = why.falls[k], why.numbers[k]
         ends = "" if fall.low is None else f"[{fall.low:.3f}, {fall.high:.3f}]"
-        typer.echo(f"  {why.parts[k]:16}{fall.estimate:>8.3f}  {ends:17} {n} number{'s' if n != 1 else ''}")
-    typer.echo(why.advice)
+        echo(f"  {why.parts[k]:16}{fall.estimate:>8.3f}  {ends:17} {n} number{'s' if n != 1 else ''}")
+    echo(why.advice)
 
 
 def plan(
@@ -389,39 +390,39 @@ def _print_plan(found: GapPlan, score: str, least: float, power: float) -> None:
         "margin": f"to show equivalence within ±{found.value:g} if there is no difference",
         "correlation": f"to show that a correlation of {found.value:g} is above {least:g}",
     }[found.question]
-    typer.echo(f"Controllers {question} in {100 * power:g} of 100 studies, in {score}")
-    typer.echo(
+    echo(f"Controllers {question} in {100 * power:g} of 100 studies, in {score}")
+    echo(
         f"Trials of one controller vary by {found.spreads.noise:.3f}, controllers by "
         f"{found.spreads.controllers:.3f} (standard deviations of {found.spreads.origin})"
     )
     if found.question != "correlation":
-        typer.echo(f"Assumed: true differences of controllers vary by {found.spread:.3f} (--spread)")
-    typer.echo(f"{'trials each':>12}{'controllers':>13}{'on the target':>15}{'detected in simulations':>30}")
+        echo(f"Assumed: true differences of controllers vary by {found.spread:.3f} (--spread)")
+    echo(f"{'trials each':>12}{'controllers':>13}{'on the target':>15}{'detected in simulations':>30}")
     for row in found.needed:
         if row.controllers is None or row.power is None:
-            typer.echo(f"{row.trials:>12}{'over 100,000':>13}")
+            echo(f"{row.trials:>12}{'over 100,000':>13}")
             continue
         share = f"{row.power:.2f} [{row.low:.2f}, {row.high:.2f}]"
-        typer.echo(f"{row.trials:>12}{row.controllers:>13,}{row.on_target:>15,}{share:>30}")
+        echo(f"{row.trials:>12}{row.controllers:>13,}{row.on_target:>15,}{share:>30}")
     if found.best is not None:
-        typer.echo(
+        echo(
             f"Minimum number of trials on the target: {found.best.on_target:,}, by {found.best.controllers:,} "
             f"controllers with {found.best.trials} each."
         )
     else:
         from realitygap.study import MOST_CONTROLLERS
 
-        typer.echo(
+        echo(
             f"`realitygap gap` takes at most {MOST_CONTROLLERS:,} controllers, fewer than each of these plans "
             "needs."
         )
     if found.question == "effect":
-        typer.echo(
+        echo(
             "The RMS gap and the noise ceiling need at least 2 trials each: noise and gap are not separable "
             "with one."
         )
     if found.question == "correlation":
-        typer.echo(
+        echo(
             "A correlation is shown if it is above --least, one-sided at 5 %. `realitygap gap` prints the correlation "
             "without noise if each controller has at least 2 trials."
         )

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from realitygap._terminal import echo
 from realitygap.errors import LogError
 
 from ._json import print_json
@@ -83,7 +84,7 @@ def import_log(
 
     mapped = logs.mapped_logs(log, map_file, step_s=step, draft=show_map)
     if show_map:
-        typer.echo(mapped[0].log_map.to_toml(), nl=False)
+        echo(mapped[0].log_map.to_toml(), nl=False)
         return
     if out is None:
         raise LogError("No file for the trials. Name one: -o trials.jsonl. Or print the mapping: --show-map.")
@@ -118,19 +119,17 @@ def _print(mapped: Sequence[MappedLog], out: Path, report: ImportReport) -> None
     trials = "1 trial" if report.n_trials == 1 else f"{report.n_trials:,} trials"
     seconds = report.n_steps * report.step_s
     name = target_of([log.path for log in mapped])
-    typer.echo(
-        f"{name} ({log_map.label}): {trials}, {report.n_steps:,} steps, {seconds:.4g} s; {report.observe}"
-    )
-    typer.echo(f"Mapping: {', '.join(origins)}.")
+    echo(f"{name} ({log_map.label}): {trials}, {report.n_steps:,} steps, {seconds:.4g} s; {report.observe}")
+    echo(f"Mapping: {', '.join(origins)}.")
     if any("guessed" in origin for origin in origins):
-        typer.echo("".join(f"  {line}\n" for line in log_map.to_toml().splitlines()), nl=False)
+        echo("".join(f"  {line}\n" for line in log_map.to_toml().splitlines()), nl=False)
     for note in report.notes:
-        typer.echo(note)
+        echo(note)
     offset = report.offset
     if offset is not None:
         wheels = "commands" if "commands" in report.observe else "encoders"
-        typer.echo(f"Poses follow {wheels} by {offset}, a robot's lag and delay included.")
+        echo(f"Poses follow {wheels} by {offset}, a robot's lag and delay included.")
     for mistake in report.mistakes:
-        typer.echo(f"Check ({mistake.kind}): {mistake.message}")
+        echo(f"Check ({mistake.kind}): {mistake.message}")
     data = " ".join(f"--from {shlex.quote(str(log.path))}" for log in mapped)
-    typer.echo(f"Written: {out}. Fit a robot to it: realitygap calibrate motion {data}")
+    echo(f"Written: {out}. Fit a robot to it: realitygap calibrate motion {data}")

@@ -8,12 +8,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import typer
+from realitygap._terminal import echo
 
 
 def print_json(values: Any) -> None:
     """Print plain values as JSON that any program reads: null stands for nan and infinities, and text for paths."""
-    typer.echo(json.dumps(_plain(values), indent=2, allow_nan=False))
+    echo(json.dumps(_plain(values), indent=2, allow_nan=False))
 
 
 def _plain(value: Any) -> Any:

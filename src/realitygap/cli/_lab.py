@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from realitygap._terminal import echo
+
 
 def lab(
     folder: Annotated[Path, typer.Argument(metavar="[DIR]", help="Folder of the studies.")] = Path("results"),
@@ -48,7 +50,7 @@ def lab(
 
 
 def _say(line: str) -> None:
-    typer.echo(line)
+    echo(line)
     import sys
 
     sys.stdout.flush()

@@ -10,8 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import typer
-
+from realitygap._terminal import draw, echo
 from realitygap.errors import StudyError
 from realitygap.trials import Operator, WitnessObserver
 
@@ -190,7 +189,8 @@ class PersonOperator(Operator):
         stalled = "  stalled" if seen.stalled else "         "
         told = f"move {command.move:+.2f} turn {command.turn:+.2f}"
         text = f"step {step + 1:3}/{card.n_steps}  sees {raw}  {told}{stalled}"
-        self._say(f"\r{text}  space aborts", nl=step + 1 == card.n_steps)
+        draw("\r", err=self._to_stderr)
+        self._say(f"{text}  space aborts", nl=step + 1 == card.n_steps)
         with single_keys() as keys:
             return keys.read(0.0) in _ABORTING
 
@@ -244,7 +244,7 @@ class PersonOperator(Operator):
         from realitygap.records import Score
 
         self._say(f"\nTrial {card.trial.trial}, {card.title}, pen: {card.pen}")
-        cells = pick_cells(card.arena, write=lambda text: self._say(text, nl=False))
+        cells = pick_cells(card.arena, write=lambda codes: draw(codes, err=self._to_stderr))
         return None if cells is None else Score(cells, self._answers.name)
 
     def _ask(self, prompt: str, option: str) -> str:
@@ -261,19 +261,15 @@ class PersonOperator(Operator):
         return read_line()
 
     def _say(self, text: str, *, nl: bool = True) -> None:
-        typer.echo(text, nl=nl, err=self._to_stderr)
+        echo(text, nl=nl, err=self._to_stderr)
 
 
 def pick_cells(
     arena: Arena, cells: Sequence[int] = (), *, write: Callable[[str], None] | None = None
 ) -> list[int] | None:
     """Return cells picked in the terminal; None for later."""
-
-    def to_stdout(text: str) -> None:
-        typer.echo(text, nl=False)
-
     with single_keys() as keys:
-        return edit_cells(arena.grid, arena.start, keys.read, write or to_stdout, cells)
+        return edit_cells(arena.grid, arena.start, keys.read, write or draw, cells)
 
 
 def sketch(arena: Arena) -> str:

@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from realitygap._terminal import echo
 from realitygap.errors import StudyError
 
 from ._code import AllowPlatforms
@@ -49,7 +50,7 @@ def platforms(
             if platform.is_physical
             else ""
         )
-        typer.echo(f"{check} keeps the contract of a platform.{only}")
+        echo(f"{check} keeps the contract of a platform.{only}")
         return
     models, problems = [], []
     for name in platform_names():
@@ -63,6 +64,6 @@ def platforms(
     else:
         width = max(len(" or ".join(each.specs())) for each in models)
         for each in models:
-            typer.echo(f"{' or '.join(each.specs()):{width}}  {each.summary.partition(':')[0]}")
+            echo(f"{' or '.join(each.specs()):{width}}  {each.summary.partition(':')[0]}")
     for problem in problems:
-        typer.echo(f"realitygap: {problem}", err=True)
+        echo(f"realitygap: {problem}", err=True)

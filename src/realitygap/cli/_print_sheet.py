@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from realitygap._terminal import echo
 from realitygap.errors import RealityGapError
 
 if TYPE_CHECKING:
@@ -55,7 +56,7 @@ def print_sheet(
     n_pages = len(sheet_tiles(layout, paper))
     left, lower, right, upper = layout.paper
     pages = "1 page" if n_pages == 1 else f"{n_pages} pages"
-    typer.echo(
+    echo(
         f"Written: {out} ({pages}; the sheet is {1000 * (right - left):.0f} x {1000 * (upper - lower):.0f} mm)"
     )
 

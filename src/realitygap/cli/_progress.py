@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Self
 
-from rich.console import Console
 from rich.progress import (
     BarColumn,
     MofNCompleteColumn,
     Progress,
     ProgressColumn,
     SpinnerColumn,
-    TextColumn,
     TimeRemainingColumn,
 )
+
+from realitygap._console import PlainColumn, PlainConsole
 
 if TYPE_CHECKING:
     from realitygap.study import Progress as StudyProgress
@@ -38,8 +38,8 @@ class ProgressBar:
         more: Sequence[ProgressColumn] = (),
         quiet: bool,
     ) -> None:
-        self._console = Console(stderr=True, quiet=quiet)
-        counted = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn(unit))
+        self._console = PlainConsole(stderr=True, quiet=quiet)
+        counted = (PlainColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), PlainColumn(unit))
         columns = (*first, *counted, *more, TimeRemainingColumn())
         self._progress = Progress(*columns, console=self._console, transient=True)
 
@@ -56,7 +56,7 @@ class RunsBar(ProgressBar):
 
     def __init__(self, *, quiet: bool) -> None:
         super().__init__(
-            "runs", first=[SpinnerColumn()], more=[TextColumn("{task.fields[rate]}")], quiet=quiet
+            "runs", first=[SpinnerColumn()], more=[PlainColumn("{task.fields[rate]}")], quiet=quiet
         )
         self._task = self._progress.add_task("compiling or loading the kernels", total=None, rate="")
 
@@ -71,7 +71,7 @@ class RunsBar(ProgressBar):
                 )
             self._progress.start()
         if progress.waiting_for and not self._console.is_terminal:
-            self._console.print(f"Waiting for {progress.waiting_for} ...", highlight=False)
+            self._console.print(f"Waiting for {progress.waiting_for} ...")
         started = progress.n_computed > 0
         rate = (
             f"{progress.n_computed / progress.seconds:,.0f} runs/s"
@@ -111,4 +111,4 @@ class TrialsBar(ProgressBar):
     def say(self, text: str) -> None:
         """Print other progress, on a terminal."""
         if self._console.is_terminal:
-            self._console.print(text, highlight=False, markup=False)
+            self._console.print(text)

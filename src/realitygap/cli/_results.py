@@ -8,6 +8,8 @@ from typing import Annotated
 
 import typer
 
+from realitygap._terminal import echo
+
 from ._browser import show_page
 
 Folder = Annotated[Path, typer.Argument(metavar="DIR", help="Folder of results, such as results/paper.")]
@@ -38,7 +40,7 @@ def report(
     """
     path = written_report(folder, out, figures=figures)
     if figures is not None:
-        typer.echo(f"Figures and tables: {figures}")
+        echo(f"Figures and tables: {figures}")
     if open_page:
         show_page(path)
 
@@ -51,7 +53,7 @@ def written_report(
     from realitygap.report import write_report
 
     path = write_report(folder, out, figures=figures)
-    typer.echo(f"Written: {path} ({time.perf_counter() - started:.1f} s)", err=to_stderr)
+    echo(f"Written: {path} ({time.perf_counter() - started:.1f} s)", err=to_stderr)
     return path
 
 
@@ -68,6 +70,6 @@ def digest(folder: Folder) -> None:
     from realitygap.records import ResultsFolder
 
     results = ResultsFolder.open(folder)
-    typer.echo(results.digest())
+    echo(results.digest())
     if results.missing_note is not None:
-        typer.echo(f"realitygap: note: {results.missing_note}", err=True)
+        echo(f"realitygap: note: {results.missing_note}", err=True)

@@ -10,6 +10,7 @@ from typing import Annotated, Any
 import typer
 
 from realitygap._numbers import fixed
+from realitygap._terminal import echo
 from realitygap.errors import RobotError
 
 from ._json import print_json
@@ -87,7 +88,7 @@ def list_ports(as_json: Json = False) -> None:
     elif found:
         _print_table(("port", "seems to be", "the system says"), found)
     else:
-        typer.echo("No serial port found. Pair the robot or plug it in, see docs/how-to/robot.md.")
+        echo("No serial port found. Pair the robot or plug it in, see docs/how-to/robot.md.")
 
 
 @robot.command("info")
@@ -149,9 +150,9 @@ def drive(
         opened.drive(Command(move, turn))
         opened.stop()
         recoveries = opened.faults.recoveries if hasattr(opened, "faults") else 0
-    typer.echo(f"Drove {seconds:g} s with move {move:g} and turn {turn:g}, then stopped.")
+    echo(f"Drove {seconds:g} s with move {move:g} and turn {turn:g}, then stopped.")
     if recoveries:
-        typer.echo(f"The link was disturbed {recoveries} times; the robot stood still meanwhile.", err=True)
+        echo(f"The link was disturbed {recoveries} times; the robot stood still meanwhile.", err=True)
 
 
 @robot.command("stop")
@@ -164,7 +165,7 @@ def stop(port: Port) -> None:
     """
     with _opened(port, None) as (_, opened):
         opened.stop()
-    typer.echo("The motors are off.")
+    echo("The motors are off.")
 
 
 @robot.command("battery")
@@ -182,7 +183,7 @@ def battery(port: Port, as_json: Json = False, record: Record = None) -> None:
     if as_json:
         print_json({name: round(value, 3)})
         return
-    typer.echo(f"{fixed(value, 2)} V" if name.endswith("_v") else f"{value:g}, without a unit")
+    echo(f"{fixed(value, 2)} V" if name.endswith("_v") else f"{value:g}, without a unit")
 
 
 @robot.command("picture")
@@ -212,7 +213,7 @@ def picture(
     from PIL import Image
 
     Image.fromarray(pixels).save(out, "PNG")
-    typer.echo(f"Written: {out} ({pixels.shape[1]} x {pixels.shape[0]})")
+    echo(f"Written: {out} ({pixels.shape[1]} x {pixels.shape[0]})")
 
 
 @robot.command("beep")
@@ -257,10 +258,10 @@ def show_recording(
     header = recording.header
     who = header.get("robot", {})
     named = who["name"] if "name" in who else f"{who.get('model')} with Fluke {who.get('fluke')}"
-    typer.echo(f"{header.get('label', 'no robot')} on {header['port']}, {named}, {header['started']}")
+    echo(f"{header.get('label', 'no robot')} on {header['port']}, {named}, {header['started']}")
     _print_table(("t [s]", "kind", "name", "what"), [_row(line) for line in lines])
     if not recording.is_whole:
-        typer.echo("The last line is cut off, as after a crash, and left out.")
+        echo("The last line is cut off, as after a crash, and left out.")
 
 
 @robot.command("export-recording")
@@ -278,7 +279,7 @@ def export_recording(
     """
     from realitygap.robots import export_mcap
 
-    typer.echo(f"Written: {out} ({export_mcap(file, out)} messages)")
+    echo(f"Written: {out} ({export_mcap(file, out)} messages)")
 
 
 def _row(line: Any) -> tuple[str, str, str, str]:
@@ -312,13 +313,13 @@ def _print(found: dict[str, Any], as_json: bool) -> None:
 
 def _print_table(heads: tuple[str, ...] | None, rows: Any) -> None:
     from rich import box
-    from rich.console import Console
     from rich.table import Table
-    from rich.text import Text
+
+    from realitygap._console import PlainConsole
 
     table = Table(box=box.SIMPLE_HEAD if heads else None, show_header=heads is not None)
     for head in heads or rows[0]:
         table.add_column(head, overflow="fold")
     for row in rows:
-        table.add_row(*(Text(str(cell)) for cell in row))
-    Console().print(table)
+        table.add_row(*(str(cell) for cell in row))
+    PlainConsole().print(table)

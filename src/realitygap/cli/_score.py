@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from realitygap._terminal import echo, prompt
 from realitygap.errors import StudyError
 
 from ._json import print_json
@@ -166,10 +167,10 @@ def _only_show(photo: Path, arena: str, pens: str | None, overlay: Path | None, 
         print_json({"photo": photo_hash(data), "traces": rows, "overlay": overlay})
         return
     for trace in found.traces:
-        typer.echo(f"{trace.pen + 1} {trace.name}: {_told(trace)}")
+        echo(f"{trace.pen + 1} {trace.name}: {_told(trace)}")
     _say_what_was_guessed(found)
     if overlay is not None:
-        typer.echo(f"Written: {overlay}")
+        echo(f"Written: {overlay}")
 
 
 def _as_json(trace: TraceScore) -> dict[str, Any]:
@@ -188,7 +189,7 @@ def _told(trace: TraceScore) -> str:
 def _say_what_was_guessed(found: SheetScore) -> None:
     guessed = [trace.name for trace in found.traces if not trace.is_tried]
     if guessed:
-        typer.echo(
+        echo(
             f"Not tried in their boxes, so their colors are guessed from their names: {', '.join(guessed)}.",
             err=True,
         )
@@ -225,9 +226,9 @@ def _score_trials(
     write_whole(place, overlay_png(found, names), within=folder if overlay is None else None)
     if not as_json:
         for trial in on_sheet.waiting:
-            typer.echo(f"{names[trial.pen]}: {_told(traces[trial.pen])}")
+            echo(f"{names[trial.pen]}: {_told(traces[trial.pen])}")
         _say_what_was_guessed(found)
-        typer.echo(f"Written: {place}")
+        echo(f"Written: {place}")
     _say_what_is_spoiled(on_sheet)
     is_asked = not yes and not as_json and sys.stdin.isatty() and sys.stdout.isatty()
     entries = (
@@ -253,7 +254,7 @@ def _score_trials(
         ]
         print_json({"sheet": on_sheet.sheet, "overlay": place, "entered": n_entered, "trials": rows})
     else:
-        typer.echo(
+        echo(
             f"{n_entered} trials entered."
             if n_entered
             else "Nothing was entered. Look at the picture, then run the same command with --yes."
@@ -264,7 +265,7 @@ def _say_what_is_spoiled(on_sheet: SheetTrials) -> None:
     for trial in on_sheet.waiting:
         if trial.pen in on_sheet.spoiled:
             void = on_sheet.spoiled[trial.pen].trial
-            typer.echo(
+            echo(
                 f"Trial {trial.trial}: the pen also drew trial {void}, which is void. If that line is still on "
                 "the sheet, the two cannot be distinguished, and --yes skips this trial.",
                 err=True,
@@ -303,12 +304,12 @@ def _confirmed(
 
 def _answer(trial: Trial, trace: TraceScore) -> str:
     while True:
-        prompt = (
+        question = (
             f"Trial {trial.trial}, {trace.name}, {len(trace.cells)} cells. Enter: accept, e: edit, s: skip"
         )
-        answer = typer.prompt(prompt, default="", show_default=False).strip().lower()
+        answer = prompt(question, default="", show_default=False).strip().lower()
         if answer in ("", "e", "s"):
-            return str(answer)
+            return answer
 
 
 def _score_of(trace: TraceScore, cells: tuple[int, ...], photo: Path, data: bytes, who: str) -> Score:

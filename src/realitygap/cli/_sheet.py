@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-import typer
-
+from realitygap._terminal import prompt
 from realitygap.study import NO_LINE
 from realitygap.trials import SheetObserver
 from realitygap.world import INCH
@@ -31,10 +30,10 @@ def sheet_observer(*, asks_for_start: bool) -> SheetObserver:
 def _settle(problem: str, can_count: bool) -> Verdict:
     """Ask about a trial that was running when the program ended."""
     if not can_count:
-        typer.prompt(f"{problem} Enter", default="", show_default=False, err=True)
+        prompt(f"{problem} Enter", default="", show_default=False, err=True)
         return "void"
     while True:
-        answer = typer.prompt(f"{problem} v: void, drive it again; d: driven, count it", err=True).lower()
+        answer = prompt(f"{problem} v: void, drive it again; d: driven, count it", err=True).lower()
         if answer in ("v", "void", "d", "driven"):
             return "void" if answer.startswith("v") else "driven"
 
@@ -44,7 +43,7 @@ def _ask_for_start(plan: TrialPlan, arena: Arena, observe: Observe) -> None:
     sheet = ", with a fresh sheet below" if observe in ("cells", "encoders") else ""
     start = plan.start or arena.start
     x, y, heading = start.x / INCH, start.y / INCH, math.degrees(start.heading)
-    typer.prompt(
+    prompt(
         f"Put the robot {x:.1f} in from the left and {y:.1f} in from the lower wall, its front {heading:.0f} "
         f"degrees counter-clockwise from the long wall{sheet}. Enter",
         default="",

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
+from realitygap._terminal import echo
 from realitygap.errors import RealityGapError, StudyError
 
 if TYPE_CHECKING:
@@ -149,11 +150,11 @@ def show(
         if what != "arena":
             _refuse(what, ("--robot",), robot)
         if what == "movie":
-            typer.echo(f"Written: {_movie(names, out, each, speed, numbers)}")
+            echo(f"Written: {_movie(names, out, each, speed, numbers)}")
             return
         name = _one_name(what, names)
         if what == "divergence":
-            typer.echo(f"Written: {_divergence(name, out, against, repeats, numbers)}")
+            echo(f"Written: {_divergence(name, out, against, repeats, numbers)}")
             return
         if what in ("arena", "robot"):
             _refuse(what, [f"--{key}" for key in numbers], *numbers.values())
@@ -166,7 +167,7 @@ def show(
             path = save_view(folder, out, subject=subject, **numbers)
     except ValueError as error:
         raise RealityGapError(str(error)) from error
-    typer.echo(f"Written: {path}")
+    echo(f"Written: {path}")
 
 
 def _subject(what: str, name: str | None, out: Path) -> tuple[Subject, str]:

@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from realitygap._terminal import echo
+
 
 def simulate(
     case: Annotated[
@@ -32,5 +34,5 @@ def simulate(
     described, track = simulate_file(case, out)
     for i, robot in enumerate(described.robots):
         blocked = int(track.stalls[:, i].sum())
-        typer.echo(f"SIM jyro, {robot.name}: {described.steps} steps, {blocked} of them blocked.")
-    typer.echo(f"Written: {out}")
+        echo(f"SIM jyro, {robot.name}: {described.steps} steps, {blocked} of them blocked.")
+    echo(f"Written: {out}")

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from realitygap._how_to_run import launcher
+from realitygap._terminal import echo
 from realitygap.errors import StudyError
 
 from ._browser import show_page
@@ -127,7 +128,7 @@ def run(
                 allow_code=code_permission(allow_code),
             )
     except KeyboardInterrupt:
-        typer.echo("Interrupted. Published runs are saved. Run the same command to resume.", err=True)
+        echo("Interrupted. Published runs are saved. Run the same command to resume.", err=True)
         raise typer.Exit(130) from None
     print_result(result, as_json=as_json)
     if open_page:
@@ -173,7 +174,7 @@ def new_study(
         raise StudyError(f"{path} exists and was not changed. Choose another name.") from None
     except OSError as error:
         raise StudyError(f"{path} cannot be written: {error.strerror}.") from error
-    typer.echo(f"Written: {path}. Run it with: {launcher()} run {shlex.quote(str(path))}")
+    echo(f"Written: {path}. Run it with: {launcher()} run {shlex.quote(str(path))}")
 
 
 def _as_name(stem: str) -> str:
@@ -218,18 +219,18 @@ def print_result(result: StudyResult, *, as_json: bool) -> None:
     if len(tasks) < len(summary):
         console.print(summary_table(summary, title))
     if note := result.folder.description.get("note"):
-        console.print(note, style="italic", highlight=False, markup=False)
+        console.print(note, style="italic")
     path = result.folder.path
     if result.n_computed:
-        typer.echo(
+        echo(
             f"{result.n_computed} of {result.n_runs} runs computed in {result.seconds:.1f} s "
             f"({result.n_computed / result.seconds:,.0f} runs/s)."
         )
     elif result.n_runs:
-        typer.echo(f"All {result.n_runs} runs existed already.")
+        echo(f"All {result.n_runs} runs existed already.")
     _print_physical(result)
-    typer.echo(f"Results: {path}   in Python: {_reading(result.folder)}")
-    typer.echo(f"Report:  {launcher()} report {shlex.quote(str(path))}")
+    echo(f"Results: {path}   in Python: {_reading(result.folder)}")
+    echo(f"Report:  {launcher()} report {shlex.quote(str(path))}")
 
 
 def _reading(folder: ResultsFolder) -> str:
@@ -253,10 +254,8 @@ def _print_physical(result: StudyResult, *, to_stderr: bool = False) -> None:
         return
     left = physical.n_runs - physical.n_complete
     driven = f" {physical.n_driven} trials were driven just now." if physical.n_driven else ""
-    typer.echo(
-        f"{physical.n_complete} of {physical.n_runs} runs on a robot are complete.{driven}", err=to_stderr
-    )
+    echo(f"{physical.n_complete} of {physical.n_runs} runs on a robot are complete.{driven}", err=to_stderr)
     if physical.waiting:
-        typer.echo(physical.waiting, err=to_stderr)
+        echo(physical.waiting, err=to_stderr)
     elif left:
-        typer.echo("`realitygap drive` drives the others.", err=to_stderr)
+        echo("`realitygap drive` drives the others.", err=to_stderr)

@@ -5,10 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from rich import box
-from rich.console import Console
 from rich.table import Table
-from rich.text import Text
 
+from realitygap._console import PlainConsole
 from realitygap._numbers import fixed
 
 if TYPE_CHECKING:
@@ -20,10 +19,10 @@ NARROWEST = 78
 """Width below which numbers of a table would be cut; on a narrower terminal, lines wrap."""
 
 
-def wide_console() -> Console:
+def wide_console() -> PlainConsole:
     """Return a console that is wide enough for tables."""
-    console = Console()
-    return console if console.width >= NARROWEST else Console(width=NARROWEST)
+    console = PlainConsole()
+    return console if console.width >= NARROWEST else PlainConsole(width=NARROWEST)
 
 
 def summary_table(summary: pl.DataFrame, title: str) -> Table:
@@ -51,7 +50,7 @@ def summary_table(summary: pl.DataFrame, title: str) -> Table:
             cells.append("not seen" if median == "-" and row["n"] else f"{median} {interval}\n{q25} to {q75}")
         if published:
             cells.append(" ".join(_number(value) for value in row["published"] or []))
-        table.add_row(*(Text(cell) for cell in cells))
+        table.add_row(*cells)
     return table
 
 
@@ -74,7 +73,7 @@ def task_table(summary: pl.DataFrame, title: str) -> Table:
         )
         interval = f"[{low}, {high}]" if low != "-" else "[few runs]"
         cells = [row["condition"], f"{row['n']:,}", first, last, f"{median} {interval}\n{q25} to {q75}"]
-        table.add_row(*(Text(cell) for cell in cells))
+        table.add_row(*cells)
     return table
 
 
@@ -91,15 +90,15 @@ def calibration_table(calibration: Calibration) -> Table:
     for each in calibration.fitted:
         estimate, interval = each.shown
         cells = [each.name, f"{estimate} {each.unit}".rstrip(), interval]
-        table.add_row(*(Text(cell) for cell in cells), Text("yes" if each.identified else "no"))
+        table.add_row(*cells, "yes" if each.identified else "no")
     return table
 
 
 def table_of(title: str, caption: str = "") -> Table:
     """Return a table without columns yet."""
     return Table(
-        title=Text(title),
-        caption=Text(caption) if caption else None,
+        title=title,
+        caption=caption or None,
         title_justify="left",
         caption_justify="left",
         title_style="bold",
@@ -118,8 +117,8 @@ def held_out_table(held_out: dict[str, Any], label: str) -> Table:
     """Return errors on what a fit did not see: one row a prediction, the fit first."""
     unit = f" [{held_out['unit']}]" if held_out["unit"] else ""
     table = Table(
-        title=Text(f"Not seen by the fit ({label}, n = {held_out['n']:,}){unit}"),
-        caption=Text(f"error: {held_out['measure']}"),
+        title=f"Not seen by the fit ({label}, n = {held_out['n']:,}){unit}",
+        caption=f"error: {held_out['measure']}",
         title_justify="left",
         caption_justify="left",
         box=box.SIMPLE_HEAD,
@@ -130,10 +129,5 @@ def held_out_table(held_out: dict[str, Any], label: str) -> Table:
         table.add_column(name, justify="right")
     for name, error in held_out["errors"].items():
         more = [held_out["more"][key].get(name) for key in held_out["more"]]
-        table.add_row(
-            *(
-                Text(cell)
-                for cell in (name, f"{error:.3g}", *("-" if x is None else f"{x:.3g}" for x in more))
-            )
-        )
+        table.add_row(name, f"{error:.3g}", *("-" if x is None else f"{x:.3g}" for x in more))
     return table

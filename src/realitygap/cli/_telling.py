@@ -7,8 +7,7 @@ from collections.abc import Sequence
 from itertools import groupby
 from typing import TYPE_CHECKING
 
-import typer
-
+from realitygap._terminal import echo
 from realitygap.trials import Card, Operator, Preflight
 
 if TYPE_CHECKING:
@@ -54,7 +53,7 @@ class TellingOperator(Operator):
         return super().close(cards)
 
     def _say(self, text: str) -> None:
-        typer.echo(text, err=True)
+        echo(text, err=True)
         self._told = time.monotonic()
 
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from realitygap._numbers import fixed
+from realitygap._terminal import echo
 from realitygap.errors import StudyError
 
 from ._json import print_json
@@ -215,7 +216,7 @@ def print_tags(
         n = write(out, tag_of(tag, tag_size, 0.1, "0,0,0"), corner_size, paper)  # type: ignore[arg-type]
     except ValueError as error:
         raise StudyError(str(error)) from None
-    typer.echo(f"Written: {out} ({n} pages)")
+    echo(f"Written: {out} ({n} pages)")
 
 
 def lens(
@@ -257,7 +258,7 @@ def lens(
     finally:
         source.close()
     _save(out, made.to_toml())
-    typer.echo(f"The board's corners are off by {made.rms:.2f} pixels.\nWritten: {out}")
+    echo(f"The board's corners are off by {made.rms:.2f} pixels.\nWritten: {out}")
 
 
 # what was asked for
@@ -450,22 +451,22 @@ def _print(found: Tracked, placed: TrackedTrial | None, written: _Written, *, as
             }
         print_json(values)
         return
-    typer.echo(
+    echo(
         f"Tag {found.tag.family}:{found.tag.number} seen in {n_seen} of {n} pictures; longest gap "
         f"{track.longest_gap_s:.2f} s, filled in."
     )
-    typer.echo(f"The camera is {above:.2f} m above the floor.")
+    echo(f"The camera is {above:.2f} m above the floor.")
     if placed is not None:
         begun = placed.beginning
         how = (
             "as said" if math.isnan(begun.agreement) else f"commands and path agree to {begun.agreement:.2f}"
         )
-        typer.echo(
+        echo(
             f"The trial begins at {fixed(begun.time, 2)} s ({how}) and crosses {len(placed.score.cells)} cells."
         )
     for said in found.warnings:
-        typer.echo(f"Note: {said}")
+        echo(f"Note: {said}")
     if written.study is not None:
-        typer.echo(f"Entered into the ledger of {written.study}.")
+        echo(f"Entered into the ledger of {written.study}.")
     for path in written.files:
-        typer.echo(f"Written: {path}")
+        echo(f"Written: {path}")

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from realitygap._terminal import echo
+
 from ._code import AllowPlatforms
 from ._json import print_json
 
@@ -136,17 +138,17 @@ def transfer(
                 calibration=calibration,
                 seed=seed,
                 allow_code=allow_code,
-                tell=lambda text: typer.echo(text, err=True),
+                tell=lambda text: echo(text, err=True),
             )
     except KeyboardInterrupt:
-        typer.echo("Interrupted. All trials are saved. Run the same command to resume.", err=True)
+        echo("Interrupted. All trials are saved. Run the same command to resume.", err=True)
         raise typer.Exit(130) from None
     if as_json:
         about = {"score": result.score, "folder": folder, "champions_folder": folder / "champions"}
         print_json(result.to_dict() | about)
         return
     _print(result)
-    typer.echo(f"Results: {folder}   champions: {folder / 'champions'}")
+    echo(f"Results: {folder}   champions: {folder / 'champions'}")
 
 
 def _with_interval(found: Estimate) -> str:
@@ -155,18 +157,16 @@ def _with_interval(found: Estimate) -> str:
 
 
 def _print(result: TransferResult) -> None:
-    typer.echo(
+    echo(
         f"{result.study}, {result.condition}: from simulation (SIM) to {result.target} ({result.label}), "
         f"{result.replicates} replicate{'s' if result.replicates > 1 else ''}, {result.fresh_trials} fresh trials "
         f"each, {result.score}"
     )
-    typer.echo(f"{'strategy':16}{'budget':>7}{'on the target':>24}{'regret':>24}{'in simulation':>15}")
+    echo(f"{'strategy':16}{'budget':>7}{'on the target':>24}{'regret':>24}{'in simulation':>15}")
     for row in result.strategies:
         quality, regret = map(_with_interval, (row.quality, row.regret))
         simulated = "-" if row.simulated is None else f"{row.simulated:.3f}"
-        typer.echo(f"{row.strategy:16}{row.budget:>7}{quality:>24}{regret:>24}{simulated:>15}")
-    typer.echo(f"Regret is to {result.best_in_words}.")
+        echo(f"{row.strategy:16}{row.budget:>7}{quality:>24}{regret:>24}{simulated:>15}")
+    echo(f"Regret is to {result.best_in_words}.")
     if result.replicates == 1:
-        typer.echo(
-            "Intervals are over the fresh trials of one champion. To compare strategies, add --replicates."
-        )
+        echo("Intervals are over the fresh trials of one champion. To compare strategies, add --replicates.")

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from realitygap._terminal import echo
 from realitygap.errors import StudyError
 
 
@@ -60,4 +61,4 @@ def export_trials(
     diameter = WHEEL_DIAMETER_MM if wheel_diameter_mm is None else wheel_diameter_mm
     for report in write(source, out, trial or (), wheel_diameter_mm=diameter):
         topics = ", ".join(f"{topic} {n}" for topic, n in report.n_messages.items())
-        typer.echo(f"Written: {report.bag} ({topics}); mapping: {report.mapping}")
+        echo(f"Written: {report.bag} ({topics}); mapping: {report.mapping}")

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from realitygap._limits import MOST_TABLE_BYTES, read_file
+from realitygap._terminal import echo
 from realitygap.errors import LedgerError, StudyError, did_you_mean
 
 from ._json import print_json
@@ -122,15 +123,15 @@ def trials(
             _score(ledger, folder, trial, cells, file, name, role)
         elif what == "note":
             ledger.note(_needed(text, "--text"), name, None if trial is None else _number(ledger, trial))
-            typer.echo("Noted.")
+            echo("Noted.")
         else:
             number = _number(ledger, _needed(trial, "a trial"))
             if what == "undo":
                 ledger.undo(number)
-                typer.echo(f"The score of trial {number} is withdrawn. Enter a new one.")
+                echo(f"The score of trial {number} is withdrawn. Enter a new one.")
             else:
                 ledger.void(number, _needed(text, "--text"))
-                typer.echo(f"Trial {number} is void; it will be driven again.")
+                echo(f"Trial {number} is void; it will be driven again.")
 
 
 _LONGEST_NUMBER = 19
@@ -177,9 +178,9 @@ def _score(
         ledger.score_all({number: Score(found, who) for number, found in given.items()}, role)
         n_entered += len(given)
         for number, found in given.items():
-            typer.echo(f"Trial {number}: {len(set(found))} cells.")
+            echo(f"Trial {number}: {len(set(found))} cells.")
     if not n_entered:
-        typer.echo("Nothing was entered.")
+        echo("Nothing was entered.")
 
 
 def _cells(text: str, where: str) -> list[int]:
@@ -227,7 +228,7 @@ def _pick(ledger: Ledger, folder: Path, trial: str | None, role: ScoreRole) -> I
         waiting = [each for each in ledger.trials(states=states) if each.trial not in seconded]
     shows = _Titles(folder)
     for each in waiting:
-        typer.echo(
+        echo(
             f"\nTrial {each.trial}, {each.code if shows.blind else each.name}, sheet {each.sheet}, {shows.pen(each)}"
         )
         cells = pick_cells(shows.arena(each), each.cells or () if role == "correction" else ())
@@ -290,10 +291,10 @@ def _list(ledger: Ledger, *, as_json: bool) -> None:
             *(str(each.trial), each.code, str(each.sheet), each.state),
             *("" if each.cells is None else str(len(each.cells)), more),
         )
-    wide_console().print(table, highlight=False)
+    wide_console().print(table)
     states = [each.state for each in found]
     counts = ", ".join(f"{states.count(state)} {state}" for state in dict.fromkeys(states))
-    typer.echo(f"{len(found)} trials: {counts}." if found else "No trial is planned yet.")
+    echo(f"{len(found)} trials: {counts}." if found else "No trial is planned yet.")
 
 
 def _is_blind(ledger: Ledger) -> bool:
@@ -308,4 +309,4 @@ def _agreement(folder: Path, *, as_json: bool) -> None:
     if as_json:
         print_json(vars(found))
         return
-    typer.echo(found.sentence)
+    echo(found.sentence)

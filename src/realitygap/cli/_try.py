@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 
+from realitygap._terminal import echo
 from realitygap.errors import StudyError
 
 from ._code import AllowPlatforms
@@ -99,7 +100,7 @@ def try_genome(
             about = {"target": target.name, "label": target.label, "n_cells": n_cells}
             print_json(about | {"mean": mean, "coverage": coverage})
             return
-        typer.echo(
+        echo(
             f"{target.name} ({target.label}): {len(coverage)} trial{'s' if len(coverage) > 1 else ''}, mean coverage "
             f"{mean:.3f} of {n_cells} cells: {' '.join(f'{value:.3f}' for value in coverage)}"
         )

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from realitygap._terminal import echo
 from realitygap.errors import RealityGapError
 
 from ._json import print_json
@@ -54,7 +55,7 @@ def families(
     if as_json:
         print_json(rows)
     elif not rows:
-        typer.echo(f"{name} draws what every twin does: realitygap twin families every")
+        echo(f"{name} draws what every twin does: realitygap twin families every")
     else:
         _print_rows([{key: _text(value) for key, value in row.items()} for row in rows])
 
@@ -67,7 +68,7 @@ def _print_rows(rows: list[dict[str, str]]) -> None:
     """Print columns as wide as they must be."""
     widths = {key: max(len(key), *(len(row[key]) for row in rows)) for key in rows[0]}
     for row in [{key: key for key in widths}, *rows]:
-        typer.echo("  ".join(row[key].ljust(width) for key, width in widths.items()).rstrip())
+        echo("  ".join(row[key].ljust(width) for key, width in widths.items()).rstrip())
 
 
 @twin.command("build-enki")
@@ -82,7 +83,7 @@ def build() -> None:
     """
     from realitygap.platforms import build_enki
 
-    typer.echo(f"Built: {build_enki()}")
+    echo(f"Built: {build_enki()}")
 
 
 @twin.command("sample")
@@ -112,10 +113,10 @@ def sample(
     except ValueError as error:
         raise RealityGapError(str(error)) from error
     if out is None:
-        typer.echo(text, nl=False)
+        echo(text, nl=False)
         return
     write_whole(out, text.encode("utf-8"))
-    typer.echo(f"Written: {out}")
+    echo(f"Written: {out}")
 
 
 @twin.command("show")
@@ -137,7 +138,7 @@ def show_twin(
         path = save_twin(out, file)
     except ValueError as error:
         raise RealityGapError(str(error)) from error
-    typer.echo(f"Written: {path}")
+    echo(f"Written: {path}")
 
 
 @twin.command("render")
@@ -184,4 +185,4 @@ def render(
         path = save_twin_trial(trial, out, view=view, speed=speed)  # type: ignore[arg-type]  # checked there
     except ValueError as error:
         raise RealityGapError(str(error)) from error
-    typer.echo(f"Written: {path}")
+    echo(f"Written: {path}")

@@ -8,7 +8,9 @@ from dataclasses import dataclass
 from importlib import resources
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from ._picture import NOT_XML, Picture
+from realitygap._foreign_text import page_text
+
+from ._picture import Picture
 from ._theme import theme_rules, themed
 
 if TYPE_CHECKING:
@@ -136,8 +138,8 @@ def _style() -> str:
 
 
 def _printable(value: Any) -> Any:
-    """Return a text without what HTML may not hold, and not too long; what is HTML already stays."""
+    """Return a text that a page may have, and that is not too long; what is HTML already stays."""
     if not isinstance(value, str) or hasattr(value, "__html__"):
         return value
-    text = NOT_XML.sub("", value)
+    text = page_text(value)
     return text if len(text) <= MOST_LETTERS else text[: MOST_LETTERS - 1] + "…"

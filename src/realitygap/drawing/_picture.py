@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import html
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
+
+from realitygap._foreign_text import page_text
 
 from ._ink import Ink
 
 FONT = "'Helvetica Neue', Helvetica, Arial, 'Liberation Sans', 'DejaVu Sans', sans-serif"
 
 Point = tuple[float, float]
-
-NOT_XML = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")
-"""Characters that a user's text may contain but XML may not."""
 
 
 @dataclass(frozen=True)
@@ -150,7 +148,7 @@ def _number(value: float) -> str:
 
 
 def _text(text: str) -> str:
-    return html.escape(NOT_XML.sub("", text))
+    return html.escape(page_text(text))
 
 
 def _line(line: Line, points: list[Point]) -> str:

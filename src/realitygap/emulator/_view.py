@@ -42,12 +42,13 @@ class LiveView:
 
     def _panel(self, emulator: Emulator) -> RenderableType:
         from rich.panel import Panel
-        from rich.text import Text
+
+        from realitygap._console import plain_text
 
         size = self._live.console.size
         room = (min(WIDTH, size.width - FRAME_WIDTH), min(HEIGHT, size.height - FRAME_HEIGHT))
         text = "\n".join([*picture(emulator, *room), "", *status(emulator)])
-        return Panel(Text(text, no_wrap=True), title=self._title, expand=False)
+        return Panel(plain_text(text, no_wrap=True), title=plain_text(self._title), expand=False)
 
     def __enter__(self) -> LiveView:
         self._live.start()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import functools
 import logging
 import os
 import secrets
@@ -18,6 +19,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
+from realitygap._foreign_text import script_text
 from realitygap.errors import RealityGapError, StudyError, from_extra, whole_number
 from realitygap.settings import shown
 
@@ -168,6 +170,7 @@ def _prepare(root: Path, token: str, port: int, *, is_local: bool, allow_code: b
     nicegui_app.config.quasar_config["loadingBar"]["skipHijack"] = (
         True  # pages show by themselves how far an upload is
     )
+    _clean_pages()
     app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
     add_pages(lab)
     ui.run_with(
@@ -196,6 +199,21 @@ def _prepare(root: Path, token: str, port: int, *, is_local: bool, allow_code: b
         timeout_graceful_shutdown=2,
     )
     return lab, uvicorn.Server(config)
+
+
+def _clean_pages() -> None:
+    """Let no text on a page control it; NiceGUI has no other place through which all of them go."""
+    import nicegui.json
+
+    write = nicegui.json.dumps
+    if not hasattr(write, "of_lab"):
+
+        @functools.wraps(write)
+        def write_clean(*arguments: Any, **options: Any) -> str:
+            return script_text(write(*arguments, **options))
+
+        write_clean.of_lab = True  # type: ignore[attr-defined]  # marks our own, to install it once
+        nicegui.json.dumps = write_clean
 
 
 def _is_news(record: logging.LogRecord) -> bool:

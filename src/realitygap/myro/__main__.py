@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import realitygap.myro as myro
+from realitygap._foreign_text import printable
 from realitygap.errors import RealityGapError
 
 from . import _robot
@@ -107,7 +108,7 @@ def _once(options: argparse.Namespace) -> int:
         force_port(None)
     _, trace_of_program = _outcome()
     if error is not None:
-        print(error, file=sys.stderr)
+        print(printable(str(error)), file=sys.stderr)
     if trace_of_program:
         print(trace_of_program)
     return 0 if error is None else 1

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from realitygap._foreign_text import printable
+
 from ._colors import Color
 from ._mistakes import MyroError
 
@@ -89,7 +91,7 @@ def pickAFile() -> str:
         names = sorted(
             entry.name + "/" * entry.is_dir() for entry in folder.iterdir() if entry.name[0] != "."
         )
-        print(f"In {folder.resolve()}: {', '.join(names) or 'nothing'}")
+        print(printable(f"In {folder.resolve()}: {', '.join(names) or 'nothing'}"))
 
 
 def pickAFolder() -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from realitygap._foreign_text import printable
+
 from ._base import Base
 from ._mistakes import MyroError, is_on, whole
 
@@ -66,7 +68,7 @@ class Fluke(Base):
 
     def getFlukeLog(self) -> None:
         """Print the error log of a Fluke 2."""
-        print(self.driver.error_log())
+        print(printable(self.driver.error_log()))
 
     def enablePanNetworking(self) -> None:
         """Let a Fluke 2 offer a network over Bluetooth."""

@@ -12,6 +12,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, TypeVar
 
+from realitygap._foreign_text import printable
 from realitygap.errors import RealityGapError, did_you_mean
 
 T = TypeVar("T")
@@ -146,7 +147,7 @@ def show_mistakes_plainly(on_error: Callable[[], None], on_cell: Callable[[], No
     def hook(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
         on_error()
         if issubclass(kind, RealityGapError):
-            sys.stderr.write(explanation(error, trace) + "\n")
+            sys.stderr.write(printable(explanation(error, trace)) + "\n")
         else:
             before(kind, error, trace)
 
@@ -162,7 +163,7 @@ def show_mistakes_plainly(on_error: Callable[[], None], on_cell: Callable[[], No
 def _in_notebook(
     shell: Any, kind: type[BaseException], error: BaseException, trace: TracebackType | None, **_: Any
 ) -> None:
-    sys.stderr.write(explanation(error, trace) + "\n")
+    sys.stderr.write(printable(explanation(error, trace)) + "\n")
 
 
 def notebook_shell() -> Any:

@@ -6,6 +6,7 @@ import os
 import sys
 from typing import Any
 
+from realitygap._foreign_text import printable
 from realitygap.errors import RobotError
 from realitygap.robots.scribbler import Scribbler as Driver
 from realitygap.robots.scribbler import find_ports
@@ -65,7 +66,7 @@ def _name(port: str | int | None) -> str:
 def _asked() -> str:
     ports = find_ports()
     for found in ports:
-        print(f"  {found.port:20} {found.seems}")
+        print(printable(f"  {found.port:20} {found.seems}"))
     try:
         given = input('Port of the robot ("sim" for a simulated one) [sim]: ').strip().strip("\"'")
     except EOFError:

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from typing import Any, Concatenate, ParamSpec, TypeVar
 
 from realitygap._closing import ClosedOnExit
+from realitygap._foreign_text import printable
 from realitygap.errors import RobotError
 from realitygap.robots import SystemClock
 
@@ -99,7 +100,7 @@ class Scribbler(Driving, Senses, Sound, Lights, Camera, Identity, Paths, Fluke, 
         self.setLED("all", "off")
         for hz in _HELLO:
             self.beep(0.03, hz)
-        print(f"Hello, I'm {self.getName()}!")
+        print(printable(f"Hello, I'm {self.getName()}!"))
 
     def reboot(self) -> None:
         """Restart the robot, as its reset button does."""

@@ -228,7 +228,10 @@ _GENOME = {
 """Lists of a genome: the types of JSON in them, and what each entry must be."""
 _RUN = "condition = own.condition AND replicate = own.replicate"
 _GENERATION = f"{_RUN} AND generation = own.generation"
-_N_CELLS = "(SELECT n_cells FROM trials JOIN conditions ON conditions.name = trials.condition WHERE trials.id = own.trial)"
+_N_CELLS = (
+    "(SELECT n_cells FROM trials JOIN conditions ON conditions.name = trials.condition "
+    "WHERE trials.id = own.trial)"
+)
 
 _RULES = (
     # each value

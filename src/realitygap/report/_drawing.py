@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy.typing as npt
 
+from realitygap._foreign_text import page_text
 from realitygap.drawing import FONT, Ink
 from realitygap.report._marks import Panel, frames_of
 
@@ -36,10 +37,6 @@ NARROW = 3.7
 
 _METRIC_FONT = "DejaVu Sans"
 """Comes with matplotlib, so that the layout is the same everywhere; wider than those in `FONT`."""
-
-
-_NOT_XML = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")
-"""Characters that a user's text may contain but XML may not."""
 
 
 _STYLE: dict[Any, Any] = {
@@ -274,14 +271,14 @@ def to_svg(figure: Figure, name: str, alt: str) -> str:
     """
     buffer = io.StringIO()
     figure.savefig(buffer, format="svg", metadata=dict.fromkeys(("Creator", "Date", "Format", "Type")))
-    root = ET.fromstring(_NOT_XML.sub("", buffer.getvalue()))
+    root = ET.fromstring(page_text(buffer.getvalue()))
     _drop_baggage(root)
     _rename_ids(root, name)
     for element in root.iter():
         _tidy(element)
     root.attrib.pop("version", None)
     root.set("role", "img")
-    root.set("aria-label", _NOT_XML.sub("", alt))
+    root.set("aria-label", page_text(alt))
     root.set("style", "stroke-linejoin: round; stroke-linecap: butt")
     ET.register_namespace("", _SVG)
     return ET.tostring(root, encoding="unicode")

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from realitygap._foreign_text import script_text
 from realitygap.report._drawing import NARROW, Drawing, inline
 from realitygap.report._marks import marks_content
 from realitygap.report._template import packed, template_text
@@ -73,7 +74,7 @@ def as_json(values: Mapping[str, Any]) -> Markup:
     """JSON for a script element: nothing in it ends the element, whatever the names are."""
     from markupsafe import Markup
 
-    text = json.dumps(values, separators=(",", ":"), allow_nan=False)
+    text = script_text(json.dumps(values, separators=(",", ":"), allow_nan=False))
     for letter in "<>&":
         text = text.replace(letter, f"\\u{ord(letter):04x}")
     return Markup(text)

@@ -7,6 +7,8 @@ from collections.abc import Callable, Mapping
 from importlib import resources
 from typing import Any
 
+from realitygap._foreign_text import page_text
+
 
 def render_page(name: str, content: Mapping[str, Any], **filters: Callable[..., str]) -> str:
     """A page from a template, its style sheet and its content.
@@ -28,7 +30,7 @@ def render_page(name: str, content: Mapping[str, Any], **filters: Callable[..., 
     environment.filters.update(filters)
     tokens = resources.files("realitygap.drawing").joinpath("tokens.css").read_text(encoding="utf-8")
     page = environment.get_template(name).render({**content, "css": tokens + template_text("report.css")})
-    return _keep_units(page)
+    return _keep_units(page_text(page))
 
 
 _UNIT = re.compile(

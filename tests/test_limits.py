@@ -237,9 +237,9 @@ def test_checkpoint_with_an_array_larger_than_the_file_is_refused():
         ("CREATE TRIGGER t AFTER INSERT ON notes BEGIN DELETE FROM notes; END", "a trigger"),
         ("UPDATE trials SET n_steps = 'many'", "table trials"),
         ("UPDATE steps SET raw = x'00'", "table steps"),
-        ("UPDATE steps SET raw = '" + "[" * 500 + "'", "too deep"),
-        ("UPDATE steps SET raw = '{\"a\": 1}'", "no list of numbers"),
-        ("UPDATE scores SET cells = '[1e999]'", "too large"),
+        ("UPDATE steps SET raw = '" + "[" * 500 + "'", "expected JSON that is not too deep"),
+        ("UPDATE steps SET raw = '{\"a\": 1}'", "expected a list of numbers"),
+        ("UPDATE scores SET cells = '[1e999]'", "expected a list of cells"),
     ],
 )
 def test_ledger_from_elsewhere_gets_one_message(tmp_path, change, expected):

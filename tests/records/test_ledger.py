@@ -242,7 +242,7 @@ def test_foreign_schema_is_refused_before_any_row_is_read(tmp_path):
                     other.execute(more[name])
                 other.close()
         for writable in (True, False):
-            with pytest.raises(LedgerError, match="realitygap did not make|is missing"):
+            with pytest.raises(LedgerError, match=r"realitygap did not make|is missing"):
                 Ledger.open(ledger.path, writable=writable)
 
 

@@ -278,7 +278,7 @@ def _list(ledger: Ledger, *, as_json: bool) -> None:
 
     table = Table(box=None, padding=(0, 2, 0, 0))
     for head in ("trial", "code", "sheet", "state", "cells", "description"):
-        table.add_column(head, no_wrap=head != "description")
+        table.add_column(head, no_wrap=head not in ("code", "description"), overflow="fold")
     hidden = _is_blind(ledger)
     for each in found:
         what = "" if hidden and not each.is_closed else each.name

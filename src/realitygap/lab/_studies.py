@@ -185,7 +185,7 @@ class Studies:
 
 
 class _Look:
-    """One look at the folder of a study, in a thread of its own.
+    """One look at the folder of a study, in a separate thread.
 
     Attributes:
         state: The state; the one before while the folder is being read.

@@ -53,12 +53,12 @@ _JSON = {
 
 @dataclass(frozen=True)
 class _Rule:
-    """What the rows of a table must be.
+    """A requirement on the rows of a table.
 
     Attributes:
         table: Table.
         column: Column that the message shows.
-        expected: What it must be.
+        expected: Its required value, for the message.
         broken: SQL that is true for a row that breaks the rule.
     """
 
@@ -114,7 +114,10 @@ def _problems(connection: sqlite3.Connection) -> Iterator[str]:
     for table, columns in _JSON.items():
         for column in columns:
             yield from _broken(
-                connection, _Rule(table, column, "JSON", f"NOT json_valid(coalesce({column}, 'null'))")
+                connection,
+                _Rule(
+                    table, column, "JSON that is not too deep", f"NOT json_valid(coalesce({column}, 'null'))"
+                ),
             )
     for table, number, parent, _ in connection.execute("PRAGMA foreign_key_check"):
         yield f"table {table}: row {number} refers to a row that is not in table {parent}"

@@ -8,14 +8,15 @@ from ._contact_plans import contact_plans
 from ._evidence import LEAST_STEPS, Evidence, Vectors, evidence_of
 from ._excitation import excitation, random_controllers
 from ._handles import CONTACT, MOTION
-from ._held_out import HeldOut
+from ._held_out import DECISIVE, HeldOut, is_better
 from ._log_model import MotionLog
+from ._log_prediction import PathErrors, Steps, path_errors, summary_of
 from ._motion import MotionFit, fit_motion
-from ._motion_log import MotionLogFit, fit_motion_log, fit_motion_logs, motion_log
+from ._motion_log import LogPrediction, MotionLogFit, fit_motion_log, fit_motion_logs, motion_log
 from ._motion_plans import motion_plans
 from ._next_trial import information_of, next_trials
 from ._path import PathFit, fit_path, path_plans
-from ._path_baselines import drive_on, look_up_motion
+from ._path_baselines import look_up_motion
 from ._predict_table import look_up_readings, place_ranks, predict_range_table
 from ._predictive import PREDICTED, Misfit, misfits, prediction_errors
 from ._prior import Effect, Floats, Parameter, numbers_of, ranges_of, scribbler_prior, standard_of, values_of
@@ -31,6 +32,7 @@ from .infrared._readings import Placement
 
 __all__ = [
     "CONTACT",
+    "DECISIVE",
     "LEAST_PLACEMENTS",
     "LEAST_STEPS",
     "MOTION",
@@ -42,6 +44,7 @@ __all__ = [
     "Floats",
     "HeldOut",
     "Independence",
+    "LogPrediction",
     "MeasuredFrom",
     "Misfit",
     "MotionFit",
@@ -49,19 +52,20 @@ __all__ = [
     "MotionLogFit",
     "Moved",
     "Parameter",
+    "PathErrors",
     "PathFit",
     "Placement",
     "Posterior",
     "RangeTableFit",
     "SensorFit",
     "Simulate",
+    "Steps",
     "TableFrame",
     "Vectors",
     "bearings_from_heading",
     "choose_frame",
     "contact_plans",
     "distance_of",
-    "drive_on",
     "end_pose_of",
     "evidence_of",
     "excitation",
@@ -77,6 +81,7 @@ __all__ = [
     "fit_sensor",
     "independence",
     "information_of",
+    "is_better",
     "look_up_motion",
     "look_up_readings",
     "misfits",
@@ -87,6 +92,7 @@ __all__ = [
     "next_trials",
     "numbers_of",
     "of_one_length",
+    "path_errors",
     "path_plans",
     "place_ranks",
     "placements_of",
@@ -99,5 +105,6 @@ __all__ = [
     "sensor_plans",
     "standard_of",
     "step_of",
+    "summary_of",
     "values_of",
 ]

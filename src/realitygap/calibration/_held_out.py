@@ -2,13 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from realitygap.world import Fitted
 
 Choice = Literal["fitted", "nominal"]
+
+DECISIVE = ("after 5 s", "after 30 s")
+"""Further errors that have to agree before fitted numbers are recommended."""
+
+
+def is_better(errors: Sequence[tuple[float, float]]) -> bool:
+    """Return whether fitted numbers predict better than nominal ones, by (nominal, fitted) errors of several kinds.
+
+    The first error has to be smaller, and none of the others may be larger.
+    """
+    nominal, fitted = errors[0]
+    return fitted < nominal and all(fitted <= nominal for nominal, fitted in errors[1:])
 
 
 @dataclass(frozen=True)
@@ -35,8 +47,9 @@ class HeldOut:
 
     @property
     def recommended(self) -> Choice:
-        """The numbers with the smaller error; nominal if both are equal."""
-        return "fitted" if self.fitted < self.nominal else "nominal"
+        """The fitted numbers if they predict better; nominal if both are equal."""
+        also = [self.more[name] for name in DECISIVE if name in self.more]
+        return "fitted" if is_better([(self.nominal, self.fitted), *also]) else "nominal"
 
 
 @dataclass(frozen=True)

@@ -1,9 +1,7 @@
 """A model of a log: wheels follow commands, a body follows its wheels, and a camera or encoders see it.
 
-Poses are filtered by an extended Kalman filter, so that errors of the heading grow along the path, and one false
-turn is not explained by gains.
-
-Source: Särkkä (2013), Bayesian Filtering and Smoothing, sections 5.2 and 12.2.
+The wheels and the filter of the poses are kernels (`kernels/sim/odometry.py`), so that errors of the heading grow along
+the path, and one false turn is not explained by gains.
 """
 
 from __future__ import annotations
@@ -13,19 +11,24 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from realitygap.kernels.sim import odometry
+
 from ._simulate import Bools, Floats
 
-LEAST_LAG = 1e-6
-"""A lag below this is none [s]."""
-
-LEAST_ROOM = 1e-6
-"""Minimum of 1 - soft dead band, by which commands are divided."""
-
-FIRST_TURN = 0.3
-"""Standard deviation of the first heading, which positions alone show only later [rad]."""
-
 FIRST_PATH = 0.3
-"""Path from which the first heading is taken [m]."""
+"""Path from which the first heading is taken if the log has none [m]."""
+
+WHEELS = ("speed_left", "speed_right", "bias_left", "bias_right", "dead_band", "soft_dead_band", "lag")
+"""Numbers of the drive, in the order of the kernel; a speed is that of the robot times a gain."""
+
+BODY = (
+    "drive.track", "drive.axle", "camera.left", "camera.heading", "drive.drift_per_m", "drive.slip",
+    "drive.travel_noise_per_m", "drive.heading_noise_per_m", "drive.heading_noise_per_s", "place", "angle",
+)  # fmt: skip
+"""Numbers of the body, of its noise, and of the camera, in the order of the kernel."""
+
+DEGREES = odometry.DEGREES
+Numbers = Mapping[str, Floats]
 
 
 @dataclass(frozen=True)
@@ -35,7 +38,7 @@ class MotionLog:
     Attributes:
         time_s: (n,) ascending [s].
         commands: (n, 2) command of the left and the right wheel, as shares of full speed. Each lasts until the next
-            time.
+            time. No rows if there are none: the encoders then show what the wheels did.
         poses: (n, 3) x [m], y [m], heading [rad]; nan if not seen.
         encoders: (n, 2) distance of the left and right wheel since the start [m]; nan if not seen.
     """
@@ -48,8 +51,15 @@ class MotionLog:
     def until(self, row: int) -> MotionLog:
         """Return the same log without observations from a row on."""
         poses, encoders = self.poses.copy(), self.encoders.copy()
-        poses[row:], encoders[row:] = np.nan, np.nan
+        poses[row:] = np.nan
+        if len(self.commands):
+            encoders[row:] = np.nan
         return replace(self, poses=poses, encoders=encoders)
+
+    @property
+    def has_commands(self) -> bool:
+        """True if the log has commands."""
+        return len(self.commands) > 0
 
     @property
     def sees_poses(self) -> bool:
@@ -63,195 +73,101 @@ class MotionLog:
 
     @property
     def sees_wheels(self) -> bool:
-        """True if encoders were observed at two times."""
-        return bool((np.isfinite(self.encoders).all(axis=1)).sum() > 1)
+        """True if encoders were observed at two times, next to commands."""
+        return self.has_commands and bool((np.isfinite(self.encoders).all(axis=1)).sum() > 1)
 
 
-@dataclass(frozen=True)
-class Tracked:
-    """A filtered log for m sets of numbers.
-
-    Attributes:
-        poses: (m, n, 3) predicted before each time's own observation.
-        log_likelihood: (m,) log likelihood of the poses.
-    """
-
-    poses: Floats
-    log_likelihood: Floats
-
-
-def wheel_steps(log: MotionLog, numbers: Mapping[str, Floats]) -> Floats:
-    """Return the distance of each wheel between two times, shape (m, n - 1, 2) [m].
-
-    A command is late by the delay, and a speed nears it within the lag, as in kernels/sim/drive.py. A command that
-    changes between two times because of the delay counts with its mean.
+def wheel_ways(log: MotionLog, numbers: Numbers) -> Floats:
+    """Return the distance of each wheel since the start, shape (m, n, 2) [m].
 
     Args:
-        log: Times and commands.
-        numbers: (m,) values of `drive.*`.
+        log: Times with commands or encoders.
+        numbers: (m,) values of `drive.*` and `encoder.*`.
     """
-    at = {name.removeprefix("drive."): values[:, None] for name, values in numbers.items()}
-    time = log.time_s
-    steps = []
-    for wheel, side in enumerate(("left", "right")):
-        asked = log.commands[None, :, wheel]
-        size = np.abs(asked)
-        soft = at["soft_dead_band"]
-        moved = np.where(size > at["dead_band"], size, 0.0)
-        moved = np.maximum(moved - soft, 0.0) / np.maximum(1.0 - soft, LEAST_ROOM)
-        target = at["speed"] * at[f"gain_{side}"] * np.sign(asked) * moved
-        target = target + np.where(moved > 0, at[f"bias_{side}"], 0.0)
-        steps.append(_rolled(_delayed(target, time, at["delay"]), time, at["lag"]))
-    return np.stack(steps, axis=-1)
+    if not log.has_commands:
+        gains = np.stack([numbers["encoder.gain_left"], numbers["encoder.gain_right"]], axis=1)
+        return np.asarray(log.encoders[None] / gains[:, None])
+    at = {name.removeprefix("drive."): values for name, values in numbers.items()}
+    at |= {f"speed_{side}": at["speed"] * at[f"gain_{side}"] for side in ("left", "right")}
+    wheels = np.stack([at[name] for name in WHEELS], axis=1)
+    ways = np.empty((len(wheels), len(log.time_s), 2))
+    odometry.roll_wheels(log.time_s, log.commands, wheels, ways)
+    return read_late(log, ways, at["delay"])
 
 
-def _delayed(target: Floats, time: Floats, delay: Floats) -> Floats:
-    """Return mean targets between two times of late commands, (m, n - 1)."""
-    lasts = np.diff(time)
-    if not np.any(delay):
-        return np.broadcast_to(target[:, :-1], (len(target), len(lasts)))
-    total = np.concatenate([np.zeros((len(target), 1)), np.cumsum(target[:, :-1] * lasts, axis=1)], axis=1)
-    late = np.broadcast_to(np.clip(time - delay, time[0], None), total.shape)
-    reached = np.stack([np.interp(times, time, row) for times, row in zip(late, total, strict=True)])
-    return np.asarray(np.diff(reached, axis=1) / lasts)
+def read_late(log: MotionLog, ways: Floats, late: Floats) -> Floats:
+    """Return the distances of wheels (m, n, 2) as they were `late` (m,) before each time [m]."""
+    if not np.any(late):
+        return ways
+    seen = np.empty_like(ways)
+    odometry.read_late(log.time_s, ways, late, seen)
+    return seen
 
 
-def _rolled(target: Floats, time: Floats, lag: Floats) -> Floats:
-    """Return (m, n - 1) distances of wheels that near their targets exponentially [m]."""
-    slow = np.maximum(lag, LEAST_LAG)
-    lasts = np.diff(time)
-    left = np.exp(-lasts / slow)
-    if not np.any(lag > LEAST_LAG):
-        return target * lasts
-    steps, speed = np.empty_like(target), np.zeros(len(target))
-    for k in range(target.shape[1]):
-        short = speed - target[:, k]
-        steps[:, k] = target[:, k] * lasts[k] + short * slow[:, 0] * (1.0 - left[:, k])
-        speed = target[:, k] + short * left[:, k]
-    return steps
-
-
-def track(
-    log: MotionLog, steps: Floats, numbers: Mapping[str, Floats], noise: Mapping[str, Floats]
-) -> Tracked:
-    """Filter the poses of a log.
-
-    Args:
-        log: Log of n times. Rows without a position are predicted.
-        steps: (m, n - 1, 2) result of `wheel_steps`.
-        numbers: (m,) values of `drive.*`.
-        noise: (m,) `travel_per_m`, `heading_per_m`, `heading_per_s`, `place` and `angle`.
-    """
-    m, n = steps.shape[:2]
-    n += 1
-    lasts = np.diff(log.time_s)
-    keep = (1.0 - numbers["drive.slip"])[:, None]
-    left, right = steps[..., 0] * keep, steps[..., 1] * keep
-    length = (left + right) / 2
-    turn = (right - left) / numbers["drive.track"][:, None] + numbers["drive.drift_per_m"][:, None] * length
-    way = (np.abs(steps[..., 0]) + np.abs(steps[..., 1])) / 2
-    travel = noise["travel_per_m"][:, None] ** 2 * way + 1e-12
-    heading = noise["heading_per_m"][:, None] ** 2 * way
-    heading = heading + noise["heading_per_s"][:, None] ** 2 * lasts * (way > 1e-3 * lasts) + 1e-12
-    first = int(np.flatnonzero(np.isfinite(log.poses[:, 0]))[0])
-    axle = numbers["drive.axle"]
-    state = np.zeros((m, 3))
-    state[:, 2] = log.poses[first, 2]
-    if not np.isfinite(log.poses[first, 2]):
-        state[:, 2] = _first_heading(log, length, turn, first)
-    state[:, 0] = log.poses[first, 0] + axle * np.cos(state[:, 2])
-    state[:, 1] = log.poses[first, 1] + axle * np.sin(state[:, 2])
-    place, angle = noise["place"] ** 2, noise["angle"] ** 2
-    spread = np.zeros((m, 3, 3))
-    spread[:, 0, 0] = spread[:, 1, 1] = place
-    spread[:, 2, 2] = angle if np.isfinite(log.poses[first, 2]) else FIRST_TURN**2
-    predicted, logs = np.empty((m, n, 3)), np.zeros(m)
-    predicted[:, : first + 1] = state[:, None]
-    for k in range(first, n - 1):
-        state, spread = _moved(state, spread, length[:, k], turn[:, k], travel[:, k], heading[:, k])
-        predicted[:, k + 1] = state
-        seen = log.poses[k + 1]
-        if np.isfinite(seen[0]):
-            state, spread, one = _updated(state, spread, seen, axle, place, angle)
-            logs += one
-    predicted[..., 0] -= axle[:, None] * np.cos(predicted[..., 2])
-    predicted[..., 1] -= axle[:, None] * np.sin(predicted[..., 2])
-    return Tracked(predicted, logs)
-
-
-def _first_heading(log: MotionLog, length: Floats, turn: Floats, first: int) -> Floats:
-    """Return the heading that aligns the first part of the simulated path with the observed one, (m,) [rad]."""
-    heading = np.concatenate([np.zeros((len(turn), 1)), np.cumsum(turn[:, first:], axis=1)], axis=1)
-    middle = heading[:, :-1] + turn[:, first:] / 2
-    path = np.cumsum(length[:, first:] * np.exp(1j * middle), axis=1)
-    seen = (log.poses[first + 1 :, 0] - log.poses[first, 0]) + 1j * (
-        log.poses[first + 1 :, 1] - log.poses[first, 1]
-    )
-    gone = np.cumsum(np.abs(length[:, first:]).mean(axis=0))
-    part = np.isfinite(seen) & (gone <= max(FIRST_PATH, gone[0]))
-    return np.asarray(np.angle((np.conj(path[:, part]) * seen[part]).sum(axis=1)))
-
-
-def _moved(
-    state: Floats, spread: Floats, length: Floats, turn: Floats, travel: Floats, heading: Floats
-) -> tuple[Floats, Floats]:
-    """Drive an arc, with noise of its length and of its turn."""
-    middle = state[:, 2] + turn / 2
-    chord = length * np.sinc(turn / (2 * np.pi))
-    cosine, sine = np.cos(middle), np.sin(middle)
-    new = state + np.stack([chord * cosine, chord * sine, turn], axis=1)
-    a, b = -chord * sine, chord * cosine
-    p = spread.copy()
-    p[:, 0] += a[:, None] * spread[:, 2]
-    p[:, 1] += b[:, None] * spread[:, 2]
-    q = p.copy()
-    q[:, :, 0] += a[:, None] * p[:, :, 2]
-    q[:, :, 1] += b[:, None] * p[:, :, 2]
-    half = np.stack([a / 2, b / 2, np.ones_like(a)], axis=1)
-    along = np.stack([cosine, sine, np.zeros_like(cosine)], axis=1)
-    q += travel[:, None, None] * along[:, :, None] * along[:, None, :]
-    q += heading[:, None, None] * half[:, :, None] * half[:, None, :]
-    return new, q
-
-
-def _updated(
-    state: Floats, spread: Floats, seen: Floats, axle: Floats, place: Floats, angle: Floats
-) -> tuple[Floats, Floats, Floats]:
-    """Take the observations of one time, one after the other: their errors are independent."""
-    logs = np.zeros(len(state))
-    for axis in range(3 if np.isfinite(seen[2]) else 2):
-        off, by_heading = seen[axis] - state[:, axis], np.zeros(len(state))
-        if axis == 2:
-            off = np.mod(off + np.pi, 2 * np.pi) - np.pi
-        else:  # the body's origin is seen, and the middle of its axle moves
-            cosine, sine = np.cos(state[:, 2]), np.sin(state[:, 2])
-            off = off + axle * (sine if axis else cosine)
-            by_heading = axle * (-cosine if axis else sine)
-        row = spread[:, axis] + by_heading[:, None] * spread[:, 2]
-        variance = row[:, axis] + by_heading * row[:, 2] + (angle if axis == 2 else place)
-        gain = row / variance[:, None]
-        state = state + gain * off[:, None]
-        spread = spread - gain[:, :, None] * row[:, None, :]
-        logs -= 0.5 * (off**2 / variance + np.log(2 * np.pi * variance))
-    return state, spread, logs
-
-
-def encoder_likelihood(log: MotionLog, steps: Floats, noise: Mapping[str, Floats]) -> Floats:
-    """Return the log likelihood of the distances between encoder readings, shape (m,).
+def pose_likelihood(log: MotionLog, ways: Floats, numbers: Numbers) -> tuple[Floats, Floats]:
+    """Return the log likelihood of each pose, (m, n), and what it was off by, (m, n, 3) [m, m, rad].
 
     Args:
         log: Log of n times.
-        steps: (m, n - 1, 2) result of `wheel_steps`.
-        noise: (m,) `wheel_per_m`, of a distance, and `wheel`, of a reading [m].
+        ways: (m, n, 2) result of `wheel_ways`.
+        numbers: (m,) values of `BODY` and of `camera.delay`, by which poses are late [s].
+    """
+    m, n = ways.shape[:2]
+    seen = read_late(log, ways, numbers["camera.delay"])
+    first = np.zeros(m)
+    start = int(np.flatnonzero(np.isfinite(log.poses[:, 0]))[0])
+    if not np.isfinite(log.poses[start, 2]):
+        first = _first_heading(log, seen, numbers, start)
+    bodies = np.stack([*(numbers[name] for name in BODY), first], axis=1)
+    logs, off = np.empty((m, n)), np.empty((m, n, 3))
+    odometry.filter_poses(log.time_s, log.poses, seen, bodies, np.empty((4, 3)), logs, off)
+    return logs, off
+
+
+def body_steps(ways: Floats, numbers: Numbers) -> tuple[Floats, Floats]:
+    """Return the distance of the axle's middle [m] and the turn [rad] between two times, (m, n - 1) each."""
+    steps = np.diff(ways, axis=1) * (1.0 - numbers["drive.slip"])[:, None, None]
+    length = steps.mean(axis=2)
+    turn = (steps[..., 1] - steps[..., 0]) / numbers["drive.track"][:, None]
+    return length, turn + numbers["drive.drift_per_m"][:, None] * length
+
+
+def _first_heading(log: MotionLog, ways: Floats, numbers: Numbers, first: int) -> Floats:
+    """Return the heading that aligns the first part of the simulated path with the observed one, (m,) [rad]."""
+    length, turn = body_steps(ways, numbers)
+    gone = np.cumsum(np.abs(length[:, first:]).mean(axis=0))
+    end = first + max(int(np.searchsorted(gone, FIRST_PATH)), 1) + 1
+    length, turn = length[:, first:end], turn[:, first:end]
+    heading = np.cumsum(turn, axis=1)
+    path = np.cumsum(length * np.exp(1j * (heading - turn / 2)), axis=1)
+    path += (numbers["camera.left"] * 1j - numbers["drive.axle"])[:, None] * (np.exp(1j * heading) - 1.0)
+    seen = log.poses[first + 1 : end + 1, 0] + 1j * log.poses[first + 1 : end + 1, 1]
+    seen = seen - (log.poses[first, 0] + 1j * log.poses[first, 1])
+    part = np.isfinite(seen)
+    return np.asarray(np.angle((np.conj(path[:, part]) * seen[part]).sum(axis=1)))
+
+
+def encoder_likelihood(log: MotionLog, ways: Floats, numbers: Numbers) -> Floats:
+    """Return the log likelihood of the distance since the reading before, shape (m, n).
+
+    Args:
+        log: Log of n times.
+        ways: (m, n, 2) result of `wheel_ways`.
+        numbers: (m,) values of `encoder.gain_*`, and `wheel_per_m`, of a distance, and `wheel`, of a reading [m].
     """
     rows = np.flatnonzero(np.isfinite(log.encoders).all(axis=1))
-    total = np.concatenate([np.zeros_like(steps[:, :1]), np.cumsum(steps, axis=1)], axis=1)
-    off = np.diff(log.encoders[rows], axis=0)[None] - np.diff(total[:, rows], axis=1)
-    way = np.abs(np.diff(total[:, rows], axis=1))
-    variance = noise["wheel_per_m"][:, None, None] ** 2 * way + 2 * noise["wheel"][:, None, None] ** 2
-    return np.asarray(-0.5 * (off**2 / variance + np.log(2 * np.pi * variance)).sum(axis=(1, 2)))
+    gains = np.stack([numbers["encoder.gain_left"], numbers["encoder.gain_right"]], axis=1)
+    told = np.diff(ways[:, rows], axis=1) * gains[:, None]
+    off = np.diff(log.encoders[rows], axis=0)[None] - told
+    variance = numbers["wheel_per_m"][:, None, None] ** 2 * np.abs(told)
+    variance = variance + 2 * numbers["wheel"][:, None, None] ** 2
+    logs = np.zeros(ways.shape[:2])
+    density = np.log(variance) + (DEGREES + 1.0) * np.log1p(off**2 / (DEGREES * variance))
+    logs[:, rows[1:]] = -0.5 * density.sum(axis=2)
+    return logs
 
 
 def seen_rows(log: MotionLog) -> Bools:
     """Return whether each time has an observation, (n,)."""
-    return np.asarray(np.isfinite(log.poses[:, 0]) | np.isfinite(log.encoders).all(axis=1))
+    wheels = np.isfinite(log.encoders).all(axis=1) if log.has_commands else False
+    return np.asarray(np.isfinite(log.poses[:, 0]) | wheels)

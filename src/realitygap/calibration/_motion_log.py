@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,7 +14,10 @@ from realitygap.errors import finite_numbers
 from realitygap.world import Fitted, RobotModel
 
 from ._held_out import HeldOut, HeldOutFit
-from ._log_model import MotionLog, encoder_likelihood, seen_rows, track, wheel_steps
+from ._log_fit import LogPosterior, LogProblem, rows_of, sample_log_posterior
+from ._log_model import MotionLog, Numbers, body_steps, read_late, seen_rows, wheel_ways
+from ._log_parameters import LogNumbers, LogParameter
+from ._log_prediction import PathErrors, Steps, last_seen, path_errors, positions, summary_of
 from ._simulate import Floats
 
 N_DRAWS = 200
@@ -24,105 +27,55 @@ IDENTIFIED = 0.35
 """A parameter is identified if its standard deviation is below this, in scales of its prior: half of what the prior has
 at its peak."""
 
-WIDE = 0.05
-"""Distance over which a curvature is taken, in the same scales."""
-
-FREE = 0.01
-"""Weight of the prior in a first search, in which the log alone decides what it can tell."""
-
-LEAST_CURVATURE = 0.03
-"""Minimum curvature of a log posterior on the standard scale, so that an interval is no wider than its prior's."""
-
-BEYOND = 1e12
-"""Larger than what is minimized can be."""
-
-STEP = 1e-3
-"""Step of finite differences, in standard deviations of the prior."""
+MAIN = ("drive.gain", "drive.asymmetry", "drive.track", "drive.axle", "encoder.gain", "encoder.asymmetry")
+DISAGREE = 2.0
+"""Widening of the intervals of the main parameters beyond which the parts of a log contradict each other."""
 
 METHOD = (
-    "Maximum a posteriori with a Cauchy prior around the robot file's numbers (Gelman et al. 2008); likelihood of the "
-    "poses by an extended Kalman filter (Särkkä 2013, sections 5.2 and 12.2) and of the distances between encoder "
-    "readings; intervals from the curvature (Laplace)."
+    "Posterior with Cauchy priors around the robot file's numbers (Gelman et al. 2008); likelihood of the poses by an "
+    "extended Kalman filter (Särkkä 2013, sections 5.2 and 12.2) and of the distances between encoder readings; "
+    "widened where blocks of time disagree (sandwich covariance, White 1982)."
 )
 
 
 @dataclass(frozen=True)
-class Spread:
-    """A parameter of a log with its prior.
+class LogPrediction:
+    """Predictions of the unseen part of a log.
 
     Attributes:
-        name: Name, the same as in a calibration.
-        kind: plus: spread around the robot's own number; ratio: its logarithm is; size: only its absolute value
-            counts.
-        spread: Scale of the prior, chosen for a robot whose file is nearly right: a Cauchy distribution, whose tails
-            let go of a file that is wrong (Gelman et al. 2008); with `is_normal`, the standard deviation.
-        unit: Unit of its values.
-        advice: Data to record if it is not identified.
+        split: First row of the unseen part.
+        nominal: Motion by the robot's own numbers.
+        fitted: Motion by the fitted numbers.
+        errors: Errors of both positions, by the names nominal and fitted; None without poses.
+        wheels: Errors of both speeds of the wheels; None with poses.
     """
 
-    name: str
-    kind: Literal["plus", "ratio", "size"]
-    spread: float
-    unit: str
-    advice: str
-    is_normal: bool = False
-
-    def log_prior(self, standard: Floats) -> Floats:
-        """Return log densities at points of the standard scale, less a constant."""
-        return np.asarray(-0.5 * standard**2 if self.is_normal else -np.log1p(standard**2))
-
-    @property
-    def most(self) -> float:
-        """The 95 % quantile of the prior on the standard scale."""
-        return 1.645 if self.is_normal else 6.314
-
-    def of(self, own: float, standard: Floats) -> Floats:
-        """Return values at points of the standard scale."""
-        if self.kind == "ratio":
-            return np.asarray(own * np.exp(self.spread * standard))
-        values = own + self.spread * standard
-        return np.abs(values) if self.kind == "size" else values
-
-
-DRIVE = (
-    Spread("drive.gain", "ratio", 0.01, "", "Drive straight for longer."),
-    Spread("drive.asymmetry", "plus", 0.005, "", "Drive straight, ahead and back."),
-    Spread("drive.track", "ratio", 0.01, "m", "Turn in place, in both directions, with poses."),
-    Spread("drive.axle", "plus", 0.002, "m", "Turn in place, in both directions, with poses."),
-    Spread("drive.drift_per_m", "plus", 0.01, "rad/m", "Drive straight, ahead and back, with poses."),
-    Spread("drive.soft_dead_band", "size", 0.02, "", "Drive at slow commands."),
-    Spread("drive.lag", "size", 0.02, "s", "Start and stop suddenly, and often."),
-)
-"""Numbers of the drive; the spreads are chosen."""
-
-OWN_NOISE = (
-    Spread("drive.travel_noise_per_m", "ratio", 1.0, "m", "Record poses for longer.", is_normal=True),
-    Spread("drive.heading_noise_per_m", "ratio", 1.0, "rad", "Record poses for longer.", is_normal=True),
-)
-SEEN_NOISE = {"place": 0.003, "angle": 0.01, "wheel": 0.0005, "wheel_per_m": 0.003}
-"""Typical errors of a camera and of encoders [m, rad, m, m]. A factor of e is one standard deviation."""
-
-LEAST_NOISE = 0.002
-"""Noise of the drive that a fit begins from, if the robot's file has less."""
+    split: int
+    nominal: Steps
+    fitted: Steps
+    errors: PathErrors | None
+    wheels: HeldOut | None
 
 
 @dataclass(frozen=True)
 class MotionLogFit(HeldOutFit):
-    """A drive fitted to logs; attributes as in `HeldOutFit`, and one more.
+    """A drive fitted to logs; attributes as in `HeldOutFit`, and more.
 
     `evidence` has the predicted and seen path of the unseen part of the first log with one.
 
     Attributes:
-        by_log: Errors on the unseen part of each log; None for a log that the fit saw wholly.
+        by_log: Predictions of the unseen part of each log; None for a log that the fit saw wholly.
+        misspecified: True if parts of the logs contradict each other, or if a parameter left its prior.
     """
 
     method: str = METHOD
-    by_log: tuple[HeldOut | None, ...] = ()
+    by_log: tuple[LogPrediction | None, ...] = ()
+    misspecified: bool = False
 
 
 def fit_motion_log(
     time_s: ArrayLike,
-    commands: ArrayLike,
+    commands: ArrayLike | None,
     robot: RobotModel,
     *,
     poses: ArrayLike | None = None,
@@ -133,12 +86,15 @@ def fit_motion_log(
     """Fit the drive of a robot to a log, and predict the part that the fit does not see.
 
     The prior is narrow around the robot's own numbers and has long tails. So a short log changes them little, and a
-    file that is wrong does not hold the fit back.
+    robot file that is wrong does not hold the fit back. Parameters that the log shows only together keep the file's
+    numbers. The place of the camera's marker to the left of the axle's middle, the heading that it shows, and the delay
+    of its clock are fitted, too. `drive.drift_per_m` is not: with an unknown marker, it cannot be distinguished from
+    `drive.asymmetry`. Without commands, the scales of the encoders are fitted in place of the gains.
 
     Args:
         time_s: (n,) ascending times [s].
         commands: (n, 2) commands of the left and right wheel as shares of `drive.speed`. Row k holds from time k to
-            time k + 1. Values beyond -1..1 are faster than `drive.speed`.
+            time k + 1. Values beyond -1..1 are faster than `drive.speed`. None: the encoders show what the wheels did.
         robot: The robot with its nominal numbers.
         poses: (n, 2) x, y [m] or (n, 3) x, y, heading [rad] of the body's origin; nan if not seen.
         encoders: (n, 2) distance of the left and right wheel since the start [m]; nan if not seen.
@@ -147,7 +103,8 @@ def fit_motion_log(
 
     Returns:
         The fit, with the error of nominal and fitted numbers on the unseen part. With poses the error is the mean
-        distance between seen and predicted positions [m]; without, that of the wheels' speeds [m/s].
+        distance between seen and predicted positions [m]; without, that of the wheels' speeds [m/s]. Predictions start
+        from a pose that was seen, and use the fitted place and clock of the camera.
 
     Raises:
         ValueError: The arrays do not fit together, or show too little.
@@ -161,13 +118,20 @@ def fit_motion_log(
 
 
 def fit_motion_logs(
-    logs: Sequence[MotionLog], robot: RobotModel, *, hold_out: float = 0.5, seed: int = 0
+    logs: Sequence[MotionLog],
+    robot: RobotModel,
+    *,
+    cameras: Sequence[int] | None = None,
+    hold_out: float = 0.5,
+    seed: int = 0,
 ) -> MotionLogFit:
     """Fit the drive of a robot to several logs together, and predict the parts that the fit does not see.
 
     Args:
         logs: Logs of `motion_log`, of the same robot.
         robot: The robot with its nominal numbers.
+        cameras: (k,) index of the camera that saw each log's poses, from 0: its place, heading, and clock. Default:
+            each log has its own.
         hold_out: Share of each log's time, at its end, that the fit does not see; 0 to fit to everything. A log that is
             too short to be split is seen wholly, if another one is long enough.
         seed: Seed of the draws.
@@ -183,58 +147,187 @@ def fit_motion_logs(
     if not 0.0 <= hold_out <= 0.9:
         raise ValueError(f"hold_out is {hold_out:g}, expected a share of the log from 0 to 0.9.")
     splits = _splits(logs, hold_out)
-    problem = _Problem.of([log.until(split) for log, split in zip(logs, splits, strict=True)], robot)
-    best, spread = problem.solve()
+    seen = tuple(log.until(split) for log, split in zip(logs, splits, strict=True))
+    at = tuple(range(len(logs)) if cameras is None else cameras)
     rng = np.random.default_rng(seed)
-    draws = best + rng.standard_normal((N_DRAWS, len(best))) @ np.linalg.cholesky(spread).T
-    values, drawn = problem.values(best[None]), problem.values(draws)
-    predicted = [
-        None if split == len(log.time_s) else _predict(problem, log, split, best)
-        for log, split in zip(logs, splits, strict=True)
-    ]
-    by_log = tuple(None if each is None else each[0] for each in predicted)
-    held_out = _joined([each for each in by_log if each is not None])
-    numbers = _robot_numbers(values)
+    problem = LogProblem(seen, at, LogNumbers.of(robot, seen))
+    posterior = sample_log_posterior(problem, rng)
+    best = _best(posterior)
+    draws = posterior.draws[rows_of(posterior.draws, N_DRAWS, rng)]
+    by_log = tuple(
+        None
+        if split == len(log.time_s)
+        else _predict(log, split, posterior.numbers, best[problem.places(camera)])
+        for log, split, camera in zip(logs, splits, at, strict=True)
+    )
+    held_out = _held_out([each for each in by_log if each is not None])
+    fitted = _fitted(posterior, best)
+    any_camera = problem.places(0)
+    drawn = _robot_numbers(posterior.numbers.values(draws[:, any_camera]), robot, posterior)
+    notes, misspecified = _notes(posterior, fitted)
+    numbers = _robot_numbers(posterior.numbers.values(best[None, any_camera]), robot, posterior)
     return MotionLogFit(
-        tuple(problem.fitted(best, spread, drawn)),
+        fitted,
         {name: float(value[0]) for name, value in numbers.items()},
-        {name: tuple(value.tolist()) for name, value in _robot_numbers(drawn).items()},
+        {name: tuple(value.tolist()) for name, value in drawn.items()},
         held_out,
         held_out.recommended if held_out else "fitted",
+        notes=(*notes, *posterior.against.lines),
         by_log=by_log,
-        evidence=next((each[1] for each in predicted if each is not None), {}),
+        misspecified=misspecified or bool(posterior.against.lines),
+        evidence=_evidence(logs, by_log),
     )
 
 
-def _joined(errors: Sequence[HeldOut]) -> HeldOut | None:
-    """Return the mean errors of several logs, weighted by their observations."""
-    if len(errors) < 2:
-        return errors[0] if errors else None
-    weights = [each.n for each in errors]
+def _best(posterior: LogPosterior) -> Floats:
+    """Return the median of the posterior, (q,), on the standard scale.
+
+    Numbers that the logs do not show are the robot's own.
+    """
+    best = np.median(posterior.draws, axis=0)
+    for k, one in enumerate(posterior.numbers.free):
+        if one.name in (*posterior.together, *posterior.vague):
+            best[k] = 0.0
+    return np.asarray(best)
+
+
+def _fitted(posterior: LogPosterior, best: Floats) -> tuple[Fitted, ...]:
+    """Return the parameters of the robot, of its encoders, and of the camera, with intervals."""
+    numbers = posterior.numbers
+    rows = []
+    for k, one in enumerate(numbers.free):
+        own = numbers.own[one.name]
+        if one.name in (*posterior.together, *posterior.vague):
+            rows.append(_unknown(one, own))
+        elif "." in one.name:  # others are noise of what was seen
+            rows.append(_row(one, own, float(best[k]), posterior.draws[:, k]))
+    seen = list(numbers.camera) * (posterior.n_cameras if numbers.camera else 0)
+    for k, one in enumerate(seen, len(numbers.free)):
+        row = _row(one, 0.0, float(best[k]), posterior.draws[:, k])
+        if posterior.n_cameras > 1:
+            number = (k - len(numbers.free)) // len(numbers.camera) + 1
+            row = row.model_copy(update={"name": one.name.replace("camera.", f"camera.{number}.")})
+        rows.append(row)
+    return tuple(rows)
+
+
+def _unknown(one: LogParameter, own: float) -> Fitted:
+    """Return a parameter that keeps the robot's own number, with the interval of its prior."""
+    low, high = _ends(one, own)
+    return Fitted(
+        name=one.name, estimate=own, low=low, high=high, prior_low=low, prior_high=high, identified=False,
+        unit=one.unit, advice=one.advice,
+    )  # fmt: skip
+
+
+def _ends(one: LogParameter, own: float) -> tuple[float, float]:
+    """Return the 90 % interval of a parameter's prior."""
+    low, high = one.of(own, np.array([-one.most, one.most])).tolist()
+    return max(low, 0.0) if one.kind == "size" else low, high
+
+
+def _row(one: LogParameter, own: float, best: float, draws: Floats) -> Fitted:
+    prior_low, prior_high = _ends(one, own)
+    low, high = np.quantile(one.of(own, draws), ENDS)
+    estimate = float(one.of(own, np.array([best]))[0])
+    identified = bool(np.std(draws) < IDENTIFIED) and prior_low <= estimate <= prior_high
+    return Fitted(
+        name=one.name,
+        estimate=estimate,
+        low=float(low),
+        high=float(high),
+        prior_low=prior_low,
+        prior_high=prior_high,
+        identified=identified,
+        unit=one.unit,
+        advice="" if identified else one.advice,
+    )
+
+
+def _notes(posterior: LogPosterior, fitted: Sequence[Fitted]) -> tuple[tuple[str, ...], bool]:
+    """Return what else the fit shows, and whether the model contradicts the logs."""
+    notes = []
+    if posterior.together:
+        notes.append(
+            f"The log shows {listed(posterior.together)} only together, so they keep the robot file's numbers. Drive "
+            "at several speeds, straight on, and turn in place, in both directions."
+        )
+    if posterior.vague:
+        notes.append(
+            f"The log hardly shows {listed(posterior.vague)}, so the robot file's numbers stay. Record more."
+        )
+    left = [
+        row.name for row in fitted if row.name in MAIN and not row.prior_low <= row.estimate <= row.prior_high
+    ]
+    if left:
+        notes.append(
+            f"Beyond what is plausible: {', '.join(left)}. Check the units and columns of the mapping."
+        )
+    known = [
+        wide
+        for one, wide in zip(posterior.numbers.free, posterior.widening, strict=False)
+        if one.name in MAIN and one.name not in (*posterior.together, *posterior.vague)
+    ]
+    widest = max(known, default=1.0)
+    if widest > DISAGREE:
+        notes.append(
+            f"Parts of the log contradict each other: intervals are up to {widest:.1f} times as wide as by the noise "
+            "alone."
+        )
+    return tuple(notes), bool(left) or widest > DISAGREE
+
+
+def listed(names: Sequence[str]) -> str:
+    """Return names as a list in words."""
+    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
+
+
+def _robot_numbers(values: Numbers, robot: RobotModel, posterior: LogPosterior) -> dict[str, Floats]:
+    """Return the numbers of the robot's file that were fitted."""
+    names = {one.name for one in posterior.numbers.free} - {*posterior.together, *posterior.vague}
+    for part in ("drive", "encoder"):
+        if names & {f"{part}.gain", f"{part}.asymmetry"}:
+            names |= {f"{part}.gain_left", f"{part}.gain_right"}
+    known = robot.centers()
+    return {name: values[name] for name in sorted(names) if name in known}
+
+
+def _held_out(predictions: Sequence[LogPrediction]) -> HeldOut | None:
+    """Return the errors on all unseen parts: of positions, or of the wheels' speeds if no poses were seen."""
+    paths = [each.errors for each in predictions if each.errors is not None]
+    if paths:
+        errors = summary_of(paths, "logs")
+        more = {key: (row["nominal"], row["fitted"]) for key, row in errors.more.items()}
+        return HeldOut(
+            errors.measure, "m", errors.mean["nominal"], errors.mean["fitted"], n=errors.n, more=more
+        )
+    wheels = [each.wheels for each in predictions if each.wheels is not None]
+    if len(wheels) < 2:
+        return wheels[0] if wheels else None
+    weights = [each.n for each in wheels]
 
     def mean(values: Sequence[float]) -> float:
         return float(np.average(values, weights=weights))
 
-    first = errors[0]
     return HeldOut(
-        f"{first.measure}, mean of {len(errors)} logs",
-        first.unit,
-        mean([each.nominal for each in errors]),
-        mean([each.fitted for each in errors]),
+        f"{wheels[0].measure}, mean of {len(wheels)} logs",
+        wheels[0].unit,
+        mean([each.nominal for each in wheels]),
+        mean([each.fitted for each in wheels]),
         n=sum(weights),
         more={
             name: (
-                mean([each.more[name][0] for each in errors]),
-                mean([each.more[name][1] for each in errors]),
+                mean([each.more[name][0] for each in wheels]),
+                mean([each.more[name][1] for each in wheels]),
             )
-            for name in first.more
+            for name in wheels[0].more
         },
     )
 
 
 def motion_log(
     time_s: ArrayLike,
-    commands: ArrayLike,
+    commands: ArrayLike | None,
     *,
     poses: ArrayLike | None = None,
     encoders: ArrayLike | None = None,
@@ -251,21 +344,42 @@ def motion_log(
             f"time_s is {time[k]:g} s in row {k} and {time[k + 1]:g} s in row {k + 1}, expected ascending times. Sort "
             "the log, and leave out repeated rows."
         )
-    asked = finite_numbers("commands", _rows("commands", commands, n, (2,)))
-    if not np.any(asked):
-        raise ValueError("All commands are 0, expected a robot that drives.")
+    asked = _asked(commands, n)
     seen = np.full((n, 3), np.nan)
     if poses is not None:
         given = _rows("poses", poses, n, (2, 3))
         seen[:, : given.shape[1]] = given
         seen[~np.isfinite(seen[:, :2]).all(axis=1)] = np.nan
     wheels = np.full((n, 2), np.nan) if encoders is None else _rows("encoders", encoders, n, (2,))
+    if not len(asked):
+        wheels = _without_gaps(time, wheels)
     log = MotionLog(time, asked, seen, wheels)
     if seen_rows(log).sum() < LEAST_ROWS:
         raise ValueError(
             f"Poses or encoders were recorded at {seen_rows(log).sum()} times, expected at least {LEAST_ROWS}."
         )
     return log
+
+
+def _asked(commands: ArrayLike | None, n: int) -> Floats:
+    """Return the commands, (n, 2), or none."""
+    if commands is None:
+        return np.empty((0, 2))
+    asked = finite_numbers("commands", _rows("commands", commands, n, (2,)))
+    if not np.any(asked):
+        raise ValueError("All commands are 0, expected a robot that drives.")
+    return asked
+
+
+def _without_gaps(time: Floats, wheels: Floats) -> Floats:
+    """Return the distances of wheels that stand for the commands, with straight lines over times without one."""
+    known = np.isfinite(wheels).all(axis=1)
+    if known.sum() < LEAST_ROWS or not np.ptp(wheels[known], axis=0).any():
+        raise ValueError(
+            f"There are no commands, and encoders were recorded at {known.sum()} times, expected at least {LEAST_ROWS} "
+            "of a robot that drives."
+        )
+    return np.stack([np.interp(time, time[known], wheel) for wheel in wheels[known].T], axis=1)
 
 
 def _rows(name: str, values: ArrayLike, n: int, widths: Sequence[int]) -> Floats:
@@ -307,167 +421,40 @@ def _split(log: MotionLog, hold_out: float) -> int:
     return split
 
 
-@dataclass(frozen=True)
-class _Problem:
-    """Logs, the free numbers, and their prior."""
-
-    logs: tuple[MotionLog, ...]
-    own: Mapping[str, float]
-    free: tuple[Spread, ...]
-
-    @classmethod
-    def of(cls, logs: Sequence[MotionLog], robot: RobotModel) -> _Problem:
-        now = robot.centers()
-        left, right = now["drive.gain_left"], now["drive.gain_right"]
-        own = {name: value for name, value in now.items() if name.startswith("drive.")}
-        own |= {"drive.gain": (left + right) / 2, "drive.asymmetry": left - right}
-        own |= {s.name: max(own[s.name], LEAST_NOISE) for s in OWN_NOISE} | SEEN_NOISE
-        by_poses = ("drive.track", "drive.axle", "drive.drift_per_m")
-        sees_poses = any(log.sees_poses for log in logs)
-        free = tuple(s for s in DRIVE if sees_poses or s.name not in by_poses)
-        names: tuple[str, ...] = ()
-        if sees_poses:
-            free += OWN_NOISE
-            names += ("place", "angle") if any(log.sees_heading for log in logs) else ("place",)
-        if any(log.sees_wheels for log in logs):
-            names += ("wheel", "wheel_per_m")
-        free += tuple(Spread(name, "ratio", 1.0, "m", "", is_normal=True) for name in names)
-        return cls(tuple(logs), own, free)
-
-    def values(self, standard: Floats) -> dict[str, Floats]:
-        """Return (m,) of everything at (m, p) points on the standard scales of the parameters."""
-        m = len(standard)
-        values = {name: np.full(m, value) for name, value in self.own.items()}
-        for k, one in enumerate(self.free):
-            values[one.name] = one.of(self.own[one.name], standard[:, k])
-        values["drive.gain_left"] = values["drive.gain"] + values["drive.asymmetry"] / 2
-        values["drive.gain_right"] = values["drive.gain"] - values["drive.asymmetry"] / 2
-        return values
-
-    def log_posterior(self, standard: Floats, weight: float = 1.0) -> Floats:
-        """Return (m,) of (m, p) points, with a weight of the prior."""
-        values = self.values(standard)
-        priors = [one.log_prior(standard[:, k]) for k, one in enumerate(self.free)]
-        logs = weight * np.sum(priors, axis=0)
-        for log in self.logs:
-            steps = wheel_steps(log, values)
-            if log.sees_poses:
-                logs = logs + track(log, steps, values, _noise(values)).log_likelihood
-            if log.sees_wheels:
-                logs = logs + encoder_likelihood(log, steps, _noise(values))
-        return np.asarray(logs)
-
-    def down(self, point: Floats, weight: float = 1.0) -> tuple[float, Floats]:
-        """Return the negative log posterior at a point (p,), and its slope."""
-        p = len(point)
-        ends = np.concatenate([point[None], point + STEP * np.eye(p), point - STEP * np.eye(p)])
-        with np.errstate(over="ignore", invalid="ignore"):
-            logs = self.log_posterior(ends, weight)
-        if not np.isfinite(
-            logs
-        ).all():  # a step of the search that went beyond all numbers: back to the middle
-            return BEYOND, point
-        return -float(logs[0]), -(logs[1 : p + 1] - logs[p + 1 :]) / (2 * STEP)
-
-    def solve(self) -> tuple[Floats, Floats]:
-        """Return the point of greatest posterior, (p,), and the covariance there, (p, p).
-
-        With a prior of long tails there may be two peaks, one at the robot's own numbers and one where the log is met
-        best: the search starts at both.
-        """
-        first = np.zeros(len(self.free))
-        first[[one.kind == "size" for one in self.free]] = 0.1
-        free, _ = self._search(first, FREE)
-        best = min((self._search(start, 1.0) for start in (first, free)), key=lambda found: found[1])[0]
-        slopes = np.array(
-            [
-                (self.down(best + WIDE * row)[1] - self.down(best - WIDE * row)[1]) / (2 * WIDE)
-                for row in np.eye(len(best))
-            ]
-        )
-        sizes, directions = np.linalg.eigh((slopes + slopes.T) / 2)
-        return best, (directions / np.maximum(sizes, LEAST_CURVATURE)) @ directions.T
-
-    def _search(self, start: Floats, weight: float) -> tuple[Floats, float]:
-        """Return the nearest point of least `down`, and its value."""
-        from scipy.optimize import minimize
-
-        found = minimize(self.down, start, (weight,), jac=True, method="BFGS", options={"gtol": 0.02})
-        return np.asarray(found.x), float(found.fun)
-
-    def fitted(self, best: Floats, spread: Floats, drawn: Mapping[str, Floats]) -> list[Fitted]:
-        """Return the robot's parameters with intervals."""
-        rows = []
-        for k, one in enumerate(self.free):
-            if not one.name.startswith("drive."):
-                continue
-            ends = one.of(self.own[one.name], np.array([-one.most, one.most]))
-            low, high = np.quantile(drawn[one.name], ENDS)
-            identified = bool(np.sqrt(spread[k, k]) < IDENTIFIED)
-            rows.append(
-                Fitted(
-                    name=one.name,
-                    estimate=float(one.of(self.own[one.name], best[k : k + 1])[0]),
-                    low=float(low),
-                    high=float(high),
-                    prior_low=0.0 if one.kind == "size" else float(ends.min()),
-                    prior_high=float(ends.max()),
-                    identified=identified,
-                    unit=one.unit,
-                    advice="" if identified else one.advice,
-                )
-            )
-        return rows
+def _steps_of(log: MotionLog, values: Numbers) -> list[Steps]:
+    """Return the motion of the body between the times of its poses, by m sets of numbers."""
+    ways = read_late(log, wheel_ways(log, values), values["camera.delay"])
+    length, turn = body_steps(ways, values)
+    seen = values["camera.left"] * 1j - values["drive.axle"]
+    return [
+        Steps(*each)
+        for each in zip(length, turn, seen.tolist(), values["camera.heading"].tolist(), strict=True)
+    ]
 
 
-def _noise(values: Mapping[str, Floats]) -> dict[str, Floats]:
-    short = {
-        "travel_per_m": "drive.travel_noise_per_m",
-        "heading_per_m": "drive.heading_noise_per_m",
-        "heading_per_s": "drive.heading_noise_per_s",
-    }
-    return {name: values[short.get(name, name)] for name in (*short, *SEEN_NOISE)}
-
-
-def _robot_numbers(values: Mapping[str, Floats]) -> dict[str, Floats]:
-    """Return the numbers that a robot's file has."""
-    names = [one.name for one in (*DRIVE, *OWN_NOISE) if one.name not in ("drive.gain", "drive.asymmetry")]
-    return {name: values[name] for name in ("drive.gain_left", "drive.gain_right", *names)}
-
-
-def _predict(problem: _Problem, log: MotionLog, split: int, best: Floats) -> tuple[HeldOut, dict[str, Any]]:
-    """Predict the unseen part of a log with the robot's own and with the fitted numbers."""
-    values = problem.values(np.stack([best, best]))
-    for one in DRIVE:
-        values[one.name][0] = problem.own[one.name]
-    for side in ("left", "right"):
-        values[f"drive.gain_{side}"][0] = problem.own[f"drive.gain_{side}"]
-    steps = wheel_steps(log, values)
+def _predict(log: MotionLog, split: int, numbers: LogNumbers, best: Floats) -> LogPrediction:
+    """Predict the unseen part of a log with the robot's own and with the fitted numbers, and the fitted camera."""
+    points = np.stack([best, best])
+    points[0, : len(numbers.free)] = 0.0
+    values = numbers.values(points)
     if log.sees_poses:
-        predicted = track(log.until(split), steps, values, _noise(values)).poses
-        rows = split + np.flatnonzero(np.isfinite(log.poses[split:, 0]))
-        off = np.hypot(*np.moveaxis(predicted[:, rows, :2] - log.poses[rows, :2], -1, 0))
-        lasts = log.time_s[rows[-1]] - log.time_s[split - 1]
-        held_out = HeldOut(
-            f"mean distance between seen and predicted positions over the last {fixed(lasts, 1)} s",
-            "m",
-            float(off[0].mean()),
-            float(off[1].mean()),
-            n=len(rows),
-            more={"at the end": (float(off[0, -1]), float(off[1, -1]))},
-        )
-        path = {
-            name: np.round(predicted[k, rows, :2], 5).tolist() for k, name in enumerate(("nominal", "fitted"))
-        }
-        return held_out, {"held_out": {"seen": np.round(log.poses[rows, :2], 5).tolist(), **path}}
+        nominal, fitted = _steps_of(log, values)
+        errors = path_errors(log, {"nominal": nominal, "fitted": fitted}, split)
+        return LogPrediction(split, nominal, fitted, errors, None)
+    nothing = Steps(np.empty(0), np.empty(0))
+    wheels = _wheel_errors(log, wheel_ways(log, values), split, numbers)
+    return LogPrediction(split, nothing, nothing, None, wheels)
+
+
+def _wheel_errors(log: MotionLog, ways: Floats, split: int, numbers: LogNumbers) -> HeldOut:
+    """Return the errors of the wheels' speeds by two sets of numbers, nominal and fitted."""
     rows = np.flatnonzero(np.isfinite(log.encoders).all(axis=1))
     rows = rows[rows >= split]
-    total = np.concatenate([np.zeros_like(steps[:, :1]), np.cumsum(steps, axis=1)], axis=1)
-    speeds = np.diff(total[:, rows], axis=1) / np.diff(log.time_s[rows])[:, None]
+    speeds = np.diff(ways[:, rows], axis=1) / np.diff(log.time_s[rows])[:, None]
     seen = np.diff(log.encoders[rows], axis=0) / np.diff(log.time_s[rows])[:, None]
     off = np.sqrt(((speeds - seen) ** 2).mean(axis=(1, 2)))
-    full = problem.own["drive.speed"]
-    held_out = HeldOut(
+    full = numbers.own["drive.speed"]
+    return HeldOut(
         f"root mean square error of the wheels' speeds over the last {fixed(log.time_s[-1] - log.time_s[split], 1)} s",
         "m/s",
         float(off[0]),
@@ -475,4 +462,16 @@ def _predict(problem: _Problem, log: MotionLog, split: int, best: Floats) -> tup
         n=2 * len(seen),
         more={"as a share of full speed (1)": (float(off[0] / full), float(off[1] / full))},
     )
-    return held_out, {}
+
+
+def _evidence(logs: Sequence[MotionLog], by_log: Sequence[LogPrediction | None]) -> dict[str, Any]:
+    """Return the predicted and the seen path of the unseen part of the first log with one."""
+    for log, made in zip(logs, by_log, strict=True):
+        if made is not None and log.sees_poses:
+            rows = made.split + np.flatnonzero(np.isfinite(log.poses[made.split :, 0]))
+            paths = {
+                name: np.round(positions(log, steps, last_seen(log, made.split), rows), 5).tolist()
+                for name, steps in (("nominal", made.nominal), ("fitted", made.fitted))
+            }
+            return {"held_out": {"seen": np.round(log.poses[rows, :2], 5).tolist(), **paths}}
+    return {}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -11,13 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realitygap.calibration import (
-    HeldOut,
+    LogPrediction,
     MotionLog,
     MotionLogFit,
-    drive_on,
+    PathErrors,
+    Steps,
     fit_motion_logs,
     look_up_motion,
     motion_log,
+    path_errors,
+    summary_of,
 )
 from realitygap.errors import StudyError
 from realitygap.logs import Diagnosis, Log, MappedLog, diagnose, mapped_logs, read_logs, robot_of, target_of
@@ -33,13 +36,16 @@ BLOCKS = 4
 """Parts of a log, each of which is fitted in its first half and predicted in its second."""
 FEWEST_STEPS = 20
 """Minimum number of steps of a log: fewer say nothing about a half that is held out."""
-NOISE_DRAWS = 100
+NOISE_DRAWS = 40
 N_SPEEDS = 3
 LEFT_OUT = " The others are too short, stand still, or show no poses or encoders."
-HARMLESS = ("half track", "double track", "clock", "heading offset")
-"""Mistakes that a fit survives: they are noted."""
+FITTED_MISTAKES = ("clock", "heading offset")
+HARMLESS = ("half track", "double track", *FITTED_MISTAKES)
+"""Mistakes that a fit survives: they are noted, unless its camera shows them."""
 
 Floats = NDArray[np.float64]
+Trial = tuple[Log, int]
+"""A trial, and the index of its file: the camera of all trials of a file is the same."""
 
 
 def calibrate_from_log(
@@ -73,18 +79,21 @@ def calibrate_from_log(
     path = target_of([each.path for each in mapped])
     log_map = mapped[0].log_map
     name, robot = robot_of(log_map, None if base is None else str(base))
-    logs, n_logs = _usable(path, mapped, robot, drop_bad_rows=drop_bad_rows)
+    trials, n_logs = _usable(path, mapped, robot, drop_bad_rows=drop_bad_rows)
+    logs = [log for log, _ in trials]
     longest = max(logs, key=lambda log: len(log.commands))
     diagnosis = diagnose(longest, robot.drive.speed, robot.drive.track)
     _refuse_mistakes(path, diagnosis)
-    fit, compared = _fit(path, logs, robot, hold_out, seed)
+    fit, compared = _fit(path, trials, robot, hold_out, seed)
     rows = dict.fromkeys(note for log in logs for note in log.notes)
     origins = ", ".join(dict.fromkeys(each.origin for each in mapped))
     notes = [f"Mapping: {origins}.", *rows, *_notes(diagnosis), *fit.notes]
     if n_logs > 1:
         notes.append(f"The fit uses {len(logs)} of {n_logs} trials.{LEFT_OUT if len(logs) < n_logs else ''}")
     given = {"drive.speed": log_map.speed, "drive.track": log_map.track}
-    parts = Parts(fit.fitted, fit.numbers, fit.draws, fit.method, tuple(notes), evidence=fit.evidence)
+    parts = Parts(
+        fit.fitted, fit.numbers, fit.draws, fit.method, tuple(notes), fit.misspecified, evidence=fit.evidence
+    )
     parts = chosen_parts(parts, compared, {key: value for key, value in given.items() if value})
     observe: Observe = "track" if len(longest.poses) else "encoders"
     arena = log_map.arena or "open"
@@ -95,19 +104,19 @@ def calibrate_from_log(
 
 def _usable(
     path: str, mapped: Sequence[MappedLog], robot: RobotModel, *, drop_bad_rows: bool
-) -> tuple[list[Log], int]:
+) -> tuple[list[Trial], int]:
     """Return the trials of logs that a fit can use, and the number of all.
 
     Raises:
         StudyError: None can be used; the message names what the longest lacks.
     """
     every = [
-        log
-        for each in mapped
+        (log, file)
+        for file, each in enumerate(mapped)
         for log in read_logs(each.path, each.log_map, robot, drop_bad_rows=drop_bad_rows)
     ]
-    longest = max(every, key=lambda log: len(log.commands), default=None)
-    if longest is None or not any(len(log.poses) or len(log.wheels) for log in every):
+    longest = max((log for log, _ in every), key=lambda log: len(log.commands), default=None)
+    if longest is None or not any(len(log.poses) or len(log.wheels) for log, _ in every):
         raise StudyError(
             f"{path} has commands alone. Expected poses or encoders, too: add [poses] or [wheels] to the mapping."
         )
@@ -118,14 +127,14 @@ def _usable(
         )
     usable = []
     error = None
-    for log in every:
+    for log, file in every:
         try:
             _motion_log(log)
         except ValueError as problem:
             error = problem if log is longest else error
         else:
             if len(log.commands) >= FEWEST_STEPS:
-                usable.append(log)
+                usable.append((log, file))
     if not usable:
         raise StudyError(f"{path}: {error}")
     return usable, len(every)
@@ -143,7 +152,11 @@ def _refuse_mistakes(path: str, diagnosis: Diagnosis) -> None:
 
 
 def _notes(diagnosis: Diagnosis) -> list[str]:
-    notes = [f"Check ({mistake.kind}): {mistake.message}" for mistake in diagnosis.mistakes]
+    notes = [
+        f"Check ({mistake.kind}): {mistake.message}"
+        for mistake in diagnosis.mistakes
+        if mistake.kind not in FITTED_MISTAKES
+    ]
     offset = diagnosis.offset
     if offset is not None:
         notes.append(f"Poses follow commands by {offset}, a robot's lag and delay included.")
@@ -151,41 +164,41 @@ def _notes(diagnosis: Diagnosis) -> list[str]:
 
 
 def _fit(
-    path: str, logs: Sequence[Log], robot: RobotModel, hold_out: HoldOut, seed: int
+    path: str, trials: Sequence[Trial], robot: RobotModel, hold_out: HoldOut, seed: int
 ) -> tuple[MotionLogFit, Compared | None]:
     """Return the fit to all trials, and the errors on the parts that a fit did not see."""
     try:
         if hold_out != "blocks":
-            fit = _fit_to(logs, robot, hold_out, seed)
-            errors = [
-                _compare(log, robot, held_out, hold_out, seed)
-                for log, held_out in zip(logs, fit.by_log, strict=True)
-                if held_out is not None
+            fit = _fit_to(trials, robot, hold_out, seed)
+            made = [
+                (log, prediction)
+                for (log, _), prediction in zip(trials, fit.by_log, strict=True)
+                if prediction is not None
             ]
-            return fit, _joined(errors, "trials")
-        errors = [block for log in logs for block in _blocks(log, robot, seed)]
-        if not errors:
-            n = max(len(log.commands) for log in logs)
+            return fit, _compared(made, robot, "trials", seed)
+        made = [block for log, _ in trials for block in _blocks(log, robot, seed)]
+        if not made:
+            n = max(len(log.commands) for log, _ in trials)
             raise ValueError(
                 f"The longest trial has {n} steps, too few for {BLOCKS} blocks. Hold out a share."
             )
-        return _fit_to(logs, robot, 0.0, seed), _joined(errors, "blocks")
+        return _fit_to(trials, robot, 0.0, seed), _compared(made, robot, "blocks", seed)
     except ValueError as error:
         raise StudyError(f"{path}: {error}") from None
 
 
-def _blocks(log: Log, robot: RobotModel, seed: int) -> list[Compared]:
-    """Return the errors on the second half of each part of a trial; none if its parts are too short."""
-    errors = []
+def _blocks(log: Log, robot: RobotModel, seed: int) -> list[tuple[Log, LogPrediction]]:
+    """Return predictions of the second half of each part of a trial; none if its parts are too short."""
+    made = []
     for first, end in pairwise(np.linspace(0, len(log.commands), BLOCKS + 1).astype(int)):
         part = _part(log, int(first), int(end))
         try:
-            (held_out,) = _fit_to([part], robot, 0.5, seed).by_log
+            (prediction,) = _fit_to([(part, 0)], robot, 0.5, seed).by_log
         except ValueError:
             continue
-        if held_out is not None:
-            errors.append(_compare(part, robot, held_out, 0.5, seed))
-    return errors
+        if prediction is not None:
+            made.append((part, prediction))
+    return made
 
 
 def _part(log: Log, first: int, end: int) -> Log:
@@ -207,43 +220,62 @@ def _arrays(log: Log) -> tuple[Floats, Floats, Floats | None]:
 
 def _motion_log(log: Log) -> MotionLog:
     time_s, commands, poses = _arrays(log)
-    return motion_log(time_s, commands, poses=poses, encoders=log.wheels if len(log.wheels) else None)
+    return motion_log(
+        time_s,
+        commands if log.has_commands else None,
+        poses=poses,
+        encoders=log.wheels if len(log.wheels) else None,
+    )
 
 
-def _fit_to(logs: Sequence[Log], robot: RobotModel, hold_out: float, seed: int) -> MotionLogFit:
-    return fit_motion_logs([_motion_log(log) for log in logs], robot, hold_out=hold_out, seed=seed)
+def _fit_to(trials: Sequence[Trial], robot: RobotModel, hold_out: float, seed: int) -> MotionLogFit:
+    files = sorted({file for _, file in trials})
+    cameras = [files.index(file) for _, file in trials]
+    return fit_motion_logs(
+        [_motion_log(log) for log, _ in trials], robot, cameras=cameras, hold_out=hold_out, seed=seed
+    )
 
 
-def _split(time_s: Floats, hold_out: float) -> int:
-    """Return the first row that a fit does not see."""
-    return int(np.searchsorted(time_s, time_s[0] + (1 - hold_out) * (time_s[-1] - time_s[0])))
+def _compared(
+    made: Sequence[tuple[Log, LogPrediction]], robot: RobotModel, parts: str, seed: int
+) -> Compared | None:
+    """Return the errors of the fit on all parts that it did not see, next to those of simpler predictions."""
+    paths = [_path_errors(log, robot, prediction, seed) for log, prediction in made if prediction.errors]
+    if paths:
+        errors = summary_of(paths, parts, seed)
+        return Compared(errors.measure, "m", errors.n, errors.mean, errors.more, intervals=errors.intervals)
+    return _joined([_wheel_errors(log, robot, prediction, seed) for log, prediction in made], parts)
 
 
-def _compare(log: Log, robot: RobotModel, held_out: HeldOut, hold_out: float, seed: int) -> Compared:
-    """Return the errors of the fit next to those of simpler predictions."""
+def _path_errors(log: Log, robot: RobotModel, prediction: LogPrediction, seed: int) -> PathErrors:
+    """Return the errors of the fit next to those of simpler predictions, with the same camera."""
     time_s, commands, poses = _arrays(log)
-    split = _split(time_s, hold_out)
-    errors = {FITTED: held_out.fitted, NOMINAL: held_out.nominal}
-    more = {key: {FITTED: values[1], NOMINAL: values[0]} for key, values in held_out.more.items()}
-    if poses is None:
-        errors |= _wheel_baselines(log, robot, commands, split, seed)
-        return Compared(held_out.measure, held_out.unit, held_out.n, errors, more)
-    seen = poses[split:, :2]
-
-    def off(path: Floats) -> Floats:
-        away = np.hypot(*(path - seen).T)
-        return np.asarray(away[np.isfinite(away)])
-
-    table = off(look_up_motion(time_s, commands, poses, split))
+    nominal = prediction.nominal
     rng = np.random.default_rng(seed)
-    noisy = [
-        off(drive_on(_steps(time_s, commands + _noise(rng, commands.shape), robot), poses, split))
-        for _ in range(NOISE_DRAWS)
-    ]
-    errors |= {NOISE: float(np.mean([each.mean() for each in noisy])), TABLE: float(table.mean())}
-    if "at the end" in more:
-        more["at the end"] |= {NOISE: float(np.mean([each[-1] for each in noisy])), TABLE: float(table[-1])}
-    return Compared(held_out.measure, held_out.unit, held_out.n, errors, more)
+    scale = robot.drive.speed * np.diff(time_s)[:, None]
+    noisy = {}
+    for k in range(NOISE_DRAWS):
+        ways = scale * _noise(rng, (len(time_s) - 1, 2))
+        noisy[f"{NOISE} {k}"] = replace(
+            nominal,
+            length=nominal.length + ways.mean(1),
+            turn=nominal.turn + (ways[:, 1] - ways[:, 0]) / robot.drive.track,
+        )
+    table = look_up_motion(time_s, commands, poses if poses is not None else np.empty(0), prediction.split)
+    made: dict[str, Steps] = {FITTED: prediction.fitted, NOMINAL: nominal, **noisy}
+    errors = path_errors(_motion_log(log), made | ({} if table is None else {TABLE: table}), prediction.split)
+    return PathErrors(
+        errors.lasts_s,
+        _without_draws(errors.off),
+        tuple(replace(each, errors=_without_draws(each.errors)) for each in errors.horizons),
+    )
+
+
+def _without_draws(errors: Mapping[str, Floats]) -> dict[str, Floats]:
+    """Return errors by prediction, with the mean of the draws of noise."""
+    draws = np.mean([errors[name] for name in errors if name.startswith(f"{NOISE} ")], axis=0)
+    plain = {name: errors[name] for name in (FITTED, NOMINAL)} | {NOISE: draws}
+    return plain | ({TABLE: errors[TABLE]} if TABLE in errors else {})
 
 
 def _noise(rng: np.random.Generator, shape: tuple[int, ...]) -> Floats:
@@ -251,11 +283,16 @@ def _noise(rng: np.random.Generator, shape: tuple[int, ...]) -> Floats:
     return np.asarray(JyroPlatform.default_noise * rng.uniform(-1, 1, shape))
 
 
-def _steps(time_s: Floats, commands: Floats, robot: RobotModel) -> Floats:
-    """Return the way ahead [m] and turn [rad] of each step by the robot's nominal gains and track, without lag."""
-    gains = np.array([robot.drive.gain_left, robot.drive.gain_right]) * robot.drive.speed
-    ways = commands[:-1] * gains * np.diff(time_s)[:, None]
-    return np.stack([ways.mean(1), (ways[:, 1] - ways[:, 0]) / robot.drive.track], 1)
+def _wheel_errors(log: Log, robot: RobotModel, prediction: LogPrediction, seed: int) -> Compared:
+    """Return the errors of the wheels' speeds by the fit, next to those of simpler predictions."""
+    held_out = prediction.wheels
+    if held_out is None:
+        raise ValueError("The log has poses and no errors of wheels.")
+    _, commands, _ = _arrays(log)
+    errors = {FITTED: held_out.fitted, NOMINAL: held_out.nominal}
+    more = {key: {FITTED: values[1], NOMINAL: values[0]} for key, values in held_out.more.items()}
+    errors |= _wheel_baselines(log, robot, commands, prediction.split, seed)
+    return Compared(held_out.measure, held_out.unit, held_out.n, errors, more)
 
 
 def _wheel_baselines(
@@ -278,7 +315,7 @@ def _wheel_baselines(
 
 
 def _joined(errors: Sequence[Compared], parts: str) -> Compared | None:
-    """Return the mean errors of several trials or blocks, weighted by observations."""
+    """Return the mean errors of the wheels in several trials or blocks, weighted by observations."""
     if not errors:
         return None
     if len(errors) == 1 and parts == "trials":

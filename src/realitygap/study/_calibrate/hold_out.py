@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
+from realitygap.calibration import DECISIVE, is_better
 from realitygap.errors import StudyError
 
 from .parts import Parts
@@ -34,6 +35,7 @@ class Compared:
         more: Further errors in the same unit, by their name and by prediction.
         by: Error of the fit and of the nominal numbers by condition: kind of condition, its value, prediction.
         choices: The predictions whose numbers can be recommended.
+        intervals: 90 % intervals of further errors, by their name and by prediction.
     """
 
     measure: str
@@ -43,6 +45,7 @@ class Compared:
     more: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     by: Mapping[str, Mapping[str, Mapping[str, float]]] = field(default_factory=dict)
     choices: tuple[str, ...] = (NOMINAL, FITTED, POSTERIOR)
+    intervals: Mapping[str, Mapping[str, tuple[float, float]]] = field(default_factory=dict)
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain values, for the evidence of a calibration."""
@@ -60,6 +63,10 @@ class Compared:
             "errors": plain,
             "more": more,
             "by": by,
+            "intervals": {
+                key: {name: [round(end, digits) for end in ends] for name, ends in rows.items()}
+                for key, rows in self.intervals.items()
+            },
             "recommended": self.recommended,
         }
 
@@ -76,13 +83,17 @@ class Compared:
 
     @property
     def is_better(self) -> bool:
-        """True if the fit predicts better than the nominal numbers."""
-        return self.errors[FITTED] < self.errors[NOMINAL]
+        """True if the fit predicts better than the nominal numbers, also after 5 and 30 s."""
+        also = [self.more[name] for name in DECISIVE if name in self.more]
+        return is_better([(errors[NOMINAL], errors[FITTED]) for errors in (self.errors, *also)])
 
     @property
     def recommended(self) -> str:
         """The one of the choices with the smallest error, and the first of those with equal errors."""
-        return min((name for name in self.choices if name in self.errors), key=self.errors.__getitem__)
+        choices = [
+            name for name in self.choices if name in self.errors and (name != FITTED or self.is_better)
+        ]
+        return min(choices, key=self.errors.__getitem__)
 
 
 def chosen_parts(parts: Parts, compared: Compared | None, given: Mapping[str, float]) -> Parts:

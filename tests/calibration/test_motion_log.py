@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from realitygap.calibration import MotionLogFit, fit_motion_log
+from realitygap.calibration import MotionLogFit, fit_motion_log, fit_motion_logs, motion_log
 from realitygap.world import RobotModel, load_robot
 
 STEP_S = 0.1
@@ -123,3 +123,120 @@ def test_wrong_logs_are_refused_with_one_message() -> None:
     refused("were recorded at 0 times", poses=None)
     refused("hold_out is 1, expected", hold_out=1.0)
     refused("The held-out part of the log has 4 rows", hold_out=0.1)
+
+
+def rough_log(seed: int, n: int = 300) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Times, commands, and true poses of a robot as its file has it."""
+    rng = np.random.default_rng(seed)
+    commands = np.repeat(rng.uniform(-0.3, 0.8, (n // 6 + 1, 2)), 6, axis=0)[:n]
+    return np.arange(n) * STEP_S, commands, drive(commands, rng)[0]
+
+
+def seen_beside(poses: np.ndarray, left: float, heading: float, rng: np.random.Generator) -> np.ndarray:
+    """Poses of a marker to the left of the axle's middle, turned by an angle, under a camera that errs by 0.5 mm."""
+    x, y, angle = poses.T
+    seen = np.stack([x - left * np.sin(angle), y + left * np.cos(angle), angle + heading], axis=1)
+    return seen + rng.normal(0, [0.0005, 0.0005, 0.005], seen.shape)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("left", [-0.009, 0.0, 0.02])
+def test_marker_beside_the_axle_is_no_asymmetry(left: float) -> None:
+    """The truth is in each 90 % interval of four numbers at once in half of such logs; here within twice that."""
+    time, commands, poses = rough_log(11)
+    seen = seen_beside(poses, left, 0.1, np.random.default_rng(12))
+    fit = fit_motion_log(time, commands, ROBOT, poses=seen, hold_out=0.0)
+    truth = {
+        "drive.gain": 1.0, "drive.asymmetry": 0.0, "drive.track": TRACK, "camera.left": left, "camera.heading": 0.1,
+    }  # fmt: skip
+    for name, value in truth.items():
+        estimate, low, high = of(fit, name)
+        assert 1.5 * low - 0.5 * high - 1e-4 < value < 1.5 * high - 0.5 * low + 1e-4, name
+        assert low <= estimate <= high
+    assert not fit.misspecified
+
+
+@pytest.mark.slow
+def test_late_poses_are_a_clock_and_no_lag() -> None:
+    time, commands, poses = rough_log(21)
+    seen = np.stack([np.interp(time - 0.37, time, column) for column in poses.T], axis=1)
+    seen += np.random.default_rng(22).normal(0, [0.0005, 0.0005, 0.005], seen.shape)
+    fit = fit_motion_log(time, commands, ROBOT, poses=seen)
+    assert of(fit, "camera.delay")[0] == pytest.approx(0.37 - ROBOT.drive.delay, abs=0.02)
+    assert of(fit, "drive.lag")[0] < 0.02
+    assert fit.held_out is not None
+    assert fit.held_out.fitted < 0.01
+
+
+@pytest.mark.slow
+def test_log_without_noise_gives_the_numbers_that_made_it() -> None:
+    time, commands, poses = rough_log(31)
+    fit = fit_motion_log(time, commands, ROBOT, poses=poses)
+    assert of(fit, "drive.track")[0] == pytest.approx(TRACK, rel=2e-3)
+    assert of(fit, "drive.gain")[0] == pytest.approx(1.0, abs=2e-3)
+    assert fit.held_out is not None
+    assert fit.held_out.nominal < 1e-3
+    assert fit.held_out.fitted < 2e-3
+
+
+@pytest.mark.slow
+def test_poses_with_encoders_alone_calibrate_odometry() -> None:
+    rng = np.random.default_rng(41)
+    time, commands, _ = rough_log(42)
+    poses, wheels = drive(commands, rng, track=1.05 * TRACK)
+    encoders = wheels * [1.02, 1.01]
+    fit = fit_motion_log(time, None, ROBOT, poses=seen_beside(poses, 0.004, 0.0, rng), encoders=encoders)
+    assert of(fit, "encoder.gain")[0] == pytest.approx(1.015, abs=0.004)
+    assert of(fit, "drive.track")[0] == pytest.approx(1.05 * TRACK, rel=0.01)
+    assert "drive.gain_left" not in fit.numbers
+    assert fit.recommended == "fitted"
+
+
+@pytest.mark.slow
+def test_cameras_of_several_logs_differ_and_the_robot_is_one() -> None:
+    rng = np.random.default_rng(51)
+    logs = []
+    for left, heading in ((0.005, 0.05), (-0.003, -0.02)):
+        time, commands, _ = rough_log(int(1000 * abs(left)), 240)
+        poses = drive(commands, rng, track=1.06 * TRACK)[0]
+        logs.append(motion_log(time, commands, poses=seen_beside(poses, left, heading, rng)))
+    fit = fit_motion_logs(logs, ROBOT)
+    assert of(fit, "drive.track")[0] == pytest.approx(1.06 * TRACK, rel=0.01)
+    assert of(fit, "camera.1.left")[0] == pytest.approx(0.005, abs=0.001)
+    assert of(fit, "camera.2.left")[0] == pytest.approx(-0.003, abs=0.001)
+    assert of(fit, "camera.2.heading")[0] == pytest.approx(-0.02, abs=0.01)
+
+
+ONE_SIDED = {
+    "straight on": lambda rng, k: rng.uniform(0.2, 1, (k, 1)) * [1, 1],
+    "one speed": lambda rng, k: np.full((k, 2), 0.5),
+    "one circle": lambda rng, k: np.tile([0.4, 0.6], (k, 1)),
+    "circles of one side": lambda rng, k: rng.uniform(0.4, 1, (k, 1)) * [0.6, 0.9],
+    "turns in place": lambda rng, k: rng.choice([-0.5, 0.5], (k, 1)) * [-1, 1],
+}
+"""Logs that show some parameters only together."""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ONE_SIDED)
+def test_what_a_one_sided_log_does_not_show_stays_as_in_the_file(kind: str) -> None:
+    """Predictions of other motions are at most a tenth, or 2 mm in 5 s, worse than by the robot file's numbers."""
+    for seed, wrong in enumerate(({"track": 1.08 * TRACK}, {"gains": (0.97, 1.03)}, {"dead_band": 0.06}, {})):
+        rng = np.random.default_rng([61, seed])
+        commands = np.repeat(ONE_SIDED[kind](rng, 50), 6, axis=0)
+        poses, _ = drive(commands, rng, **wrong)
+        fit = fit_motion_log(
+            np.arange(300) * STEP_S, commands, ROBOT, poses=seen_beside(poses, 0.003, 0.0, rng)
+        )
+        numbers = ROBOT.with_numbers(fit.recommended_numbers).drive
+        errors = []
+        for _ in range(12):
+            other = np.repeat(rng.uniform(-1, 1, (9, 2)), 6, axis=0)
+            true = drive(other, rng, **wrong)[0][-1, :2]
+            fitted = drive(
+                other, rng, track=numbers.track, gains=(numbers.gain_left, numbers.gain_right),
+                dead_band=numbers.soft_dead_band,
+            )[0][-1, :2]  # fmt: skip
+            errors.append((math.dist(true, drive(other, rng)[0][-1, :2]), math.dist(true, fitted)))
+        nominal, fitted = np.mean(errors, axis=0)
+        assert fitted < 1.1 * nominal + 0.002, wrong

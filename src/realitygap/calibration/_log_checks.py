@@ -68,7 +68,7 @@ def contradictions(logs: Sequence[MotionLog], numbers: Sequence[Numbers]) -> Con
 
 
 def _rests(log: MotionLog, values: Numbers) -> tuple[Floats, Floats, Floats, Floats, Floats]:
-    """Return the predicted distance and turn of each seen row, its time, and what was seen beyond them."""
+    """Return the predicted distance and turn of each seen row, its time, and the rest of its pose."""
     ways = wheel_ways(log, values)
     off = pose_likelihood(log, ways, values)[1][0, 1:]
     length, turn = body_steps(read_late(log, ways, values["camera.delay"]), values)

@@ -68,7 +68,7 @@ def roll_wheels(times, commands, wheels, ways):
 
 @kernel
 def read_late(times, ways, late, seen):
-    """Write the distances as they were some time before each time; they go on evenly beyond the ends.
+    """Write the distances as they were some time before each time; they rise evenly after the end.
 
     Args:
         times: (n,) ascending [s].

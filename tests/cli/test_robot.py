@@ -101,7 +101,7 @@ def test_battery_stop_beep_and_list():
     ("arguments", "message"),
     [
         (("drive", PORT, "2"), "move is 2.0, expected a number from -1 to 1"),
-        (("drive", PORT, "1", "--seconds", "3601"), "--seconds is 3601.0, expected 0 to 3600"),
+        (("drive", PORT, "1", "--seconds", "3601"), "--seconds is 3601, expected 0 to 3600"),
         (("beep", PORT, "--seconds", "9"), "seconds is 9.0, expected 0 to 8.191"),
         (("picture", PORT, "-o", "x.jpg"), "does not end in .png"),
         (("picture", PORT, "--kind", "jpg"), "Unknown kind of picture 'jpg'. Did you mean 'jpeg'?"),

@@ -252,10 +252,11 @@ class _Titles:
         return f"pen: {self._pens[trial.pen % len(self._pens)]}" if self._pens else f"pen {trial.pen}"
 
     def arena(self, trial: Trial) -> Any:
+        from realitygap.records import settings_of_condition
         from realitygap.runs import Condition
 
-        described = next(each for each in self._description["conditions"] if each["name"] == trial.condition)
-        return Condition.from_settings(trial.condition, described["settings"]).arena.arena()
+        settings = settings_of_condition(self._description, trial.condition)
+        return Condition.from_settings(trial.condition, settings).arena.arena()
 
 
 def _list(ledger: Ledger, *, as_json: bool) -> None:

@@ -12,7 +12,15 @@ from typing import Any
 
 from realitygap.errors import LedgerError
 from realitygap.platforms import emulated_robots, is_physical
-from realitygap.records import LEDGER_NAME, Ledger, Score, ScoreRole, Trial, ledger_stamp
+from realitygap.records import (
+    LEDGER_NAME,
+    Ledger,
+    Score,
+    ScoreRole,
+    Trial,
+    ledger_stamp,
+    settings_of_condition,
+)
 from realitygap.runs import Condition
 from realitygap.world import Arena
 
@@ -157,7 +165,8 @@ class Counts:
     def arena(self, condition: str) -> Arena:
         """Return the arena of a condition."""
         if condition not in self._arenas:
-            resolved = Condition.from_settings(condition, self._settings[condition])
+            settings = settings_of_condition(self.description, condition)
+            resolved = Condition.from_settings(condition, settings)
             self._arenas[condition] = resolved.arena.arena()
         return self._arenas[condition]
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from realitygap._limits import read_file
 from realitygap.errors import StudyError
-from realitygap.records import LEDGER_NAME, Ledger, ResultsFolder, write_whole
+from realitygap.records import LEDGER_NAME, Ledger, ResultsFolder, settings_of_condition, write_whole
 from realitygap.runs import Condition
 from realitygap.vision import (
     PEN_NAMES,
@@ -67,10 +67,10 @@ def work(channel: Channel, order: Message) -> None:
 def _layout(folder: Path, name: str) -> SheetLayout:
     """Return the layout of a condition's sheet."""
     description = ResultsFolder.open(folder).description
-    described = next(each for each in description["conditions"] if each["name"] == name)
+    settings = settings_of_condition(description, name)
     pens = tuple((description.get("trials") or {}).get("pens") or PEN_NAMES)
     try:
-        return SheetLayout.of(Condition.from_settings(name, described["settings"]).arena.arena(), pens)
+        return SheetLayout.of(Condition.from_settings(name, settings).arena.arena(), pens)
     except ValueError as error:
         raise StudyError(f"There is no sheet to print for this study: {error}.") from error
 

@@ -38,6 +38,7 @@ from realitygap.records._ledger_kinds import (
     Trial,
     TrialState,
     Turn,
+    settings_of_condition,
 )
 from realitygap.records._ledger_reader import LedgerReader
 from realitygap.records._ledger_rows import complete_runs, ledger_frame
@@ -75,6 +76,7 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     "EXTRA_SCHEMA",
     "SCHEMA",
     "schema_with",
+    "settings_of_condition",
     "KEYS",
     "COLUMNS",
     "Column",

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from realitygap.drawing import ShownAsCard
+from realitygap.errors import LedgerError
+from realitygap.settings import shown
 
 TrialState = Literal["planned", "running", "driven", "scored", "void"]
 ScoreRole = Literal["score", "second", "correction"]
@@ -142,3 +144,18 @@ class Score:
     n_ends: int | None = None
     path: Sequence[Sequence[float]] | None = None
     photo: PhotoCount | None = None
+
+
+def settings_of_condition(description: Mapping[str, Any], name: str) -> Any:
+    """Return the settings of a condition of a ledger, from the description of its study.
+
+    Raises:
+        LedgerError: The study has no such condition.
+    """
+    for condition in description["conditions"]:
+        if condition["name"] == name:
+            return condition["settings"]
+    raise LedgerError(
+        f"The ledger has trials of condition {shown(name)}, but study.json has no such condition. Restore both files "
+        "from the same copy."
+    )

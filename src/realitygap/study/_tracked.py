@@ -22,6 +22,7 @@ from realitygap.records import (
     ScoreRole,
     TrialRecord,
     read_observations,
+    settings_of_condition,
 )
 from realitygap.runs import Condition, genome_of
 from realitygap.vision import Beginning, Track, Tracked, find_beginning
@@ -81,12 +82,8 @@ def trial_of_ledger(folder: str | Path, number: int) -> TrialToTrack:
             f"Trial {number} of {folder} is {trial.state}, expected one that was driven. See: realitygap trials list "
             f"{folder}"
         )
-    described = next(
-        each
-        for each in ResultsFolder.open(folder).description["conditions"]
-        if each["name"] == trial.condition
-    )
-    condition = Condition.from_settings(trial.condition, described["settings"])
+    settings = settings_of_condition(ResultsFolder.open(folder).description, trial.condition)
+    condition = Condition.from_settings(trial.condition, settings)
     arena = condition.arena.arena()
     t = len(record.commands)
     times = _times(record.times[:t])

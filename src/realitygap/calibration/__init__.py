@@ -11,6 +11,7 @@ from ._handles import CONTACT, MOTION
 from ._held_out import DECISIVE, HeldOut, is_better
 from ._log_model import MotionLog
 from ._log_prediction import PathErrors, Steps, path_errors, summary_of
+from ._marker import Marker, fit_marker
 from ._motion import MotionFit, fit_motion
 from ._motion_log import LogPrediction, MotionLogFit, fit_motion_log, fit_motion_logs, motion_log
 from ._motion_plans import motion_plans
@@ -45,6 +46,7 @@ __all__ = [
     "HeldOut",
     "Independence",
     "LogPrediction",
+    "Marker",
     "MeasuredFrom",
     "Misfit",
     "MotionFit",
@@ -73,6 +75,7 @@ __all__ = [
     "fit_contact",
     "fit_from_commands",
     "fit_from_poses",
+    "fit_marker",
     "fit_motion",
     "fit_motion_log",
     "fit_motion_logs",

@@ -268,13 +268,16 @@ def _rms(off: Floats, seen: Bools) -> list[float]:
 def fitted_parameter(
     parameter: Parameter, estimate: float, draws: Floats, found: Identified, observe: Observe
 ) -> Fitted:
-    """Return a parameter with its 90 % interval, and with advice if it is not identified."""
+    """Return a parameter with its 90 % interval, and with advice if it is not identified.
+
+    The interval also holds the estimate, which may lie at an end of a ridge that the draws fill.
+    """
     low, high = np.quantile(draws, [0.05, 0.95])
     return Fitted(
         name=parameter.name,
         estimate=estimate,
-        low=float(low),
-        high=float(high),
+        low=min(float(low), estimate),
+        high=max(float(high), estimate),
         prior_low=parameter.prior.lowest,
         prior_high=parameter.prior.highest,
         identified=found.identified,

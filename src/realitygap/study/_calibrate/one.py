@@ -35,11 +35,18 @@ from .._wrapped_targets import (
     RuledTarget,
 )
 from .kinds import KINDS, Kind
+from .marker import is_under_camera, with_marker, without_marker
 from .parts import SOFTWARE, Parts
 from .whole import ALL_TRIALS, LEAST_TO_CHOOSE, calibrate_all
 
 SEED_STRIDE = 10_000
 """Distance between the numbers of trials of calibrations with different seeds."""
+
+NO_READINGS = ("path", "motion", "contact")
+"""Kinds of calibration that also work with trials without readings of range sensors."""
+
+BY_CAMERA = ("motion", "all")
+"""Kinds of calibration that fit the marker of a camera, too."""
 
 Tell = Callable[[int, int], None]
 """Called with the number of finished trials and of all trials."""
@@ -111,7 +118,9 @@ def _calibrated(
     plans = _plans(KINDS[kind], target.arena, paced, budget)
     numbered = [replace(plan, number=plan.number + SEED_STRIDE * (seed % 1000)) for plan in plans]
     trials = CountingTarget(target, len(plans), tell).carry_out(numbered, observe)
-    parts = _fit(kind, trials, robot, target.arena, observe, seed)
+    parts = _fit(
+        kind, trials, robot, target.arena, observe, seed, is_under_camera(target.name, target.label, observe)
+    )
     return calibration_of(
         kind, parts, robot, target.name, target.label, observe, trials, target.arena.name, seed
     )
@@ -218,8 +227,10 @@ def calibrate_from(
     if not sees(found.head.observe, seen):
         raise StudyError(f"--observe is {seen!r}, and {data} has no more than {found.head.observe!r}.")
     trials = [_seen_as(trial, seen) for trial in those_that_count(found.trials)]
-    _refuse_other_readings(trials, load_robot(robot))
-    parts = _fit(kind, trials, robot, arena, seen, seed)
+    if kind not in NO_READINGS or any(trial.readings.shape[1] for trial in trials):
+        _refuse_other_readings(trials, load_robot(robot))
+    has_marker = is_under_camera(found.head.target, found.head.label, seen)
+    parts = _fit(kind, trials, robot, arena, seen, seed, has_marker)
     made = calibration_of(
         kind, parts, robot, found.head.target, found.head.label, seen, trials, arena.name, seed
     )
@@ -285,11 +296,15 @@ def _fit(
     arena: Arena,
     observe: Observe,
     seed: int,
+    has_marker: bool,
 ) -> Parts:
     base = load_robot(robot)
     alike, left_out = (trials, "") if kind == "sensors" else of_one_length(trials)
+    marker = None
     try:
-        parts = KINDS[kind].fit(alike, base, arena, observe, seed)
+        if has_marker and kind in BY_CAMERA:
+            alike, marker = without_marker(alike, base, arena, seed)
+        parts = with_marker(KINDS[kind].fit(alike, base, arena, observe, seed), marker)
     except ValueError as error:
         raise StudyError(str(error)) from error
     return replace(parts, notes=(*parts.notes, left_out)) if left_out else parts

@@ -43,6 +43,7 @@ from realitygap.trials import Target, TrialPlan
 from realitygap.world import Arena, Calibration, Fitted, RobotModel
 
 from .held_out_trials import compare_on_trials, evidence_in, simulate_evidence
+from .marker import is_under_camera, with_marker, without_marker
 from .parts import SOFTWARE, Parts
 
 METHOD = (
@@ -115,7 +116,10 @@ def calibrate_all(
         say(f"{len(chosen)} more trials, chosen")
         carried_out += target.carry_out(chosen, observe, told)
         trials, left_out = of_one_length(carried_out)
-    parts = fit.parts(trials, effort)
+    marker = None
+    if is_under_camera(target.name, target.label, observe):
+        trials, marker = without_marker(trials, platform.robot, target.arena, seed)
+    parts = with_marker(fit.parts(trials, effort), marker)
     return Calibration(
         kind="all",
         robot=robot if isinstance(robot, str) else platform.robot.name,

@@ -43,7 +43,7 @@ class Marker:
 
     @property
     def note(self) -> str:
-        """What was taken from the poses, in words; empty if nothing was."""
+        """The correction of the poses, in words; empty if there is none."""
         if (self.left, self.heading) == (0.0, 0.0):
             return ""
         side = "left" if self.left > 0 else "right"

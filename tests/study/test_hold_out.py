@@ -37,3 +37,15 @@ def test_verdict_names_the_numbers_that_stay_and_a_lookup_table_that_is_better()
 def test_without_held_out_data_there_is_no_verdict():
     parts = chosen_parts(PARTS, None, {})
     assert (parts.verdict, parts.reasons, parts.numbers) == ("", PARTS.reasons, PARTS.numbers)
+
+
+def test_fit_that_is_worse_after_some_time_is_not_used():
+    errors = {"fitted": 0.1, "nominal numbers": 0.3}
+    later = {"after 5 s": {"fitted": 0.06, "nominal numbers": 0.05}}
+    within = {"after 5 s": {"fitted": (0.04, 0.08), "nominal numbers": (0.03, 0.07)}}
+    compared = Compared("mean distance", "m", 9, errors, later, intervals=within)
+    made = chosen_parts(PARTS, compared, {"drive.speed": 0.2})
+    assert compared.recommended == "nominal numbers"
+    assert dict(made.numbers) == {"drive.speed": 0.2}
+    assert "after 5 s" in made.verdict
+    assert any("0.04" in reason and "0.08" in reason for reason in made.reasons)

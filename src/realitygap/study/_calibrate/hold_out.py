@@ -82,6 +82,19 @@ class Compared:
         return f"Error of the fit as a multiple of the others' errors: {ratios}."
 
     @property
+    def intervals_in_words(self) -> tuple[str, ...]:
+        """The errors of the fit and of the nominal numbers that have intervals, one line for each."""
+        lines = []
+        for key, rows in self.intervals.items():
+            each = [
+                f"{name} {self.more[key][name]:.3g} [{rows[name][0]:.3g}, {rows[name][1]:.3g}]"
+                for name in (FITTED, NOMINAL)
+                if name in rows
+            ]
+            lines.append(f"Error {key} with its 90 % interval: {', '.join(each)} {self.unit}.")
+        return tuple(lines)
+
+    @property
     def is_better(self) -> bool:
         """True if the fit predicts better than the nominal numbers, also after 5 and 30 s."""
         also = [self.more[name] for name in DECISIVE if name in self.more]
@@ -90,9 +103,9 @@ class Compared:
     @property
     def recommended(self) -> str:
         """The one of the choices with the smallest error, and the first of those with equal errors."""
-        choices = [
-            name for name in self.choices if name in self.errors and (name != FITTED or self.is_better)
-        ]
+        choices = [name for name in self.choices if name in self.errors]
+        if NOMINAL in choices and not self.is_better:
+            choices.remove(FITTED)
         return min(choices, key=self.errors.__getitem__)
 
 
@@ -107,7 +120,7 @@ def chosen_parts(parts: Parts, compared: Compared | None, given: Mapping[str, fl
     evidence = {key: value for key, value in parts.evidence.items() if key != "held_out"}
     if compared is not None:
         evidence["held_out"] = compared.to_dict()
-        reasons = (compared.in_words, *parts.reasons)
+        reasons = (compared.in_words, *compared.intervals_in_words, *parts.reasons)
         parts = replace(parts, verdict=_verdict(compared), reasons=reasons)
     if compared is None or compared.is_better:
         return replace(parts, numbers={**given, **parts.numbers}, evidence=evidence)
@@ -117,6 +130,13 @@ def chosen_parts(parts: Parts, compared: Compared | None, given: Mapping[str, fl
 def _verdict(compared: Compared) -> str:
     """Return which numbers the calibration has, and whether they keep up with a lookup table."""
     better = compared.is_better
+    if not better and compared.errors[FITTED] < compared.errors[NOMINAL]:
+        worse = [key for key in DECISIVE if key in compared.more]
+        worse = [key for key in worse if compared.more[key][FITTED] > compared.more[key][NOMINAL]]
+        return (
+            f"The fit predicts better over the whole unseen part, but worse {' and '.join(worse)}: the robot file's "
+            "numbers stay."
+        )
     if not compared.errors[FITTED if better else NOMINAL] > compared.errors.get(TABLE, math.inf):
         return (
             "The fit predicts better than the robot file's numbers: use it."

@@ -36,7 +36,7 @@ def named_file(folder: Path, name: Any, *, or_folder: bool = False) -> Path:
         is_inside = path.resolve().is_relative_to(folder.resolve())
         mode = path.stat().st_mode if is_inside else 0
     except FileNotFoundError:
-        raise NamedFileError(f"there is no file {path}.") from None
+        raise NamedFileError(f"there is no file {path}. Copy it there, or correct its name.") from None
     except (OSError, RuntimeError, ValueError) as error:  # RuntimeError: links that lead to themselves
         raise NamedFileError(
             f"{shown(name)} cannot be read ({getattr(error, 'strerror', None) or error})."

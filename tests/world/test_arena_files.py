@@ -154,7 +154,7 @@ def test_numbers_have_dotted_names_and_may_be_drawn(write):
         (ROOM + "[grid]\nx = 0\ny = 0\ncell = 0.1\ncolumns = 20\nrows = 20", "expected at most 256 cells"),
         (ROOM + "[grid]\nx = 0\ny = 0\ncell = 0\ncolumns = 2\nrows = 2", "grid.cell: expected more than 0"),
         (ROOM + "goal = [1, 1, 0]", "goal.radius: expected more than 0"),
-        (ROOM + "[floor.image]\nfile = 'none.png'\nwidth = 1", "none.png is no image"),
+        (ROOM + "[floor.image]\nfile = 'none.png'\nwidth = 1", "none.png. Copy it there"),
     ],
 )
 def test_a_mistake_gets_its_place_and_our_words(write, new, says):

@@ -38,6 +38,7 @@ ALLOWED = {
     "logs/_end_poses.py": {"pl.read_csv"},  # of a text of limited size
     "logs/_text.py": {"pl.read_csv"},  # of blocks of limited size
     "records/_chunk.py": {"pl.read_parquet"},  # after check_size
+    "records/_ledger_check.py": {"sqlite3.connect"},
     "records/_ledger_file.py": {"sqlite3.connect"},
     "records/_observations_file.py": {"json.loads"},  # of what was just written
     "study/_closing/plan.py": {"json.loads"},  # of what was just written

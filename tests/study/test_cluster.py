@@ -60,8 +60,9 @@ def start_command(tmp_path: Path, address: str, *more: str) -> subprocess.Popen:
     path = tmp_path / "clustered.toml"
     path.write_text(STUDY)
     command = [sys.executable, "-m", "realitygap", "run", str(path), "--out", str(tmp_path / "r")]
+    chunk = () if "--chunk" in more else ("--chunk", "1")
     return subprocess.Popen(
-        [*command, "--cluster", address, "--chunk", "1", *more],
+        [*command, "--cluster", address, *chunk, *more],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,

@@ -55,7 +55,8 @@ def emulated() -> RobotTarget:
 def emulator(*options: str) -> Iterator[tuple[str, str]]:
     """An emulator in another process that goes as fast as it can; its port and its witness's address."""
     command = [sys.executable, "-m", "realitygap", "emulate", "scribbler", "--tcp", "0", "--witness", "0"]
-    with subprocess.Popen([*command, "--speed", "0", *options], stdout=subprocess.PIPE, text=True) as process:
+    speed = () if "--speed" in options else ("--speed", "0")
+    with subprocess.Popen([*command, *speed, *options], stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
         try:
             port = process.stdout.readline().strip()

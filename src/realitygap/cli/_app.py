@@ -54,7 +54,7 @@ class _RootGroup(TyperGroup):
 
 
 def _drop_far_suggestions(error: Any) -> None:
-    """Keep only similar options among suggestions. Typer counts the dashes, by which --run is like --out."""
+    """Keep only similar options among suggestions. Typer compares the dashes, too, by which all options are alike."""
     if getattr(error, "possibilities", None) and getattr(error, "option_name", None):
         near = difflib.get_close_matches(
             error.option_name.lstrip("-"), [name.lstrip("-") for name in error.possibilities]

@@ -395,7 +395,6 @@ class _Page:
     def _show_finding(self, finding: str) -> None:
         if finding:
             ui.label(finding).classes("lab-finding")
-            hint(f"{_BASIS.caveat[:1].upper()}{_BASIS.caveat[1:]}.")
 
     def _waiting_for(self) -> str | None:
         """Why there are no figures; None once there are some."""

@@ -41,7 +41,6 @@ def test_papers_study_runs_with_one_click_and_its_figures_grow(lab, visit):
     expect(finding).to_contain_text(
         re.compile("As recorded, novelty-.0 and novelty-.0 have the highest .* [(]SIM, 100 runs each[)]")
     )
-    page.get_by_text("so luck is part of them").wait_for()
     pens = page.locator(".lab-curves polyline").evaluate_all(PENS)
     assert len(set(pens)) == len(pens) == 9
     seen = [json.loads(each) for each in json.loads(page.evaluate("sessionStorage.seen"))]

@@ -213,11 +213,13 @@ def visit(browser: Any, lab: RunningLab) -> Iterator[Callable[..., Any]]:
 
 
 def open_advanced(page, field) -> None:
-    """Open the section Advanced: a click may come before the page listens, so click until a field in it can be seen."""
+    """Open the section Advanced, if there is one, so that a field is seen: a click may come before the page listens."""
+    advanced = page.get_by_text("Advanced", exact=True)
     for _ in range(60):
+        advanced.or_(field).first.wait_for()
         if field.is_visible():
             return
-        page.get_by_text("Advanced", exact=True).first.click()
+        advanced.first.click()
         page.wait_for_timeout(1000)
 
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
 import time
 
 import pytest
 
+from realitygap.errors import RobotError
 from realitygap.lab._gap_work import _Telling, rounds
 from realitygap.records import read_observations
 
@@ -89,6 +91,14 @@ def test_last_of_several_trials_that_end_together_is_reported():
     while ("robot", 3) not in channel.done:
         assert time.monotonic() - began < 60
         time.sleep(0.02)
+
+
+def test_trials_that_were_saved_are_reported_before_a_failure():
+    channel = Told()
+    with contextlib.suppress(RobotError), _Telling(channel) as telling:
+        telling.show("robot", 3, 10)
+        raise RobotError("gone")
+    assert channel.done == [("robot", 3)]
 
 
 def test_reports_come_after_2_4_8_trials_and_at_the_end():

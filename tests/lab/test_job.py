@@ -112,22 +112,24 @@ def test_robot_of_a_gap_is_silent_only_in_a_trial_without_an_answer(tmp_path, mo
     assert job.silent_s == 0
 
 
-def test_job_that_failed_before_its_first_trial_offers_no_resume(tmp_path, monkeypatch):
-    """A gap with a missing file failed again at each press of Resume."""
+@pytest.mark.parametrize(
+    ("trials", "is_of_robot", "can_resume"), [(0, False, False), (1, False, True), (0, True, True)]
+)
+def test_job_that_failed_offers_to_resume_where_that_helps(
+    tmp_path, monkeypatch, trials, is_of_robot, can_resume
+):
+    """A missing file fails again; a robot that did not answer may answer the next time."""
     monkeypatch.setattr(_job, "Child", SilentChild)
     gap = {"target": "sim:missing.toml", "n_controllers": 2, "trials": 2}
     calibration = {"kind": "path", "platform": "sim:missing.toml", "out": str(tmp_path / "mine.toml")}
-    for trials, can_resume in ((0, False), (1, True)):
-        job = GapJob("gap", {"measure": gap}, tmp_path, lambda: None)
-        other = CalibrationJob(calibration, tmp_path, lambda: None)
-        if trials:
-            job._hear({"kind": "trials", "name": "sim", "done": trials})
-            other._hear({"kind": "trials", "done": trials, "n": 4, "readings": []})
-        for each in (job, other):
-            each._hear(
-                {"kind": "error", "text": "There is no robot file missing.toml.", "is_of_robot": False}
-            )
-        work = _Work(job, job.progress, True, job.is_failed, 0.0)
-        assert (work.can_resume, work.is_failed) == (can_resume, True)
-        monkeypatch.setattr(CalibrationJob, "is_over", True)
-        assert other.can_resume == can_resume
+    job = GapJob("gap", {"measure": gap}, tmp_path, lambda: None)
+    other = CalibrationJob(calibration, tmp_path, lambda: None)
+    if trials:
+        job._hear({"kind": "trials", "name": "sim", "done": trials})
+        other._hear({"kind": "trials", "done": trials, "n": 4, "readings": []})
+    for each in (job, other):
+        each._hear({"kind": "error", "text": "It did not answer.", "is_of_robot": is_of_robot})
+    work = _Work(job, job.progress, True, job.is_failed, 0.0)
+    assert (work.can_resume, work.is_failed) == (can_resume, True)
+    monkeypatch.setattr(CalibrationJob, "is_over", True)
+    assert other.can_resume == can_resume

@@ -45,8 +45,8 @@ class CalibrationJob(MeasuringJob):
 
     @property
     def can_resume(self) -> bool:
-        """True if it has ended without a result, and not by an error before the first trial."""
-        has_begun = self.n_done > 0 or self.is_lost
+        """True if it has ended without a result, and not by an error before its first trial that no robot caused."""
+        has_begun = self.n_done > 0 or self.is_link_lost
         return self.is_over and self.made is None and (has_begun or not self.is_failed)
 
     @property

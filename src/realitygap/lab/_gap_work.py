@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 from realitygap.gap import SHOWN, Estimate
 from realitygap.report import write_gap_report
@@ -33,23 +33,22 @@ def work(channel: Channel, order: Message) -> None:
 
 def _measure(channel: Channel, values: dict[str, Any], page: Path, kept: Path) -> None:
     """Measure repeatedly with more trials of each controller. Trials of the target are kept, and never driven again."""
-    told, pulse = _Telling(channel), Pulse(channel)
-    for trials in rounds(int(values.pop("trials"))):
-        found = gap_between(**values, trials=trials, results=kept, pulse=pulse.tell, tell=told.show)
-        write_gap_report(found, page)
-        result = found.study.result
-        measures = [
-            (each.title, _words(getattr(result, each.name))) for each in SHOWN if each.name in MEASURES
-        ]
-        rms = None if result.rms.low is None else [result.rms.estimate, result.rms.low, result.rms.high]
-        channel.say(
-            "measured",
-            trials=trials,
-            verdict=result.verdict,
-            measures=measures,
-            rms=rms,
-            pairs=pairs_of(found.study),
-        )
+    pulse = Pulse(channel)
+    with _Telling(channel) as told:
+        for trials in rounds(int(values.pop("trials"))):
+            gap = gap_between(**values, trials=trials, results=kept, pulse=pulse.tell, tell=told.show)
+            write_gap_report(gap, page)
+            channel.say("measured", trials=trials, **_measured(gap.study))
+
+
+def _measured(study: GapStudy) -> dict[str, Any]:
+    """Return the verdict and the measures of a gap, as its page shows them."""
+    result = study.result
+    measures = [
+        (shown.title, _words(getattr(result, shown.name))) for shown in SHOWN if shown.name in MEASURES
+    ]
+    rms = None if result.rms.low is None else [result.rms.estimate, result.rms.low, result.rms.high]
+    return {"verdict": result.verdict, "measures": measures, "rms": rms, "pairs": pairs_of(study)}
 
 
 def pairs_of(gap: GapStudy) -> dict[str, Any]:
@@ -88,12 +87,22 @@ def rounds(trials: int) -> list[int]:
 
 
 class _Telling:
-    """Reports how many trials are done, not too often; the last number of several is never left out."""
+    """Reports how many trials are done, not too often; the last number of several is never left out.
+
+    It is used in a `with`: if the gap fails, the trials that were saved are reported before the failure, so that the
+    page can offer to resume.
+    """
 
     def __init__(self, channel: Channel) -> None:
         self._channel = channel
         self._lock = threading.Lock()
         self._waiting: dict[str, tuple[int, int]] = {}
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._report()
 
     def show(self, name: str, done: int, total: int) -> None:
         """Report the number of trials on a platform."""

@@ -57,8 +57,8 @@ class _Work:
 
     @property
     def can_resume(self) -> bool:
-        """True if it has ended before all trials were done, and not by an error before the first one."""
-        has_begun = any(self.job.trials.values()) or self.job.is_lost
+        """True if it has ended before all trials were done, and not by an error before them that no robot caused."""
+        has_begun = any(self.job.trials.values()) or self.job.is_link_lost
         return self.is_over and not self.job.is_complete and (has_begun or not self.is_failed)
 
 

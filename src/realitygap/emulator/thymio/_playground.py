@@ -19,6 +19,7 @@ import threading
 import time
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -202,7 +203,7 @@ class Playground(ClosedOnExit):
             time.sleep(0.02)
         raise RobotError(f"The playground did not start within {START_S:.0f} s.")
 
-    def _call(self, path: str, interface: str, member: str, signature: str, *values: object) -> list[object]:
+    def _call(self, path: str, interface: str, member: str, signature: str, *values: object) -> Sequence[Any]:
         if self._bus is None:
             raise RobotError("The playground has ended.")
         try:
@@ -246,8 +247,9 @@ class Playground(ClosedOnExit):
 
     def pose(self) -> Pose:
         """Return the true pose of the robot."""
-        found = dict(self._call(self._path, _PROPERTIES, "GetAll", "s", _BODY)[0])  # type: ignore[call-overload]
-        return Pose(found["x"] / CM + self._left, found["y"] / CM + self._low, found["angle"])
+        (properties,) = self._call(self._path, _PROPERTIES, "GetAll", "s", _BODY)
+        x, y, angle = (properties[name][1] for name in ("x", "y", "angle"))  # each is a type and a value
+        return Pose(x / CM + self._left, y / CM + self._low, angle)
 
     def place(self, pose: Pose, seed: int = 0) -> None:
         """Put the robot, whose motors are off, at a pose; the path begins again.
@@ -267,7 +269,7 @@ class Playground(ClosedOnExit):
         }
         for _ in range(STAND_TRIES):
             for name, value in values.items():
-                self._call(self._path, _PROPERTIES, "Set", "ssv", _BODY, name, float(value))
+                self._call(self._path, _PROPERTIES, "Set", "ssv", _BODY, name, ("d", float(value)))
             for _ in range(LOOKS):
                 time.sleep(STAND_S / LOOKS / self._speed)
                 found = self.pose()

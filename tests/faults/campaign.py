@@ -35,6 +35,7 @@ KINDS: Mapping[str, Kind] = MappingProxyType(
         "interrupts": Kind("interrupts", 64, 8),
         "simulated-kills": Kind("simulated_kills", 1000, 50),
         "physical-kills": Kind("physical_kills", 200, 20),
+        "trial-kills": Kind("trial_kills", 200, 20),
         "wire": Kind("wire", 10_000, 500),
         "cluster": Kind("cluster_kills", 20, 4),
         "full-disk": Kind("full_disk", 600, 30),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import io
 import math
 import shutil
 import subprocess
@@ -19,7 +20,6 @@ from realitygap.drawing import PENS, Ink
 from realitygap.errors import RealityGapError, did_you_mean
 from realitygap.records import write_whole
 
-from ._gif import gif_bytes
 from ._moving import MovingTrial, all_trials
 from ._screen import (
     FAR,
@@ -62,6 +62,12 @@ _COLORS = [
     + [TILE, TILE_VISITED, TILE_OFTEN, FAR, MIDDLE, NEAR]
 ]
 """Colors that a movie needs unchanged, with the shades at their edges."""
+
+_N_COLORS = 63
+"""Maximum number of colors of a GIF, besides the one of unchanged pixels."""
+
+_LEVELS_APART = 8
+"""Minimum difference between a color of the pictures and each of `_COLORS`, in red, green, or blue."""
 
 
 def save_movie(
@@ -139,10 +145,48 @@ def picture_period(step_s: float, duration_s: float) -> float:
 
 
 def gif_of(pictures: Sequence[Image], duration_s: float, comment: str) -> bytes:
-    """Return pictures as a GIF that lasts so long, and then rests."""
+    """Return pictures as a GIF that lasts so long, rests on its last picture, and then restarts.
+
+    All pictures share one palette, so that nothing flickers.
+    """
+    from PIL.Image import Dither
+
     ends = np.rint(np.linspace(0, 100 * duration_s, len(pictures))).astype(int)
     shown = [*np.diff(ends).tolist(), round(100 * HOLD_S)]
-    return gif_bytes(pictures, shown, _COLORS, comment)
+    palette = _palette(pictures)
+    first, *others = (picture.quantize(palette=palette, dither=Dither.NONE) for picture in pictures)
+    buffer = io.BytesIO()
+    first.save(
+        buffer,
+        "GIF",
+        save_all=True,
+        append_images=others,
+        duration=[10 * hundredths for hundredths in shown],
+        loop=0,
+        disposal=1,
+        comment=comment.encode("utf-8"),
+        optimize=True,  # otherwise pixels that stay as they are would not be left out
+    )
+    return buffer.getvalue()
+
+
+def _palette(pictures: Sequence[Image]) -> Image:
+    """Return an image whose palette has the colors of movies, and further ones from a few of the pictures."""
+    from PIL import Image
+
+    last = len(pictures) - 1
+    samples = [pictures[k] for k in sorted({0, last // 3, 2 * last // 3, last})]
+    width, height = samples[0].size
+    sheet = Image.new("RGB", (width, height * len(samples)))
+    for k, sample in enumerate(samples):
+        sheet.paste(sample, (0, k * height))
+    own = np.array(list(dict.fromkeys(_COLORS)))
+    others = np.reshape(sheet.quantize(_N_COLORS).getpalette() or [], (-1, 3))
+    # Pillow compares colors in steps of four levels: one that is almost ours would take its place
+    differ = (np.abs(others[:, None] - own).max(axis=2) >= _LEVELS_APART).all(axis=1)
+    palette = Image.new("P", (1, 1))
+    palette.putpalette(np.concatenate([own, others[differ]]).ravel().tolist()[: 3 * _N_COLORS])
+    return palette
 
 
 def find_ffmpeg() -> str:
@@ -151,9 +195,9 @@ def find_ffmpeg() -> str:
     Raises:
         RealityGapError: there is none.
     """
-    there = shutil.which("ffmpeg")
-    if there is not None:
-        return there
+    installed = shutil.which("ffmpeg")
+    if installed is not None:
+        return installed
     with contextlib.suppress(ImportError, RuntimeError):
         return str(import_module("imageio_ffmpeg").get_ffmpeg_exe())
     raise RealityGapError(
@@ -181,8 +225,9 @@ def video_of(encoder: str, pictures: Sequence[Image]) -> bytes:
         raw = b"".join(picture.tobytes() for picture in pictures)
         done = subprocess.run(command, input=raw, capture_output=True, check=False)
         if done.returncode != 0:
-            said = done.stderr.decode(errors="replace").strip().splitlines()
+            messages = done.stderr.decode(errors="replace").strip().splitlines()
             raise RealityGapError(
-                f"ffmpeg ({encoder}) did not make the movie: {said[-1] if said else 'no reason given'}. Write a .gif."
+                f"ffmpeg ({encoder}) did not make the movie: {messages[-1] if messages else 'no reason given'}. "
+                "Write a .gif."
             )
         return path.read_bytes()

@@ -1,11 +1,9 @@
 """Plain descriptions of arenas, bodies and sensors; nothing here moves."""
 
-from . import _calibration_card  # noqa: F401  # what notebooks show
 from ._arena import (
     MOST_ROBOTS,
     NAMED_STARTS,
     Arena,
-    Grid,
     Pose,
     paper_arena,
 )
@@ -13,8 +11,8 @@ from ._arena_file import ArenaFile
 from ._calibration import Calibration, Fitted
 from ._case import Case, CaseBody, CaseDevice
 from ._distribution import Distribution
-from ._drawn_places import check_drawn_starts
 from ._floor import BARE_FLOOR, Floor, FloorImage
+from ._grid import Grid, VisitedCells, cells_along
 from ._library import (
     arena_names,
     load_arena,
@@ -24,7 +22,7 @@ from ._library import (
     read_toml,
     robot_names,
 )
-from ._numbers import in_si
+from ._numbers import INCH, in_si
 from ._obstacle import Goal, Light, Obstacle, Segment, distance_to_segment
 from ._part import MOST_CORNERS, Part, rounded, why_no_part
 from ._pictures import (
@@ -37,15 +35,13 @@ from ._pictures import (
     robot_picture,
     things_in,
 )
-from ._placing import check_start, enclosing_walls, is_inside
+from ._placing import check_drawn_starts, check_start
 from ._robot import JYRO_SCRIBBLER, Body, RangeSensors
 from ._robot_model import SENSORS, RangeSensor, RobotModel
 from ._robot_picture import model_picture
-from ._room import bounds_of, room_of, walls_within
 from ._settings import ArenaSettings
 from ._toml import toml_table
-from ._units import INCH
-from ._visited import VisitedCells, cells_along
+from ._walls import bounds_of, enclosing_walls, is_inside, room_of, walls_within
 
 __all__ = [
     "BARE_FLOOR",

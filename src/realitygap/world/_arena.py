@@ -13,8 +13,9 @@ from realitygap.errors import check_finite
 from ._arena_file import ArenaFile
 from ._distribution import Distribution
 from ._floor import BARE_FLOOR, Floor
+from ._grid import Grid
+from ._numbers import INCH
 from ._obstacle import Goal, Light, Obstacle, Segment
-from ._units import INCH
 
 MOST_ROBOTS = 16
 """Robots in an arena at once, at most."""
@@ -33,42 +34,6 @@ class Pose(NamedTuple):
         """Return the place in the arena of a point of the robot [m]."""
         sine, cosine = math.sin(self.heading), math.cos(self.heading)
         return self.x + ahead * cosine - left * sine, self.y + ahead * sine + left * cosine
-
-
-@dataclass(frozen=True)
-class Grid:
-    """The reachable cells, whose visited share is coverage.
-
-    Cell (column, row) is numbered `columns * row + column`, (0, 0) at the lower left. A cell holds its left
-    and lower border, not its right and upper one.
-
-    Attributes:
-        x, y: Lower left corner [m].
-        cell: Size of a cell [m].
-        columns, rows: Number of columns and rows; at most 256 cells.
-    """
-
-    x: float
-    y: float
-    cell: float
-    columns: int
-    rows: int
-
-    def __post_init__(self) -> None:
-        """Raise a ValueError if a number is infinite or NaN."""
-        check_finite(vars(self))
-
-    @property
-    def n_cells(self) -> int:
-        """Number of cells."""
-        return self.columns * self.rows
-
-    def cell_at(self, x: float, y: float) -> int | None:
-        """Return the number of the cell that a point [m] lies in, columns * row + column; None outside of the grid."""
-        column, row = int((x - self.x) // self.cell), int((y - self.y) // self.cell)
-        if 0 <= column < self.columns and 0 <= row < self.rows:
-            return self.columns * row + column
-        return None
 
 
 @dataclass(frozen=True)
@@ -230,8 +195,8 @@ class Arena:
     def from_dict(cls, values: dict[str, Any]) -> Arena:
         """Return the arena that `to_dict` described."""
         obstacles = (
-            Obstacle(**{**each, "corners": tuple((x, y) for x, y in each["corners"])})
-            for each in values.get("obstacles", ())
+            Obstacle(**{**row, "corners": tuple((x, y) for x, y in row["corners"])})
+            for row in values.get("obstacles", ())
         )
         return cls(
             values["name"],
@@ -239,7 +204,7 @@ class Arena:
             Grid(**values["grid"]),
             Pose(*values["start"]),
             tuple(obstacles),
-            tuple(Light(**each) for each in values.get("lights", ())),
+            tuple(Light(**row) for row in values.get("lights", ())),
             Floor.from_dict(values.get("floor", {})),
             Goal(**values["goal"]) if "goal" in values else None,
             {name: Distribution(**drawn) for name, drawn in values.get("vary", {}).items()},

@@ -12,11 +12,10 @@ from realitygap.settings import Settings, shown
 
 from ._distribution import Distribution
 from ._floor import MOST_PIXELS, Floor, FloorImage
-from ._numbers import Described, NotNegative, Number, Positive, in_si
+from ._numbers import INCH, Described, NotNegative, Number, Positive, in_si
 from ._obstacle import TAPE_WIDTH, Obstacle
 from ._part import Corner, box_as_corners, why_no_part
 from ._toml import toml_table, toml_value
-from ._units import INCH
 
 MOST_CELLS = 256
 MOST_WALLS = 2048

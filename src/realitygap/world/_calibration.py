@@ -8,7 +8,7 @@ from typing import Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from realitygap.drawing import ShownAsCard
+from realitygap.drawing import Bar, Card, ShownAsCard, Table, card_of
 from realitygap.settings import Settings
 
 from ._toml import toml_table
@@ -168,7 +168,7 @@ class Calibration(Settings, ShownAsCard):
         return self
 
     def __repr__(self) -> str:
-        n_identified = sum(each.identified for each in self.fitted)
+        n_identified = sum(fitted.identified for fitted in self.fitted)
         state = "rejected" if self.misspecified else "ok"
         counts = f"{self.trials} trials, {n_identified}/{len(self.fitted)} identified"
         return f"{type(self).__name__}({self.kind!r}, {counts}, {state})"
@@ -213,3 +213,56 @@ class Calibration(Settings, ShownAsCard):
 def is_calibration(values: Mapping[str, Any]) -> bool:
     """Return whether the values of a file are those of a calibration, of this version or another."""
     return str(values.get("format", "")).startswith("realitygap calibration")
+
+
+@card_of.register(Calibration)
+def calibration_card(calibration: Calibration) -> Card:
+    """Return the parameters, with their intervals in the range of the prior, and the origin of the numbers."""
+    n_identified = sum(fitted.identified for fitted in calibration.fitted)
+    warning = ""
+    if calibration.misspecified:
+        warning = (
+            f"Rejected: the simulator cannot reproduce this robot (p = {calibration.misspecification_p:.2g}). Don't "
+            "use this calibration for conclusions."
+        )
+    elif calibration.recommended == "nominal numbers":
+        warning = "The numbers that this calibration started from predict held-out trials better."
+    rows: list[list[str | Bar]] = [
+        [
+            f"{fitted.name} [{fitted.unit}]" if fitted.unit else fitted.name,
+            *fitted.shown,
+            _bar(fitted),
+            "yes" if fitted.identified else f"no. {fitted.advice}",
+        ]
+        for fitted in calibration.fitted
+    ]
+    origin = {
+        "built on": calibration.robot,
+        "observed": calibration.observe,
+        "arena": calibration.arena,
+        "date": calibration.date,
+        "seed": str(calibration.seed),
+        "draws": f"{calibration.n_draws:,}",
+        "software": calibration.software,
+        "method": calibration.method,
+    }
+    about = [[key, value] for key, value in origin.items() if value]
+    return Card(
+        f"Calibration ({calibration.kind}) of {calibration.target}",
+        [calibration.label],
+        f"{n_identified} of {len(rows)} parameters identified from {calibration.trials:,} trials",
+        warning,
+        parts=[
+            Table(
+                ["parameter", "estimate", "90 % interval", "in the range thought possible", "identified"],
+                rows,
+            ),
+            Table(["", ""], about, "Origin", closed=True),
+            *calibration.remarks,
+        ],
+    )
+
+
+def _bar(fitted: Fitted) -> Bar:
+    start, end = min(fitted.prior_low, fitted.low), max(fitted.prior_high, fitted.high)
+    return Bar(fitted.estimate, fitted.low, fitted.high, start, end)

@@ -315,12 +315,12 @@ class _DoubleKeyError(Exception):
 
 
 def _without_doubles(pairs: list[tuple[str, object]]) -> dict[str, object]:
-    found: dict[str, object] = {}
+    values: dict[str, object] = {}
     for key, value in pairs:
-        if key in found:
+        if key in values:
             raise _DoubleKeyError(shown(key))
-        found[key] = value
-    return found
+        values[key] = value
+    return values
 
 
 def _misspelt(data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:

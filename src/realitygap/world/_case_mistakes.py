@@ -7,6 +7,8 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from pydantic_core import ErrorDetails
+
 from .jyro_stock import DEVICES, INPUTS, LIGHT_MODES, ROBOT_BODIES, complete_device, device_ranges
 
 MAX_VALUES = 100_000_000  # numbers in one result: 800 MB, beyond which a slip is likelier than an intent
@@ -66,7 +68,7 @@ def place_of(loc: tuple[int | str, ...]) -> str:
     return path
 
 
-def explained(error: Any) -> str:
+def explained(error: ErrorDetails) -> str:
     """Describe a value that pydantic refused, in the project's words."""
     loc = error["loc"]
     if error["type"] == "value_error":

@@ -120,8 +120,8 @@ def _calibrated(calibration: Calibration, origin: str, chain: list[str]) -> dict
     """Return the values of the robot that a calibration builds on, with its numbers."""
     below, _ = _robot_values(calibration.robot, chain)
     model = _checked(origin, lambda: RobotModel(**below).with_numbers(calibration.numbers))
-    said = f"{Path(origin).name}: {calibration.kind} of {calibration.target}, {calibration.date}"
-    texts = {"sources": [*_texts(below.get("sources")), said]}
+    source = f"{Path(origin).name}: {calibration.kind} of {calibration.target}, {calibration.date}"
+    texts = {"sources": [*_texts(below.get("sources")), source]}
     named = {"name": Path(origin).stem[:80], "description": model.description}
     return model.to_dict() | calibration.step | named | texts
 
@@ -209,12 +209,12 @@ def _turned(values: Mapping[str, Any], origin: str) -> dict[str, Any]:
             f"{origin}: turned needs a base of plain numbers, and {', '.join(model.vary)} are drawn in it."
         )
     changed: dict[str, float] = {}
-    for name, value in model.numbers().items():
+    for name, value in model.centers().items():
         last = name.rsplit(".", 1)[-1]
         if last in ("x", "y", "axle", "idler"):
-            changed[name] = -float(value) or 0.0  # type: ignore[arg-type]
+            changed[name] = -value or 0.0
         elif last == "direction":
-            changed[name] = (float(value) + 2 * math.pi) % (2 * math.pi) - math.pi  # type: ignore[arg-type]
+            changed[name] = (value + 2 * math.pi) % (2 * math.pi) - math.pi
     for end in ("left", "right"):
         other = "right" if end == "left" else "left"
         changed |= {

@@ -14,7 +14,8 @@ from realitygap.errors import did_you_mean
 from realitygap.settings import Settings, table_in
 
 from ._distribution import KINDS, Distribution
-from ._units import INCH
+
+INCH = 0.0254  # [m]
 
 UNITS = {
     "_mm": lambda value: value / 1000,
@@ -213,15 +214,16 @@ def _is_fixed(model: type[BaseModel], path: Sequence[str]) -> bool:
     return _is_fixed(inner, rest) if inner is not None and rest else NUMBER not in field.metadata
 
 
-def _limits(metadata: list[Any]) -> Limits:
+def _limits(metadata: Sequence[object]) -> Limits:
     least, most, is_open = -math.inf, math.inf, False
     for rule in metadata:
-        if isinstance(rule, Ge):
-            least = float(rule.ge)  # type: ignore[arg-type]
-        elif isinstance(rule, Gt):
-            least, is_open = float(rule.gt), True  # type: ignore[arg-type]
-        elif isinstance(rule, Le | Lt):
-            most = float(rule.le if isinstance(rule, Le) else rule.lt)  # type: ignore[arg-type]
+        match rule:
+            case Ge(ge=int() | float() as end):
+                least = float(end)
+            case Gt(gt=int() | float() as end):
+                least, is_open = float(end), True
+            case Le(le=int() | float() as end) | Lt(lt=int() | float() as end):
+                most = float(end)
     return Limits(least, most, is_open)
 
 
@@ -273,26 +275,25 @@ def in_si(values: Mapping[str, Any]) -> dict[str, Any]:
 
     def plain(value: Any, place: str) -> Any:
         if isinstance(value, Mapping):
-            found: dict[str, Any] = {}
+            converted: dict[str, Any] = {}
             for key, part in value.items():
                 unit = next((unit for unit in UNITS if isinstance(key, str) and key.endswith(unit)), "")
                 name = key.removesuffix(unit) if unit else key
                 if unit and name != "width" and (unit == "_deg") != (name in ANGLES):
                     kind = "an angle: keep it in radians, or end it in _deg" if name in ANGLES else "no angle"
                     raise ValueError(f"{place}{key}: {name} is {kind}")
-                if name in found:
+                if name in converted:
                     raise ValueError(f"{place}{name}: given twice, also as {key}. Keep one")
-                converted = _converted(part, unit)
+                number = _converted(part, unit)
                 if name == "start" and isinstance(part, list | tuple):
-                    converted = [*converted[:2], *part[2:]]  # the third number is a heading
-                found[name] = plain(converted, f"{place}{name}.")
-            return found
+                    number = [*number[:2], *part[2:]]  # the third number is a heading
+                converted[name] = plain(number, f"{place}{name}.")
+            return converted
         if isinstance(value, list | tuple):
             return [plain(part, f"{place}{k}.") for k, part in enumerate(value)]
         return value
 
-    converted: dict[str, Any] = plain(values, "")
-    return converted
+    return dict(plain(values, ""))
 
 
 def _converted(value: Any, unit: str) -> Any:
@@ -345,10 +346,10 @@ def _split(
             return [plain(_row(part, names), f"{place}.{k}") for k, part in enumerate(value)]
         return value
 
-    found = {key: value if key == "vary" else plain(value, key) for key, value in values.items()}
+    numbers = {key: value if key == "vary" else plain(value, key) for key, value in values.items()}
     if problems:
         raise ValueError("\n".join(problems))
-    return found, vary
+    return numbers, vary
 
 
 def _row(value: Any, names: tuple[str, ...] | None) -> Any:

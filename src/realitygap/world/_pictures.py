@@ -10,10 +10,10 @@ from realitygap.drawing import Disc, Ink, Line, Picture, Shape, Text, picture_of
 
 from ._arena import Arena, Pose
 from ._floor import BARE_FLOOR, Floor, FloorImage
+from ._numbers import INCH
 from ._obstacle import Goal, Light, Obstacle
 from ._robot import Body, RangeSensors
 from ._robot_model import RobotModel
-from ._units import INCH
 
 _TICK = 0.012  # half the length of the strokes that end a dimension line [m]
 PAPER_WIDTH = 42 * INCH  # what sizes in pictures were chosen for [m]
@@ -133,14 +133,14 @@ def _arena_in_words(arena: Arena, width: float, height: float) -> str:
         (len(arena.floor.tape), "strip of tape"),
         (arena.goal is not None, "goal"),
     ]
-    there = [
+    contents = [
         f"{n:d} {what}{'s' if n > 1 else ''}".replace("strip of tapes", "strips of tape")
         for n, what in things
         if n
     ]
     return (
         f"Arena {arena.name}, {length_text(width)} by {length_text(height)}, with {grid.columns} by {grid.rows} "
-        f"reachable cells of {length_text(grid.cell)}{', ' if there else ''}{', '.join(there)}. Trials begin at "
+        f"reachable cells of {length_text(grid.cell)}{', ' if contents else ''}{', '.join(contents)}. Trials begin at "
         f"({start.x:.4g}, {start.y:.4g}) m, heading {start.heading:.4g} rad."
     )
 

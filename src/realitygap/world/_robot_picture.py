@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 import textwrap
 from collections.abc import Sequence
-from typing import Any
 
 from realitygap.drawing import Disc, Ink, Line, Picture, Point, Shape, Text, picture_of
 
 from ._pictures import dimension_line, length_text
-from ._robot_model import SENSORS, LightSensor, RangeSensor, RobotModel
+from ._robot_model import SENSORS, BumpSensor, LightSensor, LineSensor, RangeSensor, RobotModel
 
 WIDTH = 480.0  # of the picture when its texts have their sizes [pt]
 LETTERS = 104  # in a line of small text at that width
@@ -88,7 +87,7 @@ def _with_words(
 
 def _legend(model: RobotModel) -> list[tuple[str, str, str]]:
     """Return the text, the color of the text, and the color of the mark for each kind of mark."""
-    found: list[tuple[str, str, str]] = []
+    rows: list[tuple[str, str, str]] = []
     if model.range:
         first = model.range[0]
         kinds = ", ".join(dict.fromkeys(sensor.response for sensor in model.range))
@@ -98,10 +97,10 @@ def _legend(model: RobotModel) -> list[tuple[str, str, str]]:
         where = " at one place" if same and len(model.range) > 1 else ""
         shorter = ", drawn shorter" if first.reach > FARTHEST * _size(model) else ""
         how = f"{kinds}, reach {length_text(first.reach)}{shorter}{cone}"
-        found.append((f"{_count(len(model.range), 'range sensor')}{where}: {how}", Ink.TEXT, Ink.PUBLISHED))
+        rows.append((f"{_count(len(model.range), 'range sensor')}{where}: {how}", Ink.TEXT, Ink.PUBLISHED))
     for kind, sensors in _point_sensors(model):
         if sensors:
-            found.append((_count(len(sensors), f"{kind} sensor"), Ink.TEXT, SENSORS[kind].ink))
+            rows.append((_count(len(sensors), f"{kind} sensor"), Ink.TEXT, SENSORS[kind].ink))
     drive = model.drive
     if drive.mixing == "wheels":
         levels = f" in {drive.levels} levels" if drive.levels else ""
@@ -109,14 +108,14 @@ def _legend(model: RobotModel) -> list[tuple[str, str, str]]:
     else:
         how = f"move up to {drive.speed:g} m/s, turn up to {drive.turn_rate:g} rad/s"
     drawn = f"; {_count(len(model.vary), 'number')} drawn" if model.vary else ""
-    found.append(
+    rows.append(
         (
             f"{how}; a command lasts {model.step_s:g} s; contact: {model.contact.model}{drawn}",
             Ink.TEXT,
             Ink.OURS,
         )
     )
-    return found
+    return rows
 
 
 def _in_words(model: RobotModel) -> str:
@@ -203,7 +202,7 @@ def _marks(model: RobotModel) -> list[Shape]:
     return shapes
 
 
-def _point_sensors(model: RobotModel) -> list[tuple[str, Sequence[Any]]]:
+def _point_sensors(model: RobotModel) -> list[tuple[str, Sequence[LightSensor | LineSensor | BumpSensor]]]:
     """Return sensors other than range sensors, by kind."""
     return [(kind, getattr(model, kind)) for kind in SENSORS if kind != "range"]
 

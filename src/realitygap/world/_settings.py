@@ -22,7 +22,8 @@ from realitygap.settings import Settings
 
 from ._arena import MOST_ROBOTS, NAMED_STARTS, Arena, Pose, paper_arena
 from ._library import arena_names, load_arena
-from ._placing import enclosing_walls, is_inside, roomiest_starts
+from ._placing import roomiest_starts
+from ._walls import enclosing_walls, is_inside
 
 StartName = Literal["corner", "center", "left"]
 

@@ -190,9 +190,9 @@ def _to_meters(root: ElementTree.Element) -> Affine:
 
 def _length(text: str) -> float | None:
     """Return a length with a unit [m]."""
-    found = re.fullmatch(r"\s*([-+.\deE]+?)\s*(mm|cm|in|pt|pc)\s*", text)
-    numbers = _numbers(found[1]) if found else []
-    return numbers[0] * UNITS[found[2]] if found and len(numbers) == 1 and numbers[0] > 0 else None
+    match = re.fullmatch(r"\s*([-+.\deE]+?)\s*(mm|cm|in|pt|pc)\s*", text)
+    numbers = _numbers(match[1]) if match else []
+    return numbers[0] * UNITS[match[2]] if match and len(numbers) == 1 and numbers[0] > 0 else None
 
 
 def _numbers(text: str) -> list[float]:
@@ -295,10 +295,10 @@ def _number_of(element: ElementTree.Element, key: str, default: float | None = 0
     text = element.get(key)
     if text is None and default is not None:
         return default
-    found = re.fullmatch(rf"\s*({_NUMBER.pattern})\s*(?:px)?\s*", text or "")
-    if found is None or not math.isfinite(float(found[1])):
+    match = re.fullmatch(rf"\s*({_NUMBER.pattern})\s*(?:px)?\s*", text or "")
+    if match is None or not math.isfinite(float(match[1])):
         raise ValueError(f"{key} is {shown(text)}, expected a number")
-    return float(found[1])
+    return float(match[1])
 
 
 def _line(element: ElementTree.Element) -> tuple[list[Point], bool, float]:

@@ -1,14 +1,51 @@
-"""The cells of a grid that a line visits."""
+"""The grid of reachable cells, and those that a line visits."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ._arena import Grid
+from realitygap.errors import check_finite
+
+
+@dataclass(frozen=True)
+class Grid:
+    """The reachable cells, whose visited share is coverage.
+
+    Cell (column, row) is numbered `columns * row + column`, (0, 0) at the lower left. A cell holds its left
+    and lower border, not its right and upper one.
+
+    Attributes:
+        x, y: Lower left corner [m].
+        cell: Size of a cell [m].
+        columns, rows: Number of columns and rows; at most 256 cells.
+    """
+
+    x: float
+    y: float
+    cell: float
+    columns: int
+    rows: int
+
+    def __post_init__(self) -> None:
+        """Raise a ValueError if a number is infinite or NaN."""
+        check_finite(vars(self))
+
+    @property
+    def n_cells(self) -> int:
+        """Number of cells."""
+        return self.columns * self.rows
+
+    def cell_at(self, x: float, y: float) -> int | None:
+        """Return the number of the cell that a point [m] lies in, columns * row + column; None outside of the grid."""
+        column, row = int((x - self.x) // self.cell), int((y - self.y) // self.cell)
+        if 0 <= column < self.columns and 0 <= row < self.rows:
+            return self.columns * row + column
+        return None
 
 
 class VisitedCells:

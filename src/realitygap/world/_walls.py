@@ -1,13 +1,51 @@
-"""The rectangle of walls around an arena, for simulators whose world is such a room."""
+"""The walls that enclose an arena, and the rectangle around all of them."""
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 
 from ._arena import Arena
+from ._obstacle import Segment
+
+Point = tuple[float, float]
 
 Room = tuple[float, float, float, float]
 """Left, low, right, high [m]."""
+
+SAME_DIGITS = (
+    7  # digits to which ends of walls must be equal to be one corner, because coordinates are rounded [m]
+)
+
+
+def is_inside(arena: Arena, x: float, y: float) -> bool:
+    """Return whether a point is inside the walls that enclose the arena; False if no walls enclose it."""
+    return is_within(enclosing_walls(arena.walls), x, y)
+
+
+def enclosing_walls(walls: Sequence[Segment]) -> list[Segment]:
+    """Return the walls that make closed rounds: those with a loose end are taken away, again and again."""
+    left = list(walls)
+    while True:
+        counts = Counter(end for wall in left for end in _ends(wall))
+        tied = [wall for wall in left if all(counts[end] > 1 for end in _ends(wall))]
+        if len(tied) == len(left):
+            return tied
+        left = tied
+
+
+def _ends(wall: Segment) -> tuple[Point, Point]:
+    x1, y1, x2, y2 = (round(value, SAME_DIGITS) for value in wall)
+    return (x1, y1), (x2, y2)
+
+
+def is_within(walls: Sequence[Segment], x: float, y: float) -> bool:
+    """Return whether an odd number of walls is to the right of a point."""
+    crossings = 0
+    for x1, y1, x2, y2 in walls:
+        if (y1 > y) != (y2 > y) and x < x1 + (y - y1) / (y2 - y1) * (x2 - x1):
+            crossings += 1
+    return crossings % 2 == 1
 
 
 def bounds_of(arena: Arena) -> Room | None:

@@ -4,7 +4,7 @@
 on `sim`, eight pens each; every sheet with other paper, ink, light and camera), scores them, and says the
 intersection over union of the visited cells, how often coverage is within one cell, and of the cells said to be so
 sure how many are right. `python benchmarks/vision.py fit --sheets 48` does the same with other seeds, and finds from
-them how much each sign of a crossed cell counts; `src/realitygap/vision/_confidence.py` has what it prints.
+them how much each sign of a crossed cell counts; `src/realitygap/vision/_cells.py` has what it prints.
 """
 
 from __future__ import annotations

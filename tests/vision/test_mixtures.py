@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from realitygap.vision._mixtures import Mixtures
+from realitygap.vision._ink import Mixtures
 
 RED, BLUE = np.array([0.3, 2.0, 1.8]), np.array([2.2, 1.4, 0.4])
 PURPLE = 0.5 * (RED + BLUE)  # looks like the other two on each other, drawn faintly

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from realitygap.vision import SheetError, find_sheet, read_photo, score_sheet
+from realitygap.errors import VisionError
+from realitygap.vision import find_sheet, read_photo, score_sheet
 
 from .sheets import LAYOUT, SCAN, photo
 
@@ -61,7 +62,7 @@ def _bomb(width: int, height: int) -> bytes:
     ],
 )
 def test_files_that_are_no_photos_are_refused_with_a_remedy(data, said):
-    with pytest.raises(SheetError, match=said) as refused:
+    with pytest.raises(VisionError, match=said) as refused:
         read_photo(data)
     assert "\n" not in str(refused.value)
     assert len(str(refused.value)) < 300
@@ -71,7 +72,7 @@ def test_a_bomb_takes_no_memory():
     import tracemalloc
 
     tracemalloc.start()
-    with pytest.raises(SheetError):
+    with pytest.raises(VisionError):
         read_photo(_bomb(19_000, 9_000))
     _, most = tracemalloc.get_traced_memory()
     tracemalloc.stop()
@@ -82,22 +83,22 @@ def test_a_file_of_too_many_bytes_is_not_read(tmp_path):
     path = tmp_path / "large.jpg"
     with path.open("wb") as file:
         file.truncate(65 << 20)
-    with pytest.raises(SheetError, match="larger than 64 MiB"):
+    with pytest.raises(VisionError, match="larger than 64 MiB"):
         read_photo(path)
-    with pytest.raises(SheetError, match="larger than 64 MiB"):
+    with pytest.raises(VisionError, match="larger than 64 MiB"):
         read_photo(bytes(65 << 20))
 
 
 @pytest.mark.slow
 def test_a_photo_cut_off_is_refused():
-    with pytest.raises(SheetError, match="Is the file whole"):
+    with pytest.raises(VisionError, match="Is the file whole"):
         read_photo(photo(1, SCAN).jpeg[:50_000])
 
 
 def test_a_missing_file_is_refused(tmp_path):
-    with pytest.raises(SheetError, match="cannot be read: No such file"):
+    with pytest.raises(VisionError, match="cannot be read: No such file"):
         read_photo(tmp_path / "none.jpg")
-    with pytest.raises(SheetError, match="cannot be read: Is a directory"):
+    with pytest.raises(VisionError, match="cannot be read: Is a directory"):
         read_photo(tmp_path)
 
 
@@ -113,7 +114,7 @@ def test_torn_and_garbled_files_give_a_picture_or_one_message(kind):
             data = data[: int(rng.integers(len(data)))]
         try:
             found = read_photo(bytes(data))
-        except SheetError as refused:
+        except VisionError as refused:
             assert "\n" not in str(refused)  # noqa: PT017
         else:
             assert found.ndim == 3
@@ -170,7 +171,7 @@ def test_a_very_large_photo_is_halved():
 @pytest.mark.slow
 def test_a_gray_photo_is_read_with_one_pen_and_refused_with_several():
     gray = _file(Image.open(io.BytesIO(photo(1, SCAN, n=1).jpeg)).convert("L"), "JPEG", quality=92)
-    with pytest.raises(SheetError, match="The picture is gray, and its 8 pens are identified by color"):
+    with pytest.raises(VisionError, match="The picture is gray, and its 8 pens are identified by color"):
         score_sheet(read_photo(gray), LAYOUT)
     assert len(score_sheet(read_photo(gray), LAYOUT, [0]).traces[0].cells) > 5
 

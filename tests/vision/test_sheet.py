@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
+from realitygap.errors import VisionError
 from realitygap.vision import (
-    SheetError,
     SheetLayout,
     View,
     find_sheet,
@@ -20,7 +20,7 @@ from realitygap.vision import (
     sheet_pdf,
     sheet_tiles,
 )
-from realitygap.vision._raster import to_meters
+from realitygap.vision._pixels import to_meters
 from realitygap.world import Arena, Grid, Pose, load_arena
 
 from .sheets import LAYOUT, ORDINARY, SCAN, curve, photo
@@ -99,7 +99,7 @@ def test_one_page_is_as_large_as_the_sheet():
 
 
 def test_unknown_paper_is_refused_with_a_hint():
-    with pytest.raises(SheetError, match="Did you mean 'a4'"):
+    with pytest.raises(VisionError, match="Did you mean 'a4'"):
         sheet_tiles(LAYOUT, "a44")
 
 
@@ -165,11 +165,11 @@ def test_a_photo_without_a_tag_says_which_is_missing():
     sheet = find_sheet(image, LAYOUT)
     column, row = sheet.to_photograph(LAYOUT.tag_corners()[2].mean(axis=0)).astype(int)
     image[row - 150 : row + 150, column - 150 : column + 150] = 128
-    with pytest.raises(SheetError, match="3 were found; missing: upper right"):
+    with pytest.raises(VisionError, match="3 were found; missing: upper right"):
         find_sheet(image, LAYOUT)
 
 
 def test_a_sheet_of_another_arena_is_told():
     other = SheetLayout.of(_box_arena(0.6, 0.6, Grid(0.0, 0.0, 0.1, 6, 6)))
-    with pytest.raises(SheetError, match="not where this sheet has them"):
+    with pytest.raises(VisionError, match="not where this sheet has them"):
         find_sheet(read_photo(photo(1, SCAN).jpeg), other)

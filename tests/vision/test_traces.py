@@ -7,8 +7,8 @@ from functools import cache
 import numpy as np
 import pytest
 
+from realitygap.errors import VisionError
 from realitygap.vision import (
-    SheetError,
     SheetLayout,
     SheetScore,
     overlay_png,
@@ -69,7 +69,7 @@ def test_colors_of_untried_pens_come_from_names_and_that_is_reported():
 def test_a_pen_whose_name_is_no_color_must_be_tried():
     layout = SheetLayout.of(ARENA, ("mine", "red", "blue"))
     image = read_photo(photo(4, SCAN, n=3, has_key=False).jpeg)
-    with pytest.raises(SheetError, match="Pen 'mine': its box on the sheet is empty"):
+    with pytest.raises(VisionError, match="Pen 'mine': its box on the sheet is empty"):
         score_sheet(image, layout)
 
 

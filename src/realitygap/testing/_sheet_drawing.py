@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -70,7 +70,7 @@ def smooth_noise(n: int, scale: float, rng: np.random.Generator) -> NDArray[np.f
 def ink_layer(
     path: NDArray[np.float64],
     shape: tuple[int, int],
-    to_pixels: object,
+    to_pixels: Callable[[NDArray[np.float64]], NDArray[np.float64]],
     px_per_m: float,
     rng: np.random.Generator,
     difficulty: float,
@@ -88,7 +88,7 @@ def ink_layer(
         amount[first : first + int(rng.integers(3, 12))] *= rng.uniform(0.0, 0.4)
     thick = np.maximum(np.round(width * px_per_m), 1).astype(int).tolist()
     shades = np.clip(200 * amount, 1, 255).astype(int).tolist()
-    pixels = to_pixels(points)  # type: ignore[operator]
+    pixels = to_pixels(points)
     layer = np.zeros(shape, np.float32)
     one = np.zeros(shape, np.uint8)
     for first in range(0, n - 1, 100):

@@ -2,10 +2,8 @@
 
 Pen traces on a photograph of a sheet: a `SheetLayout` is the printed sheet of an arena, with its grid, four tags, the
 start, and a box to try each pen in. `score_sheet` finds the sheet and returns the cells that each pen's trace crosses,
-with their confidence. Its steps are `find_sheet`, `rectify`, `ink_density`, `separate_pens`, `follow_trace` and
-`visited_cells`.
-
-A map of ROS is a picture, too: `arena_of_map` traces its free space, and `save_map` draws an arena.
+with their confidence. Its steps are `find_sheet`, `rectify`, `ink_density`, `separate_pens`, `follow_traces`
+and `visited_cells`.
 
 A map of ROS is a picture, too: `arena_of_map` traces its free space, and `save_map` draws an arena.
 
@@ -13,38 +11,33 @@ A robot under a camera: `track_video` follows the tag on a robot in an arena wit
 """
 
 from ._cells import visited_cells
-from ._errors import SheetError
 from ._find import Sheet, find_sheet, rectify
 from ._ink import ink_density
 from ._layout import PEN_NAMES, SheetLayout
-from ._lens import View
 from ._overlay import overlay_png
 from ._pens import PenMaps, separate_pens
 from ._photo import photo_bytes, photo_hash, read_photo
-from ._print import PAPERS, sheet_pdf, sheet_tiles
-from ._raster import raster, to_pixels
-from ._ros_map import OccupancyMap, arena_of_map, read_map, save_map
+from ._pixels import View, raster, to_pixels
+from ._print import sheet_pdf, sheet_tiles
+from ._ros_map import arena_of_map, read_map, save_map
 from ._score import SheetScore, TraceScore, score_sheet
 from ._sheet_trials import SheetTrials, trials_on_sheet
-from ._tag_family import CORNER_FAMILY, FAMILIES, tag_bits
-from ._tag_layout import CORNER_SIZE_M, RobotTag, corner_tags
 from ._tag_print import print_tags
+from ._tags import CORNER_FAMILY, CORNER_SIZE_M, FAMILIES, RobotTag, corner_tags, tag_bits
 from ._trace import Trace, follow_traces
 from .track._align import Beginning, find_beginning
 from .track._camera import Camera, fit_camera
 from .track._lens import Lens, fit_lens, read_lens
-from .track._live import LiveTrack
 from .track._overlay import draw_overlay, save_overlay
 from .track._source import CameraDevice, Source, VideoFile, open_source
 from .track._track import Track, track_of
 from .track._tracker import Sightings, Tracker, gray_of
-from .track._video import Marks, Tracked, track_video
+from .track._video import LiveTrack, Marks, Tracked, track_video
 
 __all__ = [
     "CORNER_FAMILY",
     "CORNER_SIZE_M",
     "FAMILIES",
-    "PAPERS",
     "PEN_NAMES",
     "Beginning",
     "Camera",
@@ -52,11 +45,9 @@ __all__ = [
     "Lens",
     "LiveTrack",
     "Marks",
-    "OccupancyMap",
     "PenMaps",
     "RobotTag",
     "Sheet",
-    "SheetError",
     "SheetLayout",
     "SheetScore",
     "SheetTrials",

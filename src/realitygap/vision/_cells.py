@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
 from realitygap.world import Grid
 
-from ._confidence import COEFFICIENTS
 from ._links import STEP
 from ._trace import Trace
 
@@ -23,6 +20,11 @@ FEATURES = (
     "near", "left_out", "faint", "hidden",
 )  # fmt: skip
 """Features of a cell that show whether a trace crosses it; each about 0 to 3."""
+
+COEFFICIENTS = np.array(
+    [-6.53, 7.109, -2.747, 2.196, 1.138, 3.034, 0.749, 0.085, 1.587, 1.875, 1.449, 1.816, -0.209]
+)
+"""Weights of the features, as `benchmarks/vision.py fit --sheets 48` finds them; it judges by other sheets."""
 
 
 def visited_cells(trace: Trace, grid: Grid) -> Floats:
@@ -52,13 +54,13 @@ def cell_features(trace: Trace, grid: Grid) -> Floats:
     away = ndimage.distance_transform_edt(~trodden) * STEP if trodden.any() else np.full(trodden.shape, 1.0)
     n = grid.n_cells
 
-    def count(mask: NDArray[np.generic]) -> Any:
+    def count(mask: NDArray[np.generic]) -> Floats:
         return np.bincount(cells[cells >= 0], weights=np.asarray(mask, np.float64)[cells >= 0], minlength=n)
 
     def most(values: NDArray[np.generic], floor: float = 0.0) -> Floats:
-        found = np.full(n, floor)
-        np.maximum.at(found, cells[cells >= 0], np.asarray(values, np.float64)[cells >= 0])
-        return found
+        largest = np.full(n, floor)
+        np.maximum.at(largest, cells[cells >= 0], np.asarray(values, np.float64)[cells >= 0])
+        return largest
 
     own, links = count(trace.own), count(trace.links)
     has_own = own > 0

@@ -7,15 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from realitygap.errors import from_extra
+from realitygap.errors import VisionError, from_extra
 
-from ._errors import SheetError
 from ._grid import GridOffsets, grid_offsets
 from ._layout import SheetLayout
-from ._lens import View
-from ._raster import shape_of, to_meters
-from ._tag_family import CORNER_FAMILY, dictionary
-from ._tag_layout import CORNER_IDS
+from ._pixels import View, shape_of, to_meters
+from ._tags import CORNER_FAMILY, CORNER_IDS, dictionary
 
 Floats = NDArray[np.float64]
 
@@ -60,7 +57,7 @@ def find_sheet(image: NDArray[np.uint8], layout: SheetLayout) -> Sheet:
         layout: Printed layout.
 
     Raises:
-        SheetError: Not all four tags are seen, or they do not lie as on this sheet.
+        VisionError: Not all four tags are seen, or they do not lie as on this sheet.
     """
     height, width = image.shape[:2]
     gray = _gray(image)
@@ -71,7 +68,7 @@ def find_sheet(image: NDArray[np.uint8], layout: SheetLayout) -> Sheet:
     view = _fitted(view, here, there, None)
     tag_error = _rms(_in_meters(view, here, view(here) - there))
     if tag_error > TAG_LIMIT:
-        raise SheetError(
+        raise VisionError(
             f"The four tags were found, but not where this sheet has them: they are off by {1000 * tag_error:.0f} mm. "
             "Was it printed for this arena and at true scale (100 %, not fitted to the page)?"
         )
@@ -144,7 +141,7 @@ def _tag_corners(gray: NDArray[np.uint8]) -> dict[int, Floats]:
     """Return the corners of the four tags, upper left, upper right, lower right, lower left, (4, 2) [px] each.
 
     Raises:
-        SheetError: One of them is not found.
+        VisionError: One of them is not found.
     """
     cv2 = from_extra("cv2", "vision")
     settings = cv2.aruco.DetectorParameters()
@@ -162,7 +159,7 @@ def _tag_corners(gray: NDArray[np.uint8]) -> dict[int, Floats]:
             return found
     names = ("lower left", "lower right", "upper right", "upper left")
     missing = ", ".join(names[number] for number in CORNER_IDS if number not in found)
-    raise SheetError(
+    raise VisionError(
         f"Of the sheet's four tags {len(found)} were found; missing: {missing}. Take the photo again with all four "
         "corners in it, sharp and without glare; `realitygap print-sheet` prints such a sheet."
     )
@@ -172,7 +169,7 @@ def _first_view(here: Floats, there: Floats, width: int, height: int) -> View:
     cv2 = from_extra("cv2", "vision")
     homography, _ = cv2.findHomography(here, there)
     if homography is None:
-        raise SheetError("The sheet's tags lie on one line of the photograph. Take it from further above.")
+        raise VisionError("The sheet's tags lie on one line of the photograph. Take it from further above.")
     return View(np.asarray(homography, np.float64), 0.0, 0.0, width, height)
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from realitygap.errors import from_extra
 
 from ._layout import SheetLayout
-from ._lens import View
+from ._pixels import View
 
 Floats = NDArray[np.float64]
 

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from realitygap.world import Arena, Grid, Pose
 
-from ._tag_family import CORNER_FAMILY, tag_bits
-from ._tag_layout import CORNER_IDS, CORNER_INSET_M, CORNER_SIZE_M, Box, bounds, ring_width
+from ._tags import CORNER_FAMILY, CORNER_IDS, CORNER_INSET_M, CORNER_SIZE_M, Box, bounds, ring_width, tag_bits
 
 PEN_NAMES = ("black", "red", "blue", "green", "orange", "purple", "brown", "pink")
 """Default names of the pens of a study."""
@@ -26,6 +25,8 @@ KEY_HEIGHT = 0.026
 KEY_GAP = 0.012
 KEYS_A_STRIP = 8
 MARGIN = 0.012  # of paper around everything [m]
+
+GridLine = tuple[Literal["x", "y"], float, float, float]
 
 
 @dataclass(frozen=True)
@@ -129,13 +130,15 @@ class SheetLayout:
             boxes.append((x, y - KEY_HEIGHT / 2, x + width, y + KEY_HEIGHT / 2))
         return boxes
 
-    def grid_lines(self) -> list[tuple[Literal["x", "y"], float, float, float]]:
+    def grid_lines(self) -> list[GridLine]:
         """Return lines of the grid: which coordinate stays, its value, and between which values the other goes [m]."""
         grid = self.grid
         right, upper = grid.x + grid.columns * grid.cell, grid.y + grid.rows * grid.cell
-        upright = [("x", grid.x + k * grid.cell, grid.y, upper) for k in range(grid.columns + 1)]
-        level = [("y", grid.y + k * grid.cell, grid.x, right) for k in range(grid.rows + 1)]
-        return [*upright, *level]  # type: ignore[list-item]  # the first is a literal
+        upright: list[GridLine] = [
+            ("x", grid.x + k * grid.cell, grid.y, upper) for k in range(grid.columns + 1)
+        ]
+        level: list[GridLine] = [("y", grid.y + k * grid.cell, grid.x, right) for k in range(grid.rows + 1)]
+        return [*upright, *level]
 
     def thin_marks(self) -> list[Mark]:
         """Return the marks printed in gray where pens may draw: the grid, and an arrow at the start."""
@@ -152,7 +155,8 @@ class SheetLayout:
         for box in self.key_boxes():
             marks += _outline(box, GRID_GRAY, GRID_WIDTH)
         for number, corners in zip(CORNER_IDS, self.tag_corners(), strict=True):
-            marks += _tag_marks(number, *corners[3].tolist())
+            left, lower = corners[3].tolist()
+            marks += tag_marks(CORNER_FAMILY, number, left, lower, CORNER_SIZE_M)
         return marks
 
     def labels(self) -> list[Label]:
@@ -181,14 +185,14 @@ def _outline(box: Box, gray: float, width: float) -> list[Mark]:
     return [Mark(*corners[k], *corners[(k + 1) % 4], gray, width) for k in range(4)]
 
 
-def _tag_marks(number: int, left: float, lower: float) -> list[Mark]:
-    """Return the black parts of a tag, row by row."""
-    is_black = ~tag_bits(CORNER_FAMILY, number)
-    size = CORNER_SIZE_M / len(is_black)
+def tag_marks(family: str, number: int, left: float, lower: float, size: float) -> list[Mark]:
+    """Return the black parts of a tag, row by row from below; those side by side are one, without hairlines between."""
+    is_black = ~tag_bits(family, number)
+    cell = size / len(is_black)
     marks = []
     for row, bits in enumerate(is_black[::-1]):
         edges = np.flatnonzero(np.diff(np.concatenate([[0], bits.astype(int), [0]])))
         for first, end in edges.reshape(-1, 2).tolist():
-            y = lower + row * size
-            marks.append(Mark(left + first * size, y, left + end * size, y + size, 0.0))
+            y = lower + row * cell
+            marks.append(Mark(left + first * cell, y, left + end * cell, y + cell, 0.0))
     return marks

@@ -1,4 +1,4 @@
-"""A scored sheet as a picture: what was found, to be confirmed by eye."""
+"""A scored sheet as a picture, for a check by eye."""
 
 from __future__ import annotations
 

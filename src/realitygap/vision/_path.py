@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._links import STEP
-from ._raster import to_meters
+from ._pixels import to_meters
 from ._trace import Trace
 
 Floats = NDArray[np.float64]
@@ -25,7 +25,7 @@ def trace_path(trace: Trace, start: tuple[float, float]) -> Floats:
         return points
     from scipy.spatial import cKDTree
 
-    around = [np.array(each) for each in cKDTree(points).query_ball_point(points, REACH)]
+    around = [np.array(near) for near in cKDTree(points).query_ball_point(points, REACH)]
     left = np.ones(len(points), np.bool_)
     here = int(np.argmin(np.sum((points - np.array(start)) ** 2, axis=1)))
     order, heading = [here], np.zeros(2)
@@ -36,16 +36,16 @@ def trace_path(trace: Trace, start: tuple[float, float]) -> Floats:
             ways = points[near] - points[here]
             length = np.hypot(*ways.T)
             turned = ways @ heading / np.maximum(length, 1e-9)
-            there = int(near[np.argmax(turned - 0.3 * length / SPACING)])
-            heading = points[there] - points[here]
+            following = int(near[np.argmax(turned - 0.3 * length / SPACING)])
+            heading = points[following] - points[here]
             heading = heading / max(float(np.hypot(*heading)), 1e-9)
-            order.append(there)
+            order.append(following)
         else:
             way = _way_to_what_is_left(here, around, left)
-            there = way[-1]
+            following = way[-1]
             order.extend(way)
             heading = np.zeros(2)
-        here = there
+        here = following
         left[here] = False
     return points[order]
 

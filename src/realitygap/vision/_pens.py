@@ -9,14 +9,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from realitygap.errors import from_extra
+from realitygap.errors import VisionError, from_extra
 
-from ._errors import SheetError
-from ._ink import to_linear
+from ._ink import Mixtures, to_linear
 from ._layout import SheetLayout
-from ._mixtures import Mixtures
-from ._raster import shape_of, to_pixels
-from ._tag_layout import Box
+from ._pixels import shape_of, to_pixels
+from ._tags import Box
 
 Floats = NDArray[np.float32]
 Place = tuple[NDArray[np.int64], ...]
@@ -119,7 +117,7 @@ def separate_pens(
         drawn: Pens of the layout that drew. Default: all.
 
     Raises:
-        SheetError: A pen was not tried in its box, and its name is no color.
+        VisionError: A pen was not tried in its box, and its name is no color.
     """
     numbers = range(len(layout.pens)) if drawn is None else drawn
     pens = [layout.pens[k] for k in numbers]
@@ -187,7 +185,7 @@ def _named(pen: str) -> Floats:
     """Return the density of a full stroke of a pen by its name.
 
     Raises:
-        SheetError: It is no color.
+        VisionError: It is no color.
     """
     from matplotlib.colors import is_color_like, to_rgb
 
@@ -196,7 +194,7 @@ def _named(pen: str) -> Floats:
     elif is_color_like(pen.lower()):
         color = np.round(255 * np.array(to_rgb(pen.lower()))).astype(np.uint8)
     else:
-        raise SheetError(
+        raise VisionError(
             f"Pen {pen!r}: its box on the sheet is empty, and its name is no color. Draw a line in the box with it, or "
             "name its color, such as red or #c01030."
         )

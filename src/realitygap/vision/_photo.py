@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from realitygap._image_file import UnknownImageError, eight_bits, on_white, open_image, plain
 from realitygap._limits import LimitError, read_file
-
-from ._errors import SheetError
+from realitygap.errors import VisionError
 
 if TYPE_CHECKING:
     from PIL import Image
@@ -34,34 +33,34 @@ def read_photo(photo: str | Path | bytes) -> NDArray[np.uint8]:
         photo: File, or its bytes: JPEG, PNG, TIFF or WebP.
 
     Raises:
-        SheetError: It cannot be read, or is no such picture, or is too large or too small.
+        VisionError: It cannot be read, or is no such picture, or is too large or too small.
     """
     name = "The file" if isinstance(photo, bytes) else str(photo)
     data = photo_bytes(photo)
     if not data:
-        raise SheetError(f"{name} is empty, expected a photograph of a sheet. Was it copied to the end?")
+        raise VisionError(f"{name} is empty, expected a photograph of a sheet. Was it copied to the end?")
     try:
         with open_image(io.BytesIO(data), MOST_DECLARED, KINDS) as picture:
             _check_size(name, *picture.size)
             return _upright(picture)
-    except SheetError:
+    except VisionError:
         raise
     except UnknownImageError as error:
-        raise SheetError(
+        raise VisionError(
             f"{name} is no picture that can be read: expected JPEG, PNG, TIFF or WebP.{_hint(data)}"
         ) from error
     except LimitError as error:
-        raise SheetError(
+        raise VisionError(
             f"{name} has too many pixels, expected at most {MOST_PIXELS // 1_000_000} million."
         ) from error
     except (OSError, ValueError) as error:
-        raise SheetError(f"{name} cannot be read as a picture: {error}. Is the file whole?") from error
+        raise VisionError(f"{name} cannot be read as a picture: {error}. Is the file whole?") from error
 
 
 def _check_size(name: str, width: int, height: int) -> None:
     is_fit = min(width, height) >= LEAST_SIDE and max(width, height) <= MOST_SIDE
     if not is_fit or width * height > MOST_PIXELS:
-        raise SheetError(
+        raise VisionError(
             f"{name} has {width} x {height} pixels, expected {LEAST_SIDE} to {MOST_SIDE} each way and at most "
             f"{MOST_PIXELS // 1_000_000} million in all."
         )
@@ -115,7 +114,7 @@ def photo_bytes(photo: str | Path | bytes) -> bytes:
     """Return the bytes of a photograph's file.
 
     Raises:
-        SheetError: It cannot be read, or is too large.
+        VisionError: It cannot be read, or is too large.
     """
     if isinstance(photo, bytes):
         data, name = photo, "The picture"
@@ -125,14 +124,14 @@ def photo_bytes(photo: str | Path | bytes) -> bytes:
             data = read_file(Path(photo), MOST_BYTES)
         except OSError as error:
             if error.errno == errno.EFBIG:
-                raise SheetError(
+                raise VisionError(
                     f"{name} is larger than {MOST_BYTES >> 20} MiB, expected a photograph of a sheet."
                 ) from None
-            raise SheetError(
+            raise VisionError(
                 f"{name} cannot be read: {error.strerror or error}. Name a photograph."
             ) from error
     if len(data) > MOST_BYTES:
-        raise SheetError(f"{name} is larger than {MOST_BYTES >> 20} MiB, expected a photograph of a sheet.")
+        raise VisionError(f"{name} is larger than {MOST_BYTES >> 20} MiB, expected a photograph of a sheet.")
     return data
 
 

@@ -8,12 +8,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from realitygap.errors import did_you_mean
+from realitygap.errors import VisionError, did_you_mean
 from realitygap.world import INCH
 
-from ._errors import SheetError
 from ._layout import Label, Mark, SheetLayout
-from ._tag_layout import Box
+from ._tags import Box
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -44,13 +43,13 @@ def sheet_tiles(layout: SheetLayout, paper: str) -> list[Tile]:
     """Return the pages that make up a sheet, the upper left one first.
 
     Raises:
-        SheetError: There is no such paper.
+        VisionError: There is no such paper.
     """
     left, lower, right, upper = layout.paper
     if paper == ONE_PAGE:
         return [Tile(layout.paper, 0, 0)]
     if paper not in PAPERS:
-        raise SheetError(f"Unknown paper {paper!r}. {did_you_mean(paper, [*PAPERS, ONE_PAGE])}")
+        raise VisionError(f"Unknown paper {paper!r}. {did_you_mean(paper, [*PAPERS, ONE_PAGE])}")
     ways = [
         (math.ceil((right - left) / _usable(width)), math.ceil((upper - lower) / _usable(height)))
         for width, height in (PAPERS[paper], PAPERS[paper][::-1])
@@ -80,7 +79,7 @@ def sheet_pdf(layout: SheetLayout, paper: str = "a4") -> bytes:
         paper: `a4`, `letter`, `a3`, or `arena` for one page as large as the sheet.
 
     Raises:
-        SheetError: There is no such paper.
+        VisionError: There is no such paper.
         MissingExtraError: OpenCV, which knows the tags, is not installed.
     """
     from matplotlib.backends.backend_pdf import PdfPages
@@ -168,7 +167,7 @@ def _crop_marks(box: Box) -> Iterator[Mark]:
 
 
 def _say_which(axes: Axes, tile: Tile, tiles: list[Tile], x: float, y: float) -> None:
-    n_rows, n_columns = 1 + max(each.row for each in tiles), 1 + max(each.column for each in tiles)
+    n_rows, n_columns = 1 + max(other.row for other in tiles), 1 + max(other.column for other in tiles)
     text = (
         f"row {n_rows - tile.row} of {n_rows} from the top, column {tile.column + 1} of {n_columns}; print at 100 %, "
         "cut at the marks, join edge to edge"

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from realitygap.errors import VisionError
+
 from ._cells import cell_features, probabilities
-from ._errors import SheetError
 from ._find import Sheet, find_sheet, rectify
 from ._ink import ink_density
 from ._layout import SheetLayout
@@ -87,12 +88,12 @@ def score_sheet(
         drawn: Pens of the layout that drew. Default: all.
 
     Raises:
-        SheetError: The sheet is not found, the picture is gray and of several pens, or a pen's color is not known.
+        VisionError: The sheet is not found, the picture is gray and of several pens, or a pen's color is not known.
     """
     numbers = list(range(len(layout.pens))) if drawn is None else list(drawn)
     sheet = find_sheet(image, layout)
     if len(numbers) > 1 and is_gray(image):
-        raise SheetError(
+        raise VisionError(
             f"The picture is gray, and its {len(numbers)} pens are identified by color. Take a photo in color."
         )
     picture = rectify(image, sheet, PX_PER_M)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
+from ._layout import tag_marks
 from ._print import PAPERS, blank_page
-from ._tag_family import CORNER_FAMILY, tag_bits
-from ._tag_layout import CORNER_IDS, CORNER_SIZE_M, RobotTag
+from ._tags import CORNER_FAMILY, CORNER_IDS, CORNER_SIZE_M, RobotTag
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 Paper = Literal["a4", "letter", "a3"]
@@ -62,14 +63,14 @@ def _with_border(size: float) -> float:
     return size * 4 / 3
 
 
-def _page(width: float, height: float) -> tuple[Figure, Any]:
+def _page(width: float, height: float) -> tuple[Figure, Axes]:
     """Return a sheet whose units are meters, from its lower left."""
     page, axes = blank_page(width, height)
     _ruler(axes, width)
     return page, axes
 
 
-def _ruler(axes: Any, width: float) -> None:
+def _ruler(axes: Axes, width: float) -> None:
     x, y = width / 2 - 0.05, EDGE_M + 0.008
     axes.plot([x, x + 0.1], [y, y], color="black", lw=0.6)
     for k in range(11):
@@ -79,25 +80,20 @@ def _ruler(axes: Any, width: float) -> None:
     axes.text(width / 2, y - 0.004, words, ha="center", va="top", fontsize=8, color=GRAY)
 
 
-def _tag(axes: Any, family: str, number: int, x: float, y: float, size: float) -> None:
+def _tag(axes: Axes, family: str, number: int, x: float, y: float, size: float) -> None:
     """Draw a tag about x, y [m], upright, with a line to cut along."""
     from matplotlib.patches import Rectangle
 
-    bits = tag_bits(family, number)
-    cell, left, upper = size / len(bits), x - size / 2, y + size / 2
-    for row, line in enumerate(bits):
-        column = 0
-        while column < len(line):  # what is black side by side is one rectangle: no hairlines between
-            end = column
-            while end < len(line) and not line[end]:
-                end += 1
-            if end > column:
-                corner = (left + column * cell, upper - (row + 1) * cell)
-                black = Rectangle(
-                    corner, (end - column) * cell, cell, facecolor="black", lw=0.2, edgecolor="black"
-                )
-                axes.add_patch(black)
-            column = max(end, column + 1)
+    for mark in tag_marks(family, number, x - size / 2, y - size / 2, size):
+        black = Rectangle(
+            (mark.x1, mark.y1),
+            mark.x2 - mark.x1,
+            mark.y2 - mark.y1,
+            facecolor="black",
+            lw=0.2,
+            edgecolor="black",
+        )
+        axes.add_patch(black)
     side = _with_border(size)
     axes.add_patch(
         Rectangle(

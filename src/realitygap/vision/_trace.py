@@ -12,8 +12,8 @@ from realitygap.errors import from_extra
 
 from ._links import STEP, joined
 from ._pens import PenMaps
-from ._raster import to_pixels
-from ._tag_layout import Box
+from ._pixels import to_pixels
+from ._tags import Box
 
 Floats = NDArray[np.float32]
 

@@ -56,14 +56,14 @@ def find_beginning(track: Track, times: Floats, commands: Floats, stalled: NDArr
         )
     step = max(COARSE_S, room * len(times) / MOST_TRIED)
     tried = track.times[0] + np.arange(0.0, room + 1e-9, step)
-    found = _agreement(track, tried, times, commands, ~stalled)
-    best = tried[int(np.argmax(found))]
+    agreement = _agreement(track, tried, times, commands, ~stalled)
+    best = tried[int(np.argmax(agreement))]
     away = np.abs(tried - best) >= np.diff(times).mean() / 2
     near = best + np.arange(-step, step + FINE_S, FINE_S)
     near = near[(near >= track.times[0]) & (near + times[-1] <= track.times[-1])]
     finer = _agreement(track, near, times, commands, ~stalled)
-    most = float(finer.max()) if len(finer) else float(found.max())
-    next_best = float(found[away].max(initial=-1.0))
+    most = float(finer.max()) if len(finer) else float(agreement.max())
+    next_best = float(agreement[away].max(initial=-1.0))
     if not (most >= LEAST_AGREEMENT and most - next_best >= LEAST_LEAD):
         raise VisionError(
             f"Where the trial begins in the video is not clear: its commands and the robot's way agree to {most:.2f} "
@@ -82,10 +82,12 @@ def _agreement(
     moved = np.diff(poses, axis=1)
     heading = poses[:, :-1, 2] + moved[..., 2] / 2
     ahead = moved[..., 0] * np.cos(heading) + moved[..., 1] * np.sin(heading)
-    found = []
-    for done, told in ((ahead, commands[:, 0]), (moved[..., 2], commands[:, 1])):
-        done, told = done[:, which], told[which]
-        size = np.sqrt((done**2).sum(axis=1) * (told**2).sum())
-        if (told**2).sum() > 0:
-            found.append(np.divide(done @ told, size, out=np.zeros(len(done)), where=size > 1e-9))
-    return np.mean(found, axis=0) if found else np.zeros(len(beginnings))
+    correlations = []
+    for motion, command in ((ahead, commands[:, 0]), (moved[..., 2], commands[:, 1])):
+        motion, command = motion[:, which], command[which]
+        size = np.sqrt((motion**2).sum(axis=1) * (command**2).sum())
+        if (command**2).sum() > 0:
+            correlations.append(
+                np.divide(motion @ command, size, out=np.zeros(len(motion)), where=size > 1e-9)
+            )
+    return np.mean(correlations, axis=0) if correlations else np.zeros(len(beginnings))

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realitygap.errors import VisionError, from_extra
-from realitygap.vision._tag_layout import RobotTag
+from realitygap.vision._tags import RobotTag
 
 from ._lens import Lens
 

@@ -1,4 +1,4 @@
-"""A video with what was found drawn into it."""
+"""A video with the walls, the track, and the tags drawn into it."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from realitygap.errors import VisionError, from_extra
-from realitygap.vision._tag_layout import bounds
+from realitygap.vision._tags import bounds
 from realitygap.world import Arena
 
 from ._source import Image
@@ -87,7 +87,7 @@ def _parts(seen: np.ndarray, *, is_seen: bool) -> list[tuple[int, int]]:
     """Return the first and last row of each stretch that is of one kind."""
     rows = np.flatnonzero(seen == is_seen)
     stretches = np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1) if len(rows) else []
-    return [(int(each[0]), int(each[-1])) for each in stretches]
+    return [(int(stretch[0]), int(stretch[-1])) for stretch in stretches]
 
 
 def _line(image: Image, pixels: np.ndarray, color: tuple[int, int, int]) -> None:

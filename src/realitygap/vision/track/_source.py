@@ -105,8 +105,8 @@ class VideoFile:
                 is_read, image = capture.read()
                 if not is_read:
                     return
-                said = capture.get(cv2.CAP_PROP_POS_MSEC) / 1000
-                last = said if said > last else last + 1 / self.rate  # some files do not tell
+                time_s = capture.get(cv2.CAP_PROP_POS_MSEC) / 1000
+                last = time_s if time_s > last else last + 1 / self.rate  # some files have no times
                 yield last, image
         finally:
             capture.release()

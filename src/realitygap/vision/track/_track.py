@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from realitygap._numbers import fixed
 from realitygap.errors import VisionError
-from realitygap.vision._tag_layout import RobotTag
+from realitygap.vision._tags import RobotTag
 from realitygap.world import Grid, cells_along
 
 from ._camera import Camera, square_poses
@@ -45,8 +45,7 @@ class Track:
     @property
     def longest_gap_s(self) -> float:
         """Longest time between two successive sightings of the robot [s]."""
-        there = self.times[self.seen]
-        return float(np.max(np.diff(there), initial=0.0))
+        return float(np.max(np.diff(self.times[self.seen]), initial=0.0))
 
     def at(self, times: Floats) -> Floats:
         """Return poses at other times [s], by linear interpolation, (n, 3).
@@ -76,10 +75,10 @@ class Track:
         times = np.concatenate([[first_s], self.times, [last_s]])
         poses = np.concatenate([self.poses[:1], self.poses, self.poses[-1:]])
         seen = np.concatenate([[False], self.seen, [False]])
-        there = np.concatenate(
+        kept = np.concatenate(
             [[first_s < self.times[0]], np.ones(len(self.times), np.bool_), [last_s > self.times[-1]]]
         )
-        return Track(times[there], poses[there], seen[there], self.size_error)
+        return Track(times[kept], poses[kept], seen[kept], self.size_error)
 
     def cells(self, grid: Grid) -> tuple[int, ...]:
         """Return the cells that its line crosses, in the order of their first visits."""
@@ -94,7 +93,7 @@ class Track:
         return "\n".join(["time_s,x_m,y_m,heading_rad,seen", *rows]) + "\n"
 
 
-def track_of(found: Sightings, camera: Camera, tag: RobotTag) -> Track:
+def track_of(sightings: Sightings, camera: Camera, tag: RobotTag) -> Track:
     """Return the poses of a robot from its tag.
 
     The tag's corners are put down on the plane of its height, so its parallax is taken out; the heading is that of the
@@ -104,14 +103,14 @@ def track_of(found: Sightings, camera: Camera, tag: RobotTag) -> Track:
     Raises:
         VisionError: It was hardly seen.
     """
-    flat = camera.on_plane(found.robot.reshape(-1, 2), tag.height).reshape(-1, 4, 2)
+    flat = camera.on_plane(sightings.robot.reshape(-1, 2), tag.height).reshape(-1, 4, 2)
     seen = np.isfinite(flat).all(axis=(1, 2))
     middles, headings, off = square_poses(np.where(np.isfinite(flat), flat, 0.0), tag)
     sides = np.hypot(*np.moveaxis(flat - np.roll(flat, 1, axis=1), -1, 0)).mean(axis=1)
     size_error = float(np.median(sides[seen]) / tag.size - 1) if seen.any() else float("nan")
     shape_off = np.abs(sides / (tag.size * (1 + size_error)) - 1)
     seen &= (off < MOST_OFF * tag.size + abs(size_error) * tag.size) & (shape_off < 2 * MOST_OFF)
-    seen &= ~_leaps(found.times, middles, seen)
+    seen &= ~_leaps(sightings.times, middles, seen)
     if seen.sum() < LEAST_SEEN:
         raise VisionError(
             f"The robot's tag was seen in {seen.sum()} of {len(seen)} pictures, expected at least {LEAST_SEEN}. Is "
@@ -123,7 +122,7 @@ def track_of(found: Sightings, camera: Camera, tag: RobotTag) -> Track:
     poses = np.column_stack([middles[:, 0] - shift.real, middles[:, 1] - shift.imag, heading])
     first, last = np.flatnonzero(seen)[[0, -1]]
     inside = slice(first, last + 1)
-    return _filled(found.times[inside], poses[inside], seen[inside], size_error)
+    return _filled(sightings.times[inside], poses[inside], seen[inside], size_error)
 
 
 def _leaps(times: Floats, middles: Floats, seen: Bools) -> Bools:
@@ -139,14 +138,14 @@ def _leaps(times: Floats, middles: Floats, seen: Bools) -> Bools:
 
 
 def _filled(times: Floats, poses: Floats, seen: Bools, size_error: float) -> Track:
-    there = np.flatnonzero(seen)
-    known = poses[there].copy()
+    rows = np.flatnonzero(seen)
+    known = poses[rows].copy()
     known[:, 2] = np.unwrap(known[:, 2])
-    filled = np.column_stack([np.interp(times, times[there], column) for column in known.T])
-    for before, after in itertools.pairwise(there):
+    filled = np.column_stack([np.interp(times, times[rows], column) for column in known.T])
+    for before, after in itertools.pairwise(rows):
         if after - before > 1:
             inside = slice(before + 1, after)
-            filled[inside] = _curve(times[there], known, times[before], times[after], times[inside])
+            filled[inside] = _curve(times[rows], known, times[before], times[after], times[inside])
     return Track(times, filled, seen, size_error)
 
 

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realitygap.errors import VisionError, from_extra
-from realitygap.vision._tag_family import CORNER_FAMILY, FAMILIES, dictionary
-from realitygap.vision._tag_layout import CORNER_IDS, RobotTag
+from realitygap.vision._tags import CORNER_FAMILY, CORNER_IDS, FAMILIES, RobotTag, dictionary
 
 from ._source import Image
 
@@ -38,14 +37,14 @@ def make_detector(family: str) -> Any:
 def find_tags(image: Image, detector: Any) -> dict[int, Floats]:
     """Return the corners of each tag in a gray picture, (4, 2) pixels, by number; tags seen twice are left out."""
     corners, numbers, _ = detector.detectMarkers(image)
-    found: dict[int, Floats] = {}
     if numbers is None:
-        return found
+        return {}
     listed = [int(number) for number in np.ravel(numbers)]
-    for number, each in zip(listed, corners, strict=True):
-        if listed.count(number) == 1:
-            found[number] = np.asarray(each, np.float64).reshape(4, 2)
-    return found
+    return {
+        number: np.asarray(square, np.float64).reshape(4, 2)
+        for number, square in zip(listed, corners, strict=True)
+        if listed.count(number) == 1
+    }
 
 
 def gray_of(image: Image) -> Image:
@@ -103,7 +102,7 @@ class Tracker:
     _was_just_seen: bool = False
 
     def __post_init__(self) -> None:
-        """Make ready the detectors."""
+        """Make the detectors ready."""
         self._check(self.tag.family)
         self._corner_detector = make_detector(self.corner_family)
         names = [self.tag.family] if self.tag.family else [
@@ -131,29 +130,29 @@ class Tracker:
         self._size = (gray.shape[1], gray.shape[0])
         number = self._n_taken
         self._n_taken += 1
-        found: Floats | None = None
+        corners: Floats | None = None
         if number < CORNERS_AT_FIRST or number % CORNERS_EVERY == 0:
-            there = find_tags(gray, self._corner_detector)
-            self._keep_corners(there)
+            tags = find_tags(gray, self._corner_detector)
+            self._keep_corners(tags)
             if self.corner_family in self._detectors:
-                found = there.get(self.tag.number)
-        if found is not None:
+                corners = tags.get(self.tag.number)
+        if corners is not None:
             self._seen_of[self.corner_family] += 1
         elif self._last is not None:
-            found = self._look_nearby(gray, self._last, number - self._last_number)
+            corners = self._look_nearby(gray, self._last, number - self._last_number)
         else:
-            found = self._look_everywhere(gray)
-        if found is not None:
-            is_near = self._was_just_seen and self._last is not None
-            self._moved = (found - self._last).mean(axis=0) if is_near else np.zeros(2)  # type: ignore[operator]
-            self._last, self._last_number = found, number
-        self._was_just_seen = found is not None
+            corners = self._look_everywhere(gray)
+        if corners is not None:
+            last = self._last if self._was_just_seen else None
+            self._moved = np.zeros(2) if last is None else (corners - last).mean(axis=0)
+            self._last, self._last_number = corners, number
+        self._was_just_seen = corners is not None
         self._times.append(time)
-        self._robot.append(found)
-        return found
+        self._robot.append(corners)
+        return corners
 
-    def _keep_corners(self, there: Mapping[int, Floats]) -> None:
-        for number, corners in there.items():
+    def _keep_corners(self, tags: Mapping[int, Floats]) -> None:
+        for number, corners in tags.items():
             if number in CORNER_IDS:
                 self._corners.setdefault(number, []).append(corners)
 
@@ -170,12 +169,14 @@ class Tracker:
         if (high - low < 2 * side / 3).any():
             return None
         part = np.ascontiguousarray(gray[low[1] : high[1], low[0] : high[0]])
-        found = find_tags(part, self._detectors[self.family]).get(self.tag.number)
-        return None if found is None else found + low
+        corners = find_tags(part, self._detectors[self.family]).get(self.tag.number)
+        return None if corners is None else corners + low
 
     def _look_everywhere(self, gray: Image) -> Floats | None:
         """Search in all families until one of them has shown the tag often enough."""
-        seen = {name: find_tags(gray, each).get(self.tag.number) for name, each in self._detectors.items()}
+        seen = {
+            name: find_tags(gray, detector).get(self.tag.number) for name, detector in self._detectors.items()
+        }
         for name, corners in seen.items():
             self._seen_of[name] += corners is not None
         best = self.family
@@ -190,29 +191,30 @@ class Tracker:
     def sightings(self) -> Sightings:
         """Return all sightings so far."""
         missing = np.full((4, 2), np.nan)
-        robot = [missing if found is None else found for found in self._robot]
-        middle = {number: np.median(each, axis=0) for number, each in sorted(self._corners.items())}
-        moved = [np.abs(np.array(each) - middle[number]).max() for number, each in self._corners.items()]
+        robot = [missing if corners is None else corners for corners in self._robot]
+        middle = {number: np.median(views, axis=0) for number, views in sorted(self._corners.items())}
+        moved = [np.abs(np.array(views) - middle[number]).max() for number, views in self._corners.items()]
         return Sightings(
             np.array(self._times), np.array(robot).reshape(-1, 4, 2), middle, float(max(moved, default=0.0)),
             self.family, self._size,
         )  # fmt: skip
 
 
-def refuse_unseen(found: Sightings, tag: RobotTag) -> None:
-    """Refuse pictures in which a robot's tag never is.
+def refuse_unseen(sightings: Sightings, tag: RobotTag) -> None:
+    """Refuse pictures without the robot's tag.
 
     Raises:
-        VisionError: So it is.
+        VisionError: The tag is in none of them.
     """
-    if not np.isfinite(found.robot).any():
+    if not np.isfinite(sightings.robot).any():
         family = f" of {tag.family}" if tag.family else ""
         raise VisionError(
-            f"The robot's tag {tag.number}{family} is in none of {len(found.times)} pictures. Expected it flat on top "
-            "of the robot, whole, with a white border, at least 30 pixels wide (the option tag names another number)."
+            f"The robot's tag {tag.number}{family} is in none of {len(sightings.times)} pictures. Expected it flat on "
+            "top of the robot, whole, with a white border, at least 30 pixels wide (the option tag names another "
+            "number)."
         )
 
 
-def with_family(tag: RobotTag, found: Sightings) -> RobotTag:
+def with_family(tag: RobotTag, sightings: Sightings) -> RobotTag:
     """Return the tag with the detected family."""
-    return replace(tag, family=found.family or tag.family)
+    return replace(tag, family=sightings.family or tag.family)

@@ -1,17 +1,64 @@
-"""The places of the tags: four at the corners of an arena, flat on its floor, and one on top of the robot."""
+"""Square tags: their families, as OpenCV has them, and their places in an arena and on a robot."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from realitygap.errors import check_finite
-from realitygap.world import Arena, Grid
+from realitygap.errors import check_finite, from_extra
+from realitygap.world import Arena, Grid, bounds_of
 
-from ._tag_family import FAMILIES
+CORNER_FAMILY = "36h11"
+"""Family of the tags at the arena's corners."""
+
+FAMILIES = {
+    "36h11": "DICT_APRILTAG_36h11",
+    "25h9": "DICT_APRILTAG_25h9",
+    "16h5": "DICT_APRILTAG_16h5",
+    "aruco4x4": "DICT_4X4_1000",
+    "aruco5x5": "DICT_5X5_1000",
+    "aruco6x6": "DICT_6X6_1000",
+    "aruco7x7": "DICT_7X7_1000",
+    "aruco": "DICT_ARUCO_ORIGINAL",
+}
+"""OpenCV's name of each; of smaller ArUco dictionaries the tags are the first ones of these."""
+
+
+@cache
+def dictionary(family: str) -> Any:
+    """Return OpenCV's dictionary of a family.
+
+    Raises:
+        MissingExtraError: OpenCV is not installed.
+    """
+    aruco = from_extra("cv2", "vision").aruco
+    return aruco.getPredefinedDictionary(getattr(aruco, FAMILIES[family]))
+
+
+def n_tags(family: str) -> int:
+    """Return the number of tags in a family; they are numbered from 0."""
+    return len(dictionary(family).bytesList)
+
+
+def tag_bits(family: str, number: int) -> NDArray[np.bool_]:
+    """Return a tag with its black border, True for white, (b, b); row 0 is its upper edge.
+
+    Raises:
+        ValueError: The family has no such tag.
+    """
+    known = dictionary(family)
+    if not 0 <= number < n_tags(family):
+        raise ValueError(f"tag is {number}, expected 0 to {n_tags(family) - 1}: {family} has no more.")
+    size = known.markerSize + 2
+    image = from_extra("cv2", "vision").aruco.generateImageMarker(known, number, size)
+    bits: NDArray[np.bool_] = image > 127
+    return bits
+
 
 Floats = NDArray[np.float64]
 Box = tuple[float, float, float, float]
@@ -72,10 +119,17 @@ class RobotTag:
 
 
 def bounds(arena: Arena) -> Box:
-    """Return left, lower, right and upper end of an arena's walls [m]."""
-    walls = np.array(arena.walls, np.float64).reshape(-1, 2, 2)
-    (left, lower), (right, upper) = walls.min(axis=(0, 1)), walls.max(axis=(0, 1))
-    return float(left), float(lower), float(right), float(upper)
+    """Return left, lower, right and upper end of an arena's walls [m].
+
+    Raises:
+        ValueError: Its walls enclose no area.
+    """
+    walls = bounds_of(arena)
+    if walls is None:
+        raise ValueError(
+            f"arena {arena.name!r} has no walls around an area, expected some: tags lie at its corners"
+        )
+    return walls
 
 
 def corner_tags(

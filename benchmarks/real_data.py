@@ -18,8 +18,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import polars as pl
 
-from realitygap.logs import read_end_poses
 from realitygap.platforms import JyroPlatform
 from realitygap.study import calibrate_from_log, calibrate_from_table
 
@@ -153,10 +153,11 @@ def motors(data: Path) -> dict[str, Any]:
 
 def cube(data: Path) -> dict[str, Any]:
     """Where a pushed cube ends, on a robot and in seven simulators: mean, spread, and trials that have an end."""
-    ends = read_end_poses(data / "cube-push" / "end-poses.csv")
+    table = pl.read_csv(data / "cube-push" / "end-poses.csv", schema_overrides={"end_x_m": pl.Float64})
+    ends = table.with_columns(pl.col("end_x_m").fill_nan(None)).drop_nulls("end_x_m")
     rows = {}
-    for platform in ends.platforms():
-        x = ends.of(platform)["end_x_m"]
+    for (platform,), trials in ends.group_by("platform", maintain_order=True):
+        x = trials["end_x_m"]
         rows[platform] = [len(x), round(float(x.median() or 0.0), 4), round(float(x.std() or 0.0), 4)]  # type: ignore[arg-type]
     return rows
 

@@ -35,7 +35,6 @@ PARSERS = {
 ALLOWED = {
     "_image_file.py": {"Image.open"},
     "_limits.py": {"tomllib.loads"},
-    "logs/_end_poses.py": {"pl.read_csv"},  # of a text of limited size
     "logs/_text.py": {"pl.read_csv"},  # of blocks of limited size
     "records/_chunk.py": {"pl.read_parquet"},  # after check_size
     "records/_ledger_check.py": {"sqlite3.connect"},

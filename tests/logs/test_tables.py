@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from realitygap.errors import LogError
-from realitygap.logs import TableMap, read_end_poses, read_range_table
+from realitygap.logs import TableMap, read_range_table
 from tests.logs.made import write_sample
 
 
@@ -79,20 +79,3 @@ def test_damaged_tables_have_one_message(tmp_path):
             read_range_table(path)
         assert message in str(error.value), message
         assert "\n" not in str(error.value)
-
-
-def test_end_poses_are_listed_by_platform(tmp_path):
-    path = tmp_path / "ends.csv"
-    head = "platform,trial,start_x_m,start_y_m,end_x_m,end_y_m\n"
-    path.write_text(head + "real,1,0.5,0,0.6,0\nreal,2,0.5,0,nan,0\nsim,1,0.5,0,0.55,0\n", "utf-8")
-    ends = read_end_poses(path)
-    assert ends.platforms() == ["real", "sim"]
-    assert ends.of("real")["end_x_m"].to_list() == [0.6]
-    with pytest.raises(LogError, match=r"no platform 'jyro'\. The table has: real, sim"):
-        ends.of("jyro")
-    path.write_text(head + "real,1,0.5,0,far,0\n", "utf-8")
-    with pytest.raises(LogError, match="row 1 has 'far' in end_x_m"):
-        read_end_poses(path)
-    path.write_text("platform,trial\n", "utf-8")
-    with pytest.raises(LogError, match="has no column start_x_m"):
-        read_end_poses(path)

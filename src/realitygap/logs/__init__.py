@@ -5,33 +5,28 @@ column is what. `read_logs` yields its trials on one regular grid, `diagnose` na
 makes an observed trial of one. `write_bag` writes a trial for programs of ROS. This package fits nothing.
 """
 
-from ._as_trials import NO_HEADING, arena_of, head_of, path_headings, trial_of
 from ._clock_offset import ClockOffset, clock_offset
-from ._end_poses import EndPoses, read_end_poses
-from ._files import MappedLog, log_files, mapped_logs, mapping_of
+from ._files import MappedLog, mapped_logs, mapping_of
 from ._guess import guess_log_map
 from ._import import ImportReport, import_log, import_logs, robot_of, target_of
-from ._log import Log
+from ._log import Log, arena_of, head_of, trial_of
 from ._log_map import Commands, LogMap, Poses, Readings, TextFormat, Wheels, load_log_map
 from ._mistakes import Diagnosis, Mistake, diagnose
 from ._open import KINDS, map_beside, open_source
-from ._range_table import RangeTable, read_range_table
+from ._range_table import RangeTable, read_range_table, round_robot
 from ._read import read_logs
-from ._round_robot import round_robot
 from ._source import Batch, Source
 from ._table_map import MeasuredFrom, TableColumns, TableMap, load_table_map
 from ._write_bag import WHEEL_DIAMETER_MM, BagReport, write_bag
 
 __all__ = [
     "KINDS",
-    "NO_HEADING",
     "WHEEL_DIAMETER_MM",
     "BagReport",
     "Batch",
     "ClockOffset",
     "Commands",
     "Diagnosis",
-    "EndPoses",
     "ImportReport",
     "Log",
     "LogMap",
@@ -55,13 +50,10 @@ __all__ = [
     "import_logs",
     "load_log_map",
     "load_table_map",
-    "log_files",
     "map_beside",
     "mapped_logs",
     "mapping_of",
     "open_source",
-    "path_headings",
-    "read_end_poses",
     "read_logs",
     "read_range_table",
     "robot_of",

@@ -41,7 +41,7 @@ class BagSource:
         self.path = path
         limit_unpacking()
         if path.suffix == ".mcap" and _is_json(path):
-            self._messages: Any = _JsonMessages(path)
+            self._messages: _JsonMessages | _RosMessages = _JsonMessages(path)
         else:
             self._messages = _RosMessages(path)
         self._columns: list[str] | None = None
@@ -49,13 +49,13 @@ class BagSource:
     def columns(self) -> list[str]:
         """Return the names of the columns that the first message on each topic has."""
         if self._columns is None:
-            found: dict[str, None] = {}
+            names: dict[str, None] = {}
             for topic in self._messages.topics():
                 for _, message in self._messages.read(topic):
-                    found |= dict.fromkeys(list(_flat(topic, message))[:MOST_FIELDS])
-                    found[f"{topic}/{RECORDED}"] = None
+                    names |= dict.fromkeys(list(_flat(topic, message))[:MOST_FIELDS])
+                    names[f"{topic}/{RECORDED}"] = None
                     break
-            self._columns = list(found)
+            self._columns = list(names)
         return self._columns
 
     def time_of(self, names: Sequence[str]) -> str:
@@ -96,19 +96,19 @@ class BagSource:
     def _by_topic(self, names: Sequence[str]) -> dict[str, list[str]]:
         """Return the columns of each topic, in order."""
         topics = sorted(self._messages.topics(), key=len, reverse=True)
-        found: dict[str, list[str]] = {}
+        by_topic: dict[str, list[str]] = {}
         for name in names:
             topic = next((topic for topic in topics if name.startswith(f"{topic}/")), "")
-            found.setdefault(topic, []).append(name)
-        if "" in found:
+            by_topic.setdefault(topic, []).append(name)
+        if "" in by_topic:
             check_columns(self, names)
-        fields = {name.removeprefix(topic) for topic, own in found.items() for name in own}
-        if len(found) != 1 and len(fields) != 1:
+        fields = {name.removeprefix(topic) for topic, own in by_topic.items() for name in own}
+        if len(by_topic) != 1 and len(fields) != 1:
             raise LogError(
-                f"{self.path}: {', '.join(names)} are of {len(found)} topics, expected one for each part of the "
+                f"{self.path}: {', '.join(names)} are of {len(by_topic)} topics, expected one for each part of the "
                 "mapping, or the same field of each topic."
             )
-        return found
+        return by_topic
 
     def _joined(self, by_topic: dict[str, list[str]], names: Sequence[str]) -> Batch:
         """Return all rows of the first topic with the values of the others."""
@@ -151,7 +151,7 @@ class _RosMessages:
         return list(self._reader.topics)
 
     def read(self, topic: str) -> Iterator[tuple[float, Any]]:
-        connections = [each for each in self._reader.connections if each.topic == topic]
+        connections = [known for known in self._reader.connections if known.topic == topic]
         try:
             for connection, stamp, data in self._reader.messages(connections):
                 yield stamp * NS, self._reader.deserialize(data, connection.msgtype)
@@ -199,12 +199,14 @@ def _damaged(path: Path, error: Exception) -> LogError:
         return LogError(f"{path}: {error}.")
     if path.is_file() and not path.stat().st_size:
         return LogError(f"{path} is empty. Record it again.")
-    said = str(error).strip().split("\n")[0].rstrip(".")[:200] or type(error).__name__
+    message = str(error).strip().split("\n")[0].rstrip(".")[:200] or type(error).__name__
     if path.suffix == ".mcap":
         advice = f"If it was cut off, `mcap recover {path.name}` saves the whole messages."
     else:
         advice = "Record it again, or reindex it with `ros2 bag reindex`."
-    return LogError(f"{path} is damaged, cut off, or no such file ({type(error).__name__}: {said}). {advice}")
+    return LogError(
+        f"{path} is damaged, cut off, or no such file ({type(error).__name__}: {message}). {advice}"
+    )
 
 
 def _flat(place: str, value: Any) -> dict[str, float]:
@@ -225,18 +227,18 @@ def _flat(place: str, value: Any) -> dict[str, float]:
         fields = {name: getattr(value, name) for name in value.__dataclass_fields__ if name != "__msgtype__"}
     else:
         return {}
-    found: dict[str, float] = {}
+    numbers: dict[str, float] = {}
     for name, part in fields.items():
-        found |= _flat(f"{place}/{name}", part)
+        numbers |= _flat(f"{place}/{name}", part)
     for sec, nano in (("sec", "nanosec"), ("sec", "nsec"), ("secs", "nsecs")):  # the time of a header
         if {sec, nano} <= set(fields):
-            found[place] = float(fields[sec]) + float(fields[nano]) * NS
+            numbers[place] = float(fields[sec]) + float(fields[nano]) * NS
     names = fields.get("name")
     if isinstance(names, list) and all(isinstance(name, str) for name in names):  # the state of joints
         for kind in ("position", "velocity", "effort"):
             values = fields.get(kind, ())
             if len(values) == len(names):
-                found |= {
+                numbers |= {
                     f"{place}/{name}/{kind}": float(part) for name, part in zip(names, values, strict=True)
                 }
-    return found
+    return numbers

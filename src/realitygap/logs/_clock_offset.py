@@ -11,7 +11,7 @@ from realitygap._numbers import fixed
 from ._source import Floats
 
 LONGEST_S = 3.0
-"""The longest offset that is looked for."""
+"""Longest offset to detect."""
 N_BLOCKS = 16
 N_DRAWS = 400
 INTERVAL = (0.05, 0.95)
@@ -42,26 +42,26 @@ class ClockOffset:
         return f"{fixed(at, 2)} s ({fixed(low, 2)} to {fixed(high, 2)})"
 
 
-def clock_offset(told: Floats, seen: Floats, step_s: float, *, seed: int = 0) -> ClockOffset | None:
+def clock_offset(leading: Floats, following: Floats, step_s: float, *, seed: int = 0) -> ClockOffset | None:
     """Return the time by which one set of signals follows another; None if they do not show it.
 
     The sign of a correlation does not count: wheels may be swapped.
 
     Args:
-        told: (n, k) signals, such as speed and turn rate by the wheels.
-        seen: (n, k) the same signals, from the poses; nan if unknown.
+        leading: (n, k) signals, such as speed and turn rate by the wheels.
+        following: (n, k) the same signals, from the poses; nan if unknown.
         step_s: Time between two rows [s].
         seed: Seed of the draws.
 
     Source: peak of the cross-correlation, with a parabola through its neighbors; interval by a bootstrap of blocks
         of time (Künsch 1989).
     """
-    n = len(told)
+    n = len(leading)
     most = min(round(LONGEST_S / step_s), n // 4)
     if n < FEWEST_STEPS or most < 2:
         return None
     lags = np.arange(-most, most + 1)
-    sums = np.stack([_block_sums(told, seen, int(lag)) for lag in lags])  # lag, block, signal, moment
+    sums = np.stack([_block_sums(leading, following, int(lag)) for lag in lags])  # lag, block, signal, moment
     score = _score(sums.sum(1))
     if not np.isfinite(score).any() or np.nanmax(score) < LEAST_SCORE:
         return None
@@ -75,15 +75,15 @@ def clock_offset(told: Floats, seen: Floats, step_s: float, *, seed: int = 0) ->
     )
 
 
-def _block_sums(told: Floats, seen: Floats, lag: int) -> Floats:
+def _block_sums(leading: Floats, following: Floats, lag: int) -> Floats:
     """Return moments of the pairs of a lag: n, x, y, xx, yy, xy, (blocks, k, 6)."""
-    n = len(told)
-    x = told[max(0, -lag) : n - max(0, lag)]
-    y = seen[max(0, lag) : n - max(0, -lag)]
+    n = len(leading)
+    x = leading[max(0, -lag) : n - max(0, lag)]
+    y = following[max(0, lag) : n - max(0, -lag)]
     known = np.isfinite(y) & np.isfinite(x)
     x, y = np.where(known, x, 0.0), np.where(known, y, 0.0)
     moments = np.stack([known.astype(float), x, y, x * x, y * y, x * y], -1)
-    # blocks lie at the same times of `told` for all lags
+    # blocks lie at the same times of `leading` for all lags
     edges = np.clip(np.linspace(0, n, N_BLOCKS + 1).astype(int) - max(0, -lag), 0, len(x))
     total = np.concatenate([np.zeros((1, *moments.shape[1:])), np.cumsum(moments, 0)])
     return np.asarray(np.diff(total[edges], axis=0))

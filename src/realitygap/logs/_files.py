@@ -66,13 +66,13 @@ def mapped_logs(
     first = logs[0]
     for log in logs[1:]:
         for key in SHARED:
-            one, other = getattr(first.log_map, key), getattr(log.log_map, key)
-            if one != other:
+            ours, theirs = getattr(first.log_map, key), getattr(log.log_map, key)
+            if ours != theirs:
                 raise LogError(
-                    f"{key} is {one!r} in the mapping of {first.path}, and {other!r} in that of {log.path}. Expected "
+                    f"{key} is {ours!r} in the mapping of {first.path}, and {theirs!r} in that of {log.path}. Expected "
                     "logs of one robot. Give all one mapping, or use them one by one."
                 )
-        ours, theirs = (", ".join(each.log_map.parts) for each in (first, log))
+        ours, theirs = (", ".join(mapped.log_map.parts) for mapped in (first, log))
         if ours != theirs:
             raise LogError(
                 f"{first.path} has {ours}, and {log.path} has {theirs}. "
@@ -120,27 +120,27 @@ def log_files(names: Iterable[str | Path]) -> list[Path]:
     Raises:
         LogError: A folder has no log, a pattern fits no file, or a log is named twice.
     """
-    found: list[Path] = []
+    files: list[Path] = []
     for name in names:
-        found += _files_of(Path(name))
-    for k, path in enumerate(found):
-        if any(path.resolve() == other.resolve() for other in found[:k]):
+        files += _files_of(Path(name))
+    for k, path in enumerate(files):
+        if any(path.resolve() == other.resolve() for other in files[:k]):
             raise LogError(f"{path} is named twice. Name each log once, so that its trials count once.")
-    return found
+    return files
 
 
 def _files_of(path: Path) -> list[Path]:
     if path.is_dir() and not is_log_folder(path) and not map_beside(path).is_file():
-        files = sorted(each for each in path.iterdir() if _is_log(each))
+        files = sorted(file for file in path.iterdir() if _is_log(file))
         if not files:
             ends = ", ".join((*TEXT_ENDS, ".parquet", *BAG_ENDS))
             raise LogError(f"{path} is a folder without a log. Expected files that end in {ends}, or bags.")
         return files
     if not path.exists() and glob.has_magic(str(path)):
-        files = [Path(each) for each in sorted(glob.glob(str(path), recursive=True))]  # noqa: PTH207
+        files = [Path(file) for file in sorted(glob.glob(str(path), recursive=True))]  # noqa: PTH207
         if not files:
             raise LogError(f"No file fits the pattern {path}. Name files, or correct the pattern.")
-        return [each for file in files for each in _files_of(file)]
+        return [log for file in files for log in _files_of(file)]
     return [path]
 
 

@@ -5,17 +5,19 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from realitygap.errors import LogError
 
 from ._guess_time import add_times
 from ._guess_values import checked
 from ._log_map import LogMap
-from ._open import open_source
+from ._open import map_name, open_source
 from ._parquet import EPISODE
 from ._source import MOST_SHOWN, Source
-from ._words import UNITS, map_name, tokens_of, unit_in
+from ._units import UNITS, tokens_of, unit_in
+
+T = TypeVar("T")
 
 LEFT = {"left", "l", "vl", "wl", "lw", "lspeed", "leftspeed", "omegal", "vleft", "lmotor", "dl", "dleft"}
 RIGHT = {"right", "r", "vr", "wr", "rw", "rspeed", "rightspeed", "omegar", "vright", "rmotor", "dr", "dright"}
@@ -25,8 +27,8 @@ INCREMENTS = {"delta", "inc", "incr", "increment", "increments", "diff", "dl", "
 FORWARD = {"forward", "linear", "lin", "v", "vx", "vlin", "translation"}
 TURN = {"turn", "angular", "ang", "w", "wz", "omega", "vth", "yawrate", "rotation", "rot"}
 SPEED = {"vel", "velocity", "speed", "rate", "twist"}
-TOLD = {"cmd", "command", "commands", "commanded", "target", "targets", "setpoint", "desired", "ref", "action", "ctrl",
-        "control", "teleop"}  # fmt: skip
+COMMANDED = {"cmd", "command", "commands", "commanded", "target", "targets", "setpoint", "desired", "ref", "action",
+             "ctrl", "control", "teleop"}  # fmt: skip
 """Words for commands."""
 MEASURED = {"odom", "odometry", "actual", "measured", "meas", "feedback", "estimate", "estimated", "est", "amcl", "ekf",
             "slam", "filtered", "wheel", "wheels", "joint", "states"}  # fmt: skip
@@ -90,10 +92,10 @@ def draft_log_map(path: str | Path) -> LogMap:
     path = Path(path)
     source = open_source(path)
     names = source.columns()
-    commands, told_by = _commands(path, names)
+    commands, commanding = _commands(path, names)
     parts = {
         "commands": commands,
-        "wheels": _wheels(path, names, told_by),
+        "wheels": _wheels(path, names, commanding),
         "poses": _poses(path, names),
         "readings": _ranges(source, names) or _readings(names),
     }
@@ -130,13 +132,13 @@ def _owner(words: Iterable[str], *roles: set[str]) -> frozenset[str]:
     return frozenset(rest.difference(*roles))
 
 
-def _only(path: Path, what: str, found: Sequence[tuple[int, Any]], shown: Callable[[Any], str]) -> Any:
+def _only(path: Path, what: str, candidates: Sequence[tuple[int, T]], shown: Callable[[T], str]) -> T | None:
     """Return the candidate of the lowest rank; None if there is none.
 
     Raises:
         LogError: There are several of that rank.
     """
-    best = [value for rank, value in found if rank == min(rank for rank, _ in found)]
+    best = [value for rank, value in candidates if rank == min(rank for rank, _ in candidates)]
     if len(best) > 1:
         raise LogError(
             f"{path}: several columns could be the {what}: {'; '.join(shown(value) for value in best[:6])}. Write a "
@@ -160,7 +162,7 @@ def _pairs(names: Sequence[str]) -> list[tuple[str, str]]:
 
 def _twists(names: Sequence[str]) -> list[tuple[str, str]]:
     """Return the columns of a forward speed and a turn rate that belong together."""
-    found: dict[frozenset[str], list[tuple[str, str]]] = {}
+    by_owner: dict[frozenset[str], list[tuple[str, str]]] = {}
     for name in names:
         words = _words_of(name)
         if words & OTHER or words & ORIENTATION - {"rotation"}:
@@ -175,9 +177,9 @@ def _twists(names: Sequence[str]) -> list[tuple[str, str]]:
             continue
         owner = _owner(words, FORWARD, TURN, SPEED, {"x", "z", "theta", "yaw", "th"})
         owner |= {"odometry"} if tokens_of(name).count("twist") > 1 else set()
-        found.setdefault(owner, []).append(("forward" if is_forward else "turn", name))
+        by_owner.setdefault(owner, []).append(("forward" if is_forward else "turn", name))
     pairs = []
-    for members in found.values():
+    for members in by_owner.values():
         by_role = dict(members)
         if len(members) == len(by_role) == 2:
             pairs.append((by_role["forward"], by_role["turn"]))
@@ -187,7 +189,7 @@ def _twists(names: Sequence[str]) -> list[tuple[str, str]]:
 def _rank(*names: str) -> int:
     """Return how likely columns are commands: 0 if they say so, 1 if they say nothing, 2 if they are measured."""
     tokens = [token for name in names for token in tokens_of(name)]
-    if TOLD & set(tokens):
+    if COMMANDED & set(tokens):
         return 0 if "cmd" in tokens and not MEASURED & set(tokens) else 1
     return 3 if MEASURED & set(tokens) or tokens.count("twist") > len(names) else 2
 
@@ -197,14 +199,14 @@ def _commands(path: Path, names: Sequence[str]) -> tuple[dict[str, Any] | None, 
     if {"/call/drive/move", "/call/drive/turn"} <= set(names):  # our own recordings
         pair = ("/call/drive/move", "/call/drive/turn")
         return {"forward": pair[0], "turn": pair[1], "unit": "share", "turn_unit": "share"}, pair
-    found: list[tuple[int, tuple[str, str, str]]] = [
+    candidates: list[tuple[int, tuple[str, str, str]]] = [
         (_rank(left, right), ("wheels", left, right))
         for left, right in _pairs(names)
-        if not COUNTED & _words_of(left) or TOLD & _words_of(left)
+        if not COUNTED & _words_of(left) or COMMANDED & _words_of(left)
     ]
-    found += [(_rank(forward, turn), ("twist", forward, turn)) for forward, turn in _twists(names)]
-    found = [(rank, value) for rank, value in found if rank < 3]
-    best = _only(path, "commands", found, lambda value: f"{value[1]} and {value[2]}")
+    candidates += [(_rank(forward, turn), ("twist", forward, turn)) for forward, turn in _twists(names)]
+    candidates = [(rank, value) for rank, value in candidates if rank < 3]
+    best = _only(path, "commands", candidates, lambda value: f"{value[1]} and {value[2]}")
     if best is None:
         return None, None
     kind, first, second = best
@@ -222,13 +224,13 @@ def _measured(names: Sequence[str]) -> tuple[str, str] | None:
     return next(iter([*_twists(names), *_pairs(names)]), None)
 
 
-def _wheels(path: Path, names: Sequence[str], told_by: tuple[str, str] | None) -> dict[str, Any] | None:
-    found = [
+def _wheels(path: Path, names: Sequence[str], commanding: tuple[str, str] | None) -> dict[str, Any] | None:
+    candidates = [
         (int(not TICKS & _words_of(left)), (left, right))
         for left, right in _pairs(names)
-        if COUNTED & _words_of(left) and (left, right) != told_by
+        if COUNTED & _words_of(left) and (left, right) != commanding
     ]
-    pair = _only(path, "encoders", found, " and ".join)
+    pair = _only(path, "encoders", candidates, " and ".join)
     if pair is None:
         return None
     words = _words_of(pair[0])
@@ -247,7 +249,7 @@ def _poses(path: Path, names: Sequence[str]) -> dict[str, Any] | None:
         tokens = tokens_of(name)
         words = set(tokens)
         if (
-            words & (OTHER | TOLD | SPEED | {"linear", "lin", "angular", "ang"})
+            words & (OTHER | COMMANDED | SPEED | {"linear", "lin", "angular", "ang"})
             or "[" in name.partition("/transform")[0]
         ):
             continue
@@ -262,12 +264,14 @@ def _poses(path: Path, names: Sequence[str]) -> dict[str, Any] | None:
             places.setdefault(_owner(words, set(axes)), {}).setdefault(axes[0], []).append(name)
         elif not axes and len(words & HEADING) == 1:
             headings.setdefault(_owner(words, HEADING), []).append(name)
-    found = [
+    candidates = [
         (0 if owner & TRUTH else 2 if owner & MEASURED else 1, owner)
         for owner, axes in places.items()
         if len(axes.get("x", ())) == len(axes.get("y", ())) == 1
     ]
-    owner = _only(path, "poses", found, lambda owner: " and ".join(places[owner][axis][0] for axis in "xy"))
+    owner = _only(
+        path, "poses", candidates, lambda owner: " and ".join(places[owner][axis][0] for axis in "xy")
+    )
     if owner is None:
         return None
     x, y = (places[owner][axis][0] for axis in "xy")

@@ -10,16 +10,16 @@ import numpy as np
 
 from realitygap.errors import LogError
 
+from ._open import map_name
 from ._source import MOST_APART_S, MOST_SHOWN, Floats, Source
-from ._units import TIMES
-from ._words import map_name, tokens_of
+from ._units import TIMES, tokens_of
 
 WORDS = ("time", "t", "timestamp", "stamp", "sec", "secs", "seconds", "elapsed", "clock", "ts")
 OTHER = {"left", "right", "lap", "delta", "diff", "dt", "sample", "sampling", "step", "exec", "processing", "delay",
          "period", "duration", "valid", "seq", "nsec", "nsecs", "nanosec"}  # fmt: skip
 """Words of columns that are no times, or parts of them."""
-UNITS = {"ms": "ms", "msec": "ms", "millis": "ms", "us": "us", "usec": "us", "micros": "us", "ns": "ns", "nsec": "ns",
-         "nanos": "ns", "min": "min"}  # fmt: skip
+TIME_WORDS = {"ms": "ms", "msec": "ms", "millis": "ms", "us": "us", "usec": "us", "micros": "us", "ns": "ns",
+              "nsec": "ns", "nanos": "ns", "min": "min"}  # fmt: skip
 EPOCHS = {"s": 1e9, "ms": 1e12, "us": 1e15, "ns": 1e18}
 """Times since 1970 lie between this number and three times as much, from 2001 to 2065."""
 MOST_STEP_S = 10.0
@@ -79,8 +79,8 @@ def _ascends(times: Floats) -> bool:
 
 def _is_stamp_of(stamp: str, column: str) -> bool:
     """Return whether a column is the stamp in the header of the message that another column is of."""
-    root, found, _ = re.sub(r"[./]stamp$", "", stamp).rpartition("header")
-    return bool(found) and stamp.endswith("stamp") and column.startswith(root)
+    root, header, _ = re.sub(r"[./]stamp$", "", stamp).rpartition("header")
+    return bool(header) and stamp.endswith("stamp") and column.startswith(root)
 
 
 def _is_near(times: Floats, unit: str, others: Floats, other_unit: str) -> bool:
@@ -93,7 +93,7 @@ def _is_near(times: Floats, unit: str, others: Floats, other_unit: str) -> bool:
 
 def time_unit(name: str, times: Floats) -> str:
     """Return the unit of a column of times, by its name or its values; empty if it is unknown."""
-    named = next((UNITS[token] for token in tokens_of(name)[1:] if token in UNITS), "")
+    named = next((TIME_WORDS[token] for token in tokens_of(name)[1:] if token in TIME_WORDS), "")
     known = times[np.isfinite(times)]
     if named or len(known) < 2:
         return named or "s"

@@ -11,9 +11,9 @@ from realitygap.errors import LogError
 
 from ._guess_time import time_unit
 from ._log_map import Commands, LogMap, Part, Poses
+from ._open import map_name
 from ._source import Floats, Source
-from ._units import ANGLES, TIMES
-from ._words import map_name, tokens_of, unit_in
+from ._units import ANGLES, TIMES, tokens_of, unit_in
 
 MOST_SPEED = 5.0
 """Speed above which a number without a unit is not in m/s."""

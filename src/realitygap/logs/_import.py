@@ -1,4 +1,4 @@
-"""The import of a log: its trials in a file of observed trials, and a report of what was done and found."""
+"""The import of a log: its trials in a file of observed trials, and a report on them."""
 
 from __future__ import annotations
 
@@ -11,10 +11,9 @@ from realitygap.errors import LogError
 from realitygap.records import TrialRecord, write_observations
 from realitygap.world import RobotModel, load_robot, robot_names
 
-from ._as_trials import NO_HEADING, head_of, trial_of
 from ._clock_offset import ClockOffset
 from ._files import MappedLog
-from ._log import Log
+from ._log import NO_HEADING, Log, head_of, trial_of
 from ._log_map import LogMap
 from ._mistakes import Mistake, diagnose
 from ._read import read_logs
@@ -109,10 +108,10 @@ def import_logs(
         for trial in read_logs(log.path, log.log_map, robot, drop_bad_rows=drop_bad_rows)
     )
     first, log_map = next(trials)
-    found = _Found(first, robot)
+    report = _GrowingReport(first, robot)
     head = head_of(target_of([log.path for log in logs]), log_map, name, first)
-    write_observations(out, head, _trials(chain([(first, log_map)], trials), found))
-    return found.report
+    write_observations(out, head, _trials(chain([(first, log_map)], trials), report))
+    return report.report
 
 
 def target_of(paths: Sequence[str | Path]) -> str:
@@ -120,7 +119,7 @@ def target_of(paths: Sequence[str | Path]) -> str:
     return str(paths[0]) if len(paths) == 1 else f"{paths[0]} and {len(paths) - 1} more"
 
 
-class _Found:
+class _GrowingReport:
     """A report that grows while trials pass by."""
 
     def __init__(self, first: Log, robot: RobotModel) -> None:
@@ -155,9 +154,9 @@ class _Found:
         )
 
 
-def _trials(trials: Iterable[tuple[Log, LogMap]], found: _Found) -> Iterator[TrialRecord]:
+def _trials(trials: Iterable[tuple[Log, LogMap]], report: _GrowingReport) -> Iterator[TrialRecord]:
     for number, (log, log_map) in enumerate(trials):
-        found.look(log)
+        report.look(log)
         trial = trial_of(log, log_map, number)
-        found.count(trial)
+        report.count(trial)
         yield trial

@@ -96,13 +96,13 @@ def diagnose(log: Log, speed: float, track: float) -> Diagnosis:
     if log.has_heading:
         headings, mistakes = _checked_headings(xy, raw, headings, ways)
     mean, half = ways.sum(1) / 2, np.diff(ways, axis=1)[:, 0] / 2
-    seen = np.stack([np.hypot(*np.diff(xy, axis=0).T), _turns(xy, headings)], 1)
-    offset = clock_offset(np.stack([np.abs(mean), half], 1), seen, log.step_s)
+    observed = np.stack([np.hypot(*np.diff(xy, axis=0).T), _turns(xy, headings)], 1)
+    offset = clock_offset(np.stack([np.abs(mean), half], 1), observed, log.step_s)
     if offset is None:  # with one wheel reversed, its speed is in the difference
-        offset = clock_offset(np.stack([np.abs(half), mean], 1), seen, log.step_s)
+        offset = clock_offset(np.stack([np.abs(half), mean], 1), observed, log.step_s)
     shift = 0 if offset is None else round(offset.seconds / log.step_s)
-    found, gain, measured = _compare_wheels(xy, headings, _shifted(ways, shift), log.step_s, track)
-    mistakes += found
+    of_wheels, gain, measured = _compare_wheels(xy, headings, _shifted(ways, shift), log.step_s, track)
+    mistakes += of_wheels
     if offset is not None and (offset.high < -log.step_s / 4 or offset.low > MOST_LATE_S):
         mistakes.append(_clock(offset, log.wheel_part))
     return Diagnosis(tuple(mistakes), offset, measured, gain)
@@ -114,7 +114,7 @@ def _are_increments(log: Log) -> bool:
         return False
     moved = np.hypot(*np.diff(log.poses[:, :2], axis=0).T)
     way = log.wheels.mean(1)
-    as_counter, as_increment = (_correlation(moved, each) for each in (np.abs(np.diff(way)), way[1:]))
+    as_counter, as_increment = (_correlation(moved, distance) for distance in (np.abs(np.diff(way)), way[1:]))
     return as_increment > ALIKE and as_counter < ALIKE * as_increment
 
 

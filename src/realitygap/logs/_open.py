@@ -27,6 +27,11 @@ def map_beside(path: str | Path) -> Path:
     return path / "map.toml" if path.is_dir() else path.with_name(f"{path.name.split('.')[0]}.map.toml")
 
 
+def map_name(path: Path) -> str:
+    """Return the name of the default mapping of a log, for messages."""
+    return "map.toml in the folder" if path.is_dir() else map_beside(path).name
+
+
 def is_log_folder(path: Path) -> bool:
     """Return whether a folder is one log: a bag, or a dataset."""
     return (path / "meta" / "info.json").is_file() or (path / "metadata.yaml").is_file()

@@ -176,15 +176,15 @@ def _expressions(file: Path, names: dict[str, list[str]]) -> dict[str, pl.Expr]:
         row = _scan(file).select(fit).head(1).collect()
     except (pl.exceptions.PolarsError, OSError) as error:
         raise LogError(f"{file} cannot be read as Parquet: {_first_line(error)}.") from None
-    found: dict[str, pl.Expr] = {}
+    columns: dict[str, pl.Expr] = {}
     for name, kind in schema.items():
         column = pl.col(name)
         if kind.is_numeric() or kind == pl.Boolean:
-            found[name] = column
+            columns[name] = column
         elif isinstance(kind, pl.Datetime):
-            found[name] = column.dt.epoch("ns") / 1e9
+            columns[name] = column.dt.epoch("ns") / 1e9
         elif isinstance(kind, pl.Duration):
-            found[name] = column.dt.total_nanoseconds() / 1e9
+            columns[name] = column.dt.total_nanoseconds() / 1e9
         elif name in lists:
             entries = row[name][0] if name in fit and len(row) else None
             size = int(name not in fit) if entries is None else min(len(entries), MOST_PARTS)
@@ -193,14 +193,14 @@ def _expressions(file: Path, names: dict[str, list[str]]) -> dict[str, pl.Expr]:
                 part = (
                     column.arr.get(k) if isinstance(kind, pl.Array) else column.list.get(k, null_on_oob=True)
                 )
-                found[f"{name}[{k}]"] = part
+                columns[f"{name}[{k}]"] = part
                 if len(given) == size:
-                    found[f"{name}.{given[k]}"] = part
+                    columns[f"{name}.{given[k]}"] = part
         elif isinstance(kind, pl.Struct):
             for field in kind.fields:
                 if field.dtype.is_numeric():
-                    found[f"{name}.{field.name}"] = column.struct.field(field.name)
-    return found
+                    columns[f"{name}.{field.name}"] = column.struct.field(field.name)
+    return columns
 
 
 def _first_line(error: Exception) -> str:

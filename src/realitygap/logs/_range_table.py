@@ -1,4 +1,4 @@
-"""Tables of readings of range sensors by distance and bearing of a wall."""
+"""A table of readings of range sensors, and the file of a round robot whose sensors it places."""
 
 from __future__ import annotations
 
@@ -7,20 +7,19 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from realitygap._limits import MOST_TABLE_BYTES, read_file
 from realitygap.errors import LogError
+from realitygap.world import toml_table
 
 from ._guess import SENSOR
 from ._source import MOST_SHOWN, Floats, check_columns
 from ._table_map import BearingFrom, MeasuredFrom, TableColumns, TableMap
 from ._text import TextSource
-from ._units import ANGLES, LENGTHS, unit_factor
-from ._words import tokens_of, unit_in
+from ._units import ANGLES, LENGTHS, tokens_of, unit_factor, unit_in
 
 BITS = (8, 10, 12, 16)
 """Bit widths of converters whose largest number may be the full scale of a table."""
@@ -109,7 +108,7 @@ def _scaled(path: Path, raw: Floats, table_map: TableMap) -> tuple[Floats, list[
     full = table_map.full
     if not full:
         known = [1.0, *(2.0**bits - 1 for bits in BITS)]
-        full = next((each for each in known if raw.max() <= each), 0.0)
+        full = next((most for most in known if raw.max() <= most), 0.0)
         if full != 1.0:
             notes.append(f"Readings go up to {raw.max():g}: {full:g} is taken for the full scale.")
     if raw.min() < 0 or raw.max() > full:
@@ -164,8 +163,8 @@ def _text(path: Path, table_map: TableMap) -> tuple[NDArray[np.int64], Floats, F
     columns = table_map.columns or _guessed(path, source.columns())
     distance_m = unit_factor("columns.distance_unit", columns.distance_unit, LENGTHS)
     bearing_rad = unit_factor("columns.bearing_unit", columns.bearing_unit, ANGLES)
-    one = [name for name in (columns.sensor, columns.reading) if name]
-    given = [columns.distance, *([columns.bearing] if columns.bearing else []), *one, *columns.sensors]
+    single = [name for name in (columns.sensor, columns.reading) if name]
+    given = [columns.distance, *([columns.bearing] if columns.bearing else []), *single, *columns.sensors]
     check_columns(source, [name for name in given if not name.isdecimal()])
     parts = [dict(batch.columns) for batch in source.batches(given)]
     if not parts:
@@ -208,14 +207,12 @@ def _guessed(path: Path, names: Sequence[str]) -> TableColumns:
     )
     family = [name for name in names if SENSOR.match(name) and name not in (distance, bearing)]
     others = [name for name in names if name not in (distance, bearing)]
-    kind: dict[str, Any]
-    if distance and len(family) > 1:
-        kind = {"sensors": tuple(family)}
-    elif distance and reading:
-        kind = {"sensor": sensor, "reading": reading}
-    elif distance and others and all(name.isdecimal() for name in others):
-        kind = {"sensors": tuple(others)}
-    else:
+    sensors: tuple[str, ...] = ()
+    if len(family) > 1:
+        sensors = tuple(family)
+    elif not reading and all(name.isdecimal() for name in others):
+        sensors = tuple(others)
+    if not distance or not (sensors or reading):
         raise LogError(
             f"{path}: the names of its columns do not say which are distance and readings: "
             f"{', '.join(names[:MOST_SHOWN])}. Write a mapping with [columns], and name it with --map."
@@ -225,5 +222,73 @@ def _guessed(path: Path, names: Sequence[str]) -> TableColumns:
         distance_unit=unit_in(distance, "m"),
         bearing=bearing,
         bearing_unit=unit_in(bearing, "rad") if bearing else "rad",
-        **kind,
+        sensors=sensors,
+        sensor="" if sensors else sensor,
+        reading="" if sensors else reading,
     )
+
+
+REACH = 1.5
+"""Farthest distance of the table times this is the reach of the sensors."""
+CONE_DEG = 30
+AMPLITUDE = 2.0
+DECAY = 0.25
+"""Share of the farthest distance in which readings fall to 1/e, before the fit."""
+SAME_DIRECTION = 0.98
+"""Length of the mean of unit vectors from which on sensors look in one direction: all within about 0.2 rad."""
+SPEED, TRACK = 0.1, 1.8
+"""Speed [m/s], and track in radii: a table does not show them."""
+
+_ROBOT_HEAD = "# A round robot, made from a table of readings. Its numbers are chosen: calibrate it.\n"
+
+
+def round_robot(table: RangeTable, radius: float, name: str, *, clockwise: bool) -> str:
+    """Return the TOML text of a robot file: a disc with infrared sensors on its rim.
+
+    Each sensor looks where it reads most.
+
+    Args:
+        table: Readings at bearings all around.
+        radius: Radius of the disc [m].
+        name: Name of the robot.
+        clockwise: True if the bearings of the table grow clockwise.
+
+    Raises:
+        LogError: A sensor reads nothing, or the bearings of the table do not place the sensors.
+    """
+    if not np.ptp(table.bearing):
+        raise LogError(
+            "The table has no bearings, which would place the sensors. Write a robot file, and name it with --base."
+        )
+    bearing = table.bearing_left(clockwise=clockwise)
+    farthest = float(table.distance.max())
+    sensors, angles = [], []
+    for k in range(table.n_sensors):
+        at = table.sensor == k
+        pull = np.sum(table.readings[at] ** 2 * np.exp(1j * bearing[at])) if at.any() else 0j
+        if not abs(pull):
+            raise LogError(f"Sensor {k} of the table reads nothing anywhere. Leave it out of the mapping.")
+        angle = float(np.angle(pull))
+        angles.append(angle)
+        sensors.append(
+            {
+                "x": radius * math.cos(angle), "y": radius * math.sin(angle), "direction": angle,
+                "cone_deg": CONE_DEG, "rays": 5, "reach": REACH * farthest + radius, "response": "ir",
+                "amplitude": AMPLITUDE, "decay": DECAY * farthest,
+            }
+        )  # fmt: skip
+    if len(angles) > 1 and np.abs(np.mean(np.exp(1j * np.array(angles)))) > SAME_DIRECTION:
+        raise LogError(
+            f"All {len(angles)} sensors of the table read most at about the same bearing, so bearings seem to count "
+            "from each sensor's own direction. Such a table does not show where the sensors are. Write a robot file "
+            "with their mounts, and name it with --base."
+        )
+    values = {
+        "name": name,
+        "description": f"A disc with {table.n_sensors} infrared sensors, made from a table of their readings.",
+        "sources": ["chosen until measured: all but the radius and the directions of the sensors"],
+        "drive": {"speed": SPEED, "track": TRACK * radius},
+    }
+    parts = [_ROBOT_HEAD + toml_table(values), "[[body]]\n" + toml_table({"radius": radius})]
+    parts += ["[[range]]\n" + toml_table(sensor) for sensor in sensors]
+    return "\n\n".join(parts) + "\n"

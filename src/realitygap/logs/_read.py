@@ -216,17 +216,17 @@ class _Assembler:
                     f"No row of [{part}] is between {grid.start_s:.6g} and {self._ends[first]:.6g} s, when there are "
                     f"{first}: it ends at {self._ends[part]:.6g} s. Give the clock's offset_s, or its time_unit."
                 )
-        told = self._streams[0]
-        if told.name == "commands" and not told.has_increments:
+        driving = self._streams[0]
+        if driving.name == "commands" and not driving.has_increments:
             commands = self._rows("commands", n)
         else:
-            ways = self._rows(told.name, n + 1)
-            commands = np.diff(ways, axis=0) / grid.step_s / told.speed
+            ways = self._rows(driving.name, n + 1)
+            commands = np.diff(ways, axis=0) / grid.step_s / driving.speed
         if len(wheels):
             known = wheels[np.isfinite(wheels[:, 0])]
             wheels = wheels - known[0]
         notes = [f"Steps of {grid.step_s:.4g} s.", *self._notes]
-        if told.name != "commands":
+        if driving.name != "commands":
             notes.append(NO_COMMANDS)
         for stream in self._streams:
             notes += stream.check.notes
@@ -235,7 +235,7 @@ class _Assembler:
             *(name, grid.start_s, grid.step_s, commands),
             *(poses[:, :3], wheels, readings, poses[:, 3]),
             notes=tuple(notes),
-            has_commands=told.name == "commands",
+            has_commands=driving.name == "commands",
         )
 
     def _rows(self, name: str, n: int) -> Floats:

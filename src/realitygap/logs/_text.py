@@ -124,13 +124,13 @@ class TextSource:
 
     def _stamps(self) -> dict[str, tuple[str, str]]:
         """Return the columns of the seconds and the nanoseconds of each stamp."""
-        found = {}
+        stamps = {}
         for name in self._names:
             match = _SECONDS.fullmatch(name)
             for nano in ("nanosec", "nanosecs", "nsec", "nsecs", "nanoseconds"):
                 if match and match[1] not in self._names and f"{match[1]}{match[2]}{nano}" in self._names:
-                    found[match[1]] = (name, f"{match[1]}{match[2]}{nano}")
-        return found
+                    stamps[match[1]] = (name, f"{match[1]}{match[2]}{nano}")
+        return stamps
 
     def time_of(self, names: Sequence[str]) -> str:
         """Return no column: a table names it in its mapping."""
@@ -141,7 +141,7 @@ class TextSource:
         stamps = {name: both for name, both in self._stamps().items() if name in names}
         plain = [name for name in names if name not in stamps]
         chosen = {
-            name: self._index(name) for name in (*plain, *(each for both in stamps.values() for each in both))
+            name: self._index(name) for name in (*plain, *(part for both in stamps.values() for part in both))
         }
         first = 1
         # numbers stand for the names, so that rows may be shorter than the widest, and names may be anything

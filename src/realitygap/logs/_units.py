@@ -1,9 +1,10 @@
-"""Units of logs, and what a number in each is in meters, radians, and seconds."""
+"""Units of logs: their values in meters, radians, and seconds, and their words in the names of columns."""
 
 from __future__ import annotations
 
 import difflib
 import math
+import re
 
 from realitygap.errors import LogError
 
@@ -34,3 +35,21 @@ def unit_factor(place: str, unit: str, *tables: dict[str, float]) -> float:
         hint = f" Did you mean {near[0]!r}?" if near else ""
         raise LogError(f"{place} is {unit!r}, expected {', '.join(known)}.{hint}")
     return known[unit]
+
+
+UNITS = {
+    "mm": "mm", "millimeters": "mm", "cm": "cm", "centimeters": "cm", "m": "m", "meters": "m", "in": "in",
+    "inches": "in", "rpm": "rpm", "deg": "deg", "degrees": "deg", "rad": "rad", "radians": "rad", "ticks": "ticks",
+    "percent": "percent", "pct": "percent",
+}  # fmt: skip
+
+
+def tokens_of(name: str) -> list[str]:
+    """Return the words of a name, in lower case: leftSpeed_mm_s has left, speed, mm, s."""
+    name = re.sub(r"([a-z])([A-Z])", r"\1 \2", name)
+    return [part for part in re.split(r"[^a-zA-Z0-9]+", name.lower()) if part]
+
+
+def unit_in(name: str, default: str) -> str:
+    """Return the unit in a name, without that of the time."""
+    return next((UNITS[token] for token in reversed(tokens_of(name)[1:]) if token in UNITS), default)

@@ -55,7 +55,8 @@ def cell_features(trace: Trace, grid: Grid) -> Floats:
     n = grid.n_cells
 
     def count(mask: NDArray[np.generic]) -> Floats:
-        return np.bincount(cells[cells >= 0], weights=np.asarray(mask, np.float64)[cells >= 0], minlength=n)
+        weights = np.asarray(mask, np.float64)[cells >= 0]
+        return np.asarray(np.bincount(cells[cells >= 0], weights, n), np.float64)
 
     def most(values: NDArray[np.generic], floor: float = 0.0) -> Floats:
         largest = np.full(n, floor)

@@ -84,8 +84,6 @@ def _without_print(density: Floats, layout: SheetLayout, px_per_m: float) -> Flo
     return np.asarray(np.maximum(density - 1.15 * drawn[..., None] * seen.astype(np.float32), 0))
 
 
-Floats = NDArray[np.float32]
-
 CELL = 0.1  # of the table of densities
 SPREAD = (0.14, 0.055)  # deviation of a density: at 0, and more for each unit of it
 AMOUNTS = {

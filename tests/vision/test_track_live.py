@@ -13,7 +13,7 @@ from realitygap.study import CameraObserver, connect_robot, drive_study
 from realitygap.testing import Film, FilmedCamera, path_through
 from realitygap.trials import Operator, RobotTarget, TrialPlan, WitnessObserver
 from realitygap.vision import LiveTrack, Marks, Track, Tracked
-from realitygap.vision.track import _live
+from realitygap.vision.track import _video
 from realitygap.world import paper_arena
 from tests.study.physical import small_study
 
@@ -90,8 +90,8 @@ class _EmptyRoom:
 def test_a_picture_may_take_long_to_come_up_as_long_as_others_come(monkeypatch):
     """All of them together took longer than one may, so that the camera was said to give none."""
     room, has_to_end = _EmptyRoom(), threading.Event()
-    monkeypatch.setattr(_live, "PATIENCE_S", 1.0)
-    monkeypatch.setattr(_live, "Tracker", lambda tag: room)
+    monkeypatch.setattr(_video, "PATIENCE_S", 1.0)
+    monkeypatch.setattr(_video, "Tracker", lambda tag: room)
 
     def pictures():
         for at in range(15):

@@ -269,17 +269,17 @@ def _poses(path: Path, names: Sequence[str]) -> dict[str, Any] | None:
         for owner, axes in places.items()
         if len(axes.get("x", ())) == len(axes.get("y", ())) == 1
     ]
-    owner = _only(
+    chosen = _only(
         path, "poses", candidates, lambda owner: " and ".join(places[owner][axis][0] for axis in "xy")
     )
-    if owner is None:
+    if chosen is None:
         return None
-    x, y = (places[owner][axis][0] for axis in "xy")
+    x, y = (places[chosen][axis][0] for axis in "xy")
     part: dict[str, Any] = {"x": x, "y": y, "unit": unit_in(x, "m")}
-    quaternion = turns.get(owner, {})
+    quaternion = turns.get(chosen, {})
     if all(len(quaternion.get(axis, ())) == 1 for axis in AXES):
         return part | {"quaternion": [quaternion[axis][0] for axis in AXES]}
-    own = headings.get(owner, [])
+    own = headings.get(chosen, [])
     if len(own) == 1:
         part |= {"heading": own[0], "heading_unit": unit_in(own[0], "rad")}
     return part

@@ -1,8 +1,6 @@
 """NEAT and novelty search: settings, genomes and what they become elsewhere, populations to ask and tell, archives."""
 
-from . import _cards  # noqa: F401  # what notebooks show
-from ._archive import NoveltyArchive
-from ._archive_members import Member, archive_members
+from ._archive import Member, NoveltyArchive, archive_members
 from ._aseba import aseba_error, to_aseba
 from ._c import to_c
 from ._distances import (
@@ -14,8 +12,8 @@ from ._distances import (
     measure_of,
     pack_behaviors,
 )
+from ._export import to_networkx, to_onnx
 from ._genome import ConnectionGene, Genome, Network, NodeGene, decode_all, genome_from_record, genome_record
-from ._graph import to_networkx
 from ._interface import (
     OUTPUTS,
     PAPER_INPUTS,
@@ -36,10 +34,8 @@ from ._novelty import (
     largest_cell_distance,
     sorted_cells_distance,
 )
-from ._onnx import to_onnx
 from ._picture import network_picture
-from ._population import Population
-from ._random import random_key
+from ._population import Population, random_key
 from ._settings import NAMED_SETTINGS, NeatSettings
 
 __all__ = [

@@ -1,18 +1,19 @@
-"""The archive that settings of novelty describe, whichever kind and distance."""
+"""The archive that settings of novelty describe, its members generation by generation, and the cards of archives."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from realitygap.drawing import ShownAsCard
+from realitygap.drawing import Card, ShownAsCard, Table, card_of
 from realitygap.kernels.neat import distances
 from realitygap.kernels.neat import novelty as novelty_kernels
+from realitygap.kernels.neat.distances import Behaviors
 
 from ._distances import Cells, measure_of, pack_behaviors
-from ._novelty import NoveltySettings, PaperArchive
+from ._novelty import NearestArchive, NoveltySettings, PaperArchive
 
 
 class NoveltyArchive(ShownAsCard):
@@ -101,3 +102,80 @@ class NoveltyArchive(ShownAsCard):
             self._archived = distances.Behaviors(
                 *(np.concatenate([old, new]) for old, new in zip(self._archived, more, strict=True))
             )
+
+
+Member = tuple[int, int]
+"""Generation and individual."""
+
+
+def archive_members(
+    generations: Iterable[Sequence[Cells] | ArrayLike],
+    settings: NoveltySettings | None = None,
+    *,
+    columns: int = 12,
+    rows: int = 6,
+) -> list[list[Member]]:
+    """Return the members of the archive after each generation, in the order of their places in the archive.
+
+    Args:
+        generations: The behaviors of each, as `NoveltyArchive.update` takes them.
+        settings: Settings of the archive. Default: the paper's.
+        columns, rows: Size of the grid.
+
+    Returns:
+        The members of the archive for each generation. If individuals of a generation behave alike, the first is
+        given.
+
+    Raises:
+        TypeError: A cell that is not a whole number.
+        ValueError: A cell outside the grid, or positions that are not pairs of finite numbers.
+    """
+    archive = NoveltyArchive(settings, columns=columns, rows=rows)
+    measure = measure_of(archive.settings.distance, columns, rows, archive.settings.sort)
+    members: list[Member] = []
+    contents: list[tuple[bytes, int, bytes]] = []
+    memberships = []
+    for generation, behaviors in enumerate(generations):
+        packed = pack_behaviors(measure, behaviors, columns, rows)
+        archive.update(behaviors)
+        held = archive.packed
+        width = min(packed.marks.shape[1], held.marks.shape[1])
+        known = {_content(packed, row, width): row for row in reversed(range(len(packed.n_cells)))}
+        for place in range(len(archive)):
+            content = _content(held, place, width)
+            if place < len(contents) and contents[place] == content:
+                continue
+            contents[place : place + 1] = [content]
+            members[place : place + 1] = [(generation, known[content])]
+        memberships.append(list(members))
+    return memberships
+
+
+def _content(behaviors: Behaviors, row: int, width: int) -> tuple[bytes, int, bytes]:
+    """Return a key that identifies a behavior, from its first `width` marks, its number of cells and its points."""
+    marks = np.ascontiguousarray(behaviors.marks[row][:width]).tobytes()
+    return marks, int(behaviors.n_cells[row]), behaviors.points[row].tobytes()
+
+
+@card_of.register(PaperArchive)
+@card_of.register(NoveltyArchive)
+def archive_card(archive: PaperArchive | NoveltyArchive) -> Card:
+    """Return the number of archived behaviors, and the settings of the archive."""
+    rows = [[name, f"{value}"] for name, value in archive.settings.model_dump(mode="json").items()]
+    columns, n_rows = archive.grid_size
+    return Card(
+        repr(archive),
+        lead=f"{len(archive)} behaviors on a grid of {columns} × {n_rows} cells.",
+        parts=[Table(["setting", "value"], rows, "Settings", closed=True)],
+    )
+
+
+@card_of.register(NearestArchive)
+def nearest_card(archive: NearestArchive) -> Card:
+    """Return the number of archived behaviors, the threshold, and the range of each coordinate."""
+    rows = []
+    for k in range(len(archive.behaviors[0]) if len(archive) else 0):
+        values = [float(behavior[k]) for behavior in archive.behaviors]
+        rows.append([f"coordinate {k}", f"{min(values):.4g}", f"{max(values):.4g}"])
+    lead = f"{len(archive)} behaviors; a new one enters with a novelty above {archive.threshold:.4g}."
+    return Card(repr(archive), lead=lead, parts=[Table(["", "smallest", "largest"], rows)])

@@ -99,7 +99,7 @@ class _Code:
 
     def call(self, function: str, *arguments: str | int, n_sizes: int = 1) -> None:
         """Add a call of a native function; the compiler puts numbers among its arguments into variables."""
-        numbers = [each for each in arguments if isinstance(each, int)]
+        numbers = [argument for argument in arguments if isinstance(argument, int)]
         n_words = sum(1 + _pushed(number) for number in numbers) + len(arguments) + n_sizes + 1
         self.add(f"call {function}({', '.join(map(str, arguments))})", n_words, len(numbers))
 
@@ -243,15 +243,15 @@ def _tried(sensed: Sequence[str]) -> list[list[int]]:
 
 def _runs(sensed: Sequence[str], kind: str) -> list[tuple[int, int, int]]:
     """Return the parts in which the inputs of a kind have the order of the robot's sensors: input, sensor, number."""
-    found: list[tuple[int, int, int]] = []
+    stretches: list[tuple[int, int, int]] = []
     for place, name in enumerate(sensed):
         if match := re.fullmatch(rf"{kind}\.(\d+)", name):
             sensor = int(match[1])
-            if found and (place, sensor) == (sum(found[-1][::2]), sum(found[-1][1:])):
-                found[-1] = (*found[-1][:2], found[-1][2] + 1)
+            if stretches and (place, sensor) == (sum(stretches[-1][::2]), sum(stretches[-1][1:])):
+                stretches[-1] = (*stretches[-1][:2], stretches[-1][2] + 1)
             else:
-                found.append((place, sensor, 1))
-    return found
+                stretches.append((place, sensor, 1))
+    return stretches
 
 
 def _declare(code: _Code, fixed: FixedNetwork, sensed: Sequence[str], step_s: float) -> None:
@@ -363,9 +363,9 @@ def _nodes(code: _Code, fixed: FixedNetwork) -> None:
     """Add the statements that compute all nodes in the order of activation."""
     if fixed.is_recurrent:
         code.call("math.copy", "before", "nodes")
-    seen = "before" if fixed.is_recurrent else "nodes"
+    state = "before" if fixed.is_recurrent else "nodes"
     for node in fixed.nodes:
-        _sum(code, node, seen)
+        _sum(code, node, state)
         if fixed.activation == "identity":
             code.add(f"nodes[{node.node}] = total", 2)
             continue
@@ -376,10 +376,10 @@ def _nodes(code: _Code, fixed: FixedNetwork) -> None:
             code.add(f"nodes[{node.node}] = {ONE // 2} + (answer >> 1)", 5 + _pushed(ONE // 2))
 
 
-def _sum(code: _Code, node: FixedNode, seen: str) -> None:
+def _sum(code: _Code, node: FixedNode, state: str) -> None:
     n = len(node.sources) + 1
     into, factors = _span("sources", 0, n), _span("weights", 0, n)
-    sources = [f"{seen}[{k}]" for k in node.sources]
+    sources = [f"{state}[{k}]" for k in node.sources]
     numbers = (*node.weights, node.constant[1])
     code.add(
         f"{into} = [{', '.join((*sources, str(node.constant[0])))}]",

@@ -167,13 +167,13 @@ def _in_comment(names: Sequence[str]) -> str:
 
 def _constants(guard: str, kind: str, names: Sequence[str]) -> list[str]:
     """Return a constant for each input or output, with numbers if two would be equal."""
-    found: list[str] = []
+    words: list[str] = []
     for k, name in enumerate(names):
         word = f"{guard}_{kind}_" + re.sub(r"[^A-Z0-9]", "_", name.upper())
-        while word in found:
+        while word in words:
             word += f"_{k}"
-        found.append(word)
-    return found
+        words.append(word)
+    return words
 
 
 def _number(value: float, single: bool) -> str:

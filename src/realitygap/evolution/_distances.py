@@ -72,16 +72,16 @@ class BehaviorDistance:
             ValueError: A cell outside the grid, or positions that are not pairs of finite numbers.
         """
         measure = measure_of(self.name, columns, rows, sort)
-        one = pack_behaviors(measure, behaviors, columns, rows)
-        other = one if others is None else pack_behaviors(measure, others, columns, rows)
-        found = np.empty((len(one.n_cells), len(other.n_cells)))
-        distances_kernels.distances_between(measure, one, other, found)
-        return found
+        first = pack_behaviors(measure, behaviors, columns, rows)
+        second = first if others is None else pack_behaviors(measure, others, columns, rows)
+        distances = np.empty((len(first.n_cells), len(second.n_cells)))
+        distances_kernels.distances_between(measure, first, second, distances)
+        return distances
 
 
 DISTANCES: dict[str, BehaviorDistance] = {
-    each.name: each
-    for each in (
+    distance.name: distance
+    for distance in (
         BehaviorDistance(
             "paper",
             compares="cells",

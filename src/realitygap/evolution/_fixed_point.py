@@ -137,8 +137,8 @@ def to_one(value: int, bits: int) -> int:
 
 def _quotient(dividend: int, divisor: int) -> int:
     """Divide as C does: towards zero."""
-    found = abs(dividend) // abs(divisor)
-    return found if (dividend < 0) == (divisor < 0) else -found
+    quotient = abs(dividend) // abs(divisor)
+    return quotient if (dividend < 0) == (divisor < 0) else -quotient
 
 
 def fixed_point(network: Network) -> FixedNetwork:
@@ -247,9 +247,9 @@ def errors(network: Network, fixed: FixedNetwork, inputs: Sequence[Sequence[int]
     """
     twin = Network.from_dict(network.to_dict())
     nodes = [0] * fixed.n_nodes
-    found = []
+    errors = []
     for given in inputs:
         nodes = fixed.step(given, nodes)
         wanted = np.clip(twin.activate([value / ONE for value in given]), -1.0, 1.0)
-        found.append(np.abs(np.array(fixed.command(nodes)) / ONE - wanted))
-    return float(np.max(found)), float(np.median(found))
+        errors.append(np.abs(np.array(fixed.command(nodes)) / ONE - wanted))
+    return float(np.max(errors)), float(np.median(errors))

@@ -133,20 +133,20 @@ class Network(_json.Written[_json.NetworkForm]):
     def _from(cls, form: _json.NetworkForm, where: str) -> Self:
         _check_network(form, where)
         rules = form.rules(form.n_inputs, form.n_outputs, constant=form.constant, node_bias=True)
-        edges = [len(each.sources) for each in form.nodes]
+        edges = [len(node.sources) for node in form.nodes]
         networks = make_networks(1, rules, max(sum(edges), 1), len(edges) - rules.n_outputs)
         first_hidden = rules.n_inputs + rules.n_outputs
-        hidden = [each for each in form.nodes if each.node >= first_hidden]
+        hidden = [node for node in form.nodes if node.node >= first_hidden]
         outputs = sorted(
-            (each for each in form.nodes if each.node < first_hidden), key=lambda each: each.node
+            (node for node in form.nodes if node.node < first_hidden), key=lambda node: node.node
         )
         number = {node: node for node in range(first_hidden)}
-        number |= {each.node: first_hidden + k for k, each in enumerate(hidden)}
+        number |= {node.node: first_hidden + k for k, node in enumerate(hidden)}
         networks.n_hidden[0] = len(hidden)
         edge = 0
-        for k, each in enumerate([*hidden, *outputs]):
-            networks.bias[0, k] = each.bias
-            pairs = zip((number[node] for node in each.sources), each.weights, strict=True)
+        for k, node in enumerate([*hidden, *outputs]):
+            networks.bias[0, k] = node.bias
+            pairs = zip((number[source] for source in node.sources), node.weights, strict=True)
             for source, weight in sorted(pairs):
                 networks.source[0, edge], networks.weight[0, edge] = source, weight
                 edge += 1
@@ -360,8 +360,8 @@ def decode_all(genomes: Sequence[Genome]) -> Networks:
         decode_rows(genomes[0]._genomes, rows, genomes[0].rules, networks)
         return networks
     for k, genome in enumerate(genomes):
-        one = Networks._make(part if part is networks.ends else part[k : k + 1] for part in networks)
-        decode_rows(genome._genomes, np.array([genome._row]), genome.rules, one)
+        row = Networks._make(part if part is networks.ends else part[k : k + 1] for part in networks)
+        decode_rows(genome._genomes, np.array([genome._row]), genome.rules, row)
     return networks
 
 
@@ -461,11 +461,11 @@ def _check_genome(form: _json.GenomeForm, where: str) -> None:
 
 def _check_network(form: _json.NetworkForm, where: str) -> None:
     """Refuse what kernels could not read."""
-    numbers = {each.node for each in form.nodes}
+    numbers = {node.node for node in form.nodes}
     known = set(range(form.n_inputs)) | numbers
     problems = {
         "n_inputs counts the constant one, expected another besides": form.constant and form.n_inputs < 2,
-        "expected each output and hidden node once, numbered after the inputs": (
+        "expected node output and hidden node once, numbered after the inputs": (
             len(numbers) != len(form.nodes)
             or len(numbers) < form.n_outputs
             or numbers != set(range(form.n_inputs, form.n_inputs + len(numbers)))
@@ -473,17 +473,17 @@ def _check_network(form: _json.NetworkForm, where: str) -> None:
         "a node has not as many sources as weights": any(
             len(e.sources) != len(e.weights) for e in form.nodes
         ),
-        "a source is no node": any(not set(each.sources) <= known for each in form.nodes),
+        "a source is no node": any(not set(node.sources) <= known for node in form.nodes),
     }
     for problem, is_there in problems.items():
         if is_there:
             raise RecordError(f"{where} is not a network: {problem}.")
     if not form.recurrent:
         seen = set(range(form.n_inputs))
-        for each in form.nodes:
-            if not set(each.sources) <= seen:
-                raise RecordError(f"{where} is not a network: node {each.node} comes before a source of it.")
-            seen.add(each.node)
+        for node in form.nodes:
+            if not set(node.sources) <= seen:
+                raise RecordError(f"{where} is not a network: node {node.node} comes before a source of it.")
+            seen.add(node.node)
 
 
 def _refuse_cycle(links: Sequence[tuple[int, int]], what: str) -> None:

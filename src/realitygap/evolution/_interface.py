@@ -84,20 +84,20 @@ class ControllerInterface:
         left, right = limited[..., 0], limited[..., 1]
         return np.stack([(left + right) / 2, (right - left) / 2], axis=-1)
 
-    def check(self, there: Sequence[str], who: str, where: str) -> None:
+    def check(self, existing: Sequence[str], who: str, where: str) -> None:
         """Refuse a platform that lacks an input.
 
         Args:
-            there: Inputs that the platform has.
+            existing: Inputs that the platform has.
             who: Name of the controller in the message.
             where: Name of the platform in the message.
 
         Raises:
             ControllerError: An input is missing.
         """
-        missing = [name for name in self.sensed if name not in there]
+        missing = [name for name in self.sensed if name not in existing]
         if missing:
-            has = listed(name for name in there if name != CONSTANT)
+            has = listed(name for name in existing if name != CONSTANT)
             raise ControllerError(
                 f"{who} sees {listed(self.sensed)}, and {where} has {has}: {listed(missing)} "
                 f"{'is' if len(missing) == 1 else 'are'} missing. Choose existing inputs, or a platform, "

@@ -180,9 +180,9 @@ def checked(values: Any, form: type[F], kind: Kind, where: str) -> F:
         RecordVersionError: of another version.
     """
     expected = f"realitygap {kind}"
-    found = values.get("format") if isinstance(values, Mapping) else None
-    if found != expected:
-        raise RecordError(f"{where} has the format {found!r}, expected {expected!r}.")
+    written = values.get("format") if isinstance(values, Mapping) else None
+    if written != expected:
+        raise RecordError(f"{where} has the format {written!r}, expected {expected!r}.")
     known = (FORMAT_VERSION, NAMED_VERSION) if kind == "genome" else (FORMAT_VERSION,)
     if values.get("version") not in known:
         raise RecordVersionError(

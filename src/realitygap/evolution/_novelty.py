@@ -90,8 +90,8 @@ def largest_cell_distance(columns: int, rows: int) -> float:
 
 
 def sorted_cells_distance(
-    one: Cells,
-    other: Cells,
+    first: Cells,
+    second: Cells,
     *,
     columns: int = 12,
     rows: int = 6,
@@ -103,7 +103,7 @@ def sorted_cells_distance(
     longer list counts with the largest distance in the grid.
 
     Args:
-        one, other: Cells, numbered columns * row + column; order and repeats do not matter.
+        first, second: Cells, numbered columns * row + column; order and repeats do not matter.
         columns, rows: Size of the grid.
         sort: Order of the cells: by x first, or by y first.
 
@@ -113,7 +113,7 @@ def sorted_cells_distance(
 
     Source: Rosenzweig & Remy, section 2.4.
     """
-    return float(DISTANCES["paper"].distances([one], [other], columns=columns, rows=rows, sort=sort)[0, 0])
+    return float(DISTANCES["paper"].distances([first], [second], columns=columns, rows=rows, sort=sort)[0, 0])
 
 
 class PaperArchive(ShownAsCard):
@@ -168,9 +168,9 @@ class PaperArchive(ShownAsCard):
         return novelty
 
 
-def euclidean(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
+def euclidean(first: NDArray[np.float64], second: NDArray[np.float64]) -> float:
     """Return the straight distance between two behaviors that are points."""
-    return float(np.linalg.norm(one - other))
+    return float(np.linalg.norm(first - second))
 
 
 class NearestArchive(ShownAsCard):

@@ -1,11 +1,11 @@
-"""The picture of a genome: its network from inputs to outputs, as plain shapes."""
+"""The picture of a genome, its network from inputs to outputs as plain shapes, and its card."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 
-from realitygap.drawing import Disc, Ink, Line, Picture, Point, Shape, Text, picture_of
+from realitygap.drawing import Card, Disc, Ink, Line, Picture, Point, Shape, Table, Text, card_of, picture_of
 
 from ._genome import ConnectionGene, Genome
 
@@ -72,7 +72,7 @@ def network_picture(
                 halo=True,
             )
         )
-    shapes += [end for positive, end in sorted(ends, key=lambda each: not each[0])]  # bars over arrows
+    shapes += [end for positive, end in sorted(ends, key=lambda end: not end[0])]  # bars over arrows
     shapes += labels
     for node in genome.nodes:
         x, y = places[node.id]
@@ -221,3 +221,30 @@ def _along(curve: list[Point], part: float) -> Point:
         return curve[int(part * len(curve))]
     (x1, y1), (x2, y2) = curve
     return (x1 + part * (x2 - x1), y1 + part * (y2 - y1))
+
+
+MOST_DRAWN = 200
+"""Connections of a network that is drawn: a drawing of more is a tangle, and large."""
+
+
+@card_of.register(Genome)
+def genome_card(genome: Genome) -> Card:
+    """Return the network of a genome, and its genes, which open."""
+    n = len(genome.connections)
+    lead = f"{genome.n_enabled} of {n} connections are enabled."
+    rows = [
+        [
+            str(gene.innovation),
+            f"{gene.source} → {gene.target}",
+            f"{gene.weight:.4g}",
+            "yes" if gene.enabled else "no",
+        ]
+        for gene in genome.connections
+    ]
+    genes = Table(["innovation", "from → to", "weight", "enabled"], rows, f"{n} genes", closed=True)
+    return Card(
+        repr(genome),
+        lead=lead,
+        parts=[picture_of(genome), genes] if n <= MOST_DRAWN else ["It is too large to be drawn.", genes],
+        code=["genome.network().activate(inputs)", "genome.save('champion.json')"],
+    )

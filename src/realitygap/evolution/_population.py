@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from pathlib import Path
 from typing import Any, Self
 
@@ -16,7 +17,6 @@ from realitygap.kernels.neat.species import SpeciesTable, make_species, speciate
 from realitygap.records import read_checkpoint, write_checkpoint
 
 from ._genome import Genome
-from ._random import random_key
 from ._settings import NeatSettings
 
 # Room beyond the first genes; doubled whenever a child does not fit.
@@ -29,6 +29,17 @@ _MOST_NUMBER = 2**31 - 2**16
 
 # What kernels write to before they read it.
 _ROOM = {"genomes.reached", "genomes.cursor", "species.numbers", "species.shares"}
+
+
+def random_key(seed: int, name: str | None = None) -> int:
+    """Return the 64-bit key of a study's random numbers, or of one condition's.
+
+    Args:
+        seed: Seed of the study.
+        name: Name of the condition; None if all conditions share their random numbers.
+    """
+    text = f"realitygap:{seed}" if name is None else f"realitygap:{seed}:{name}"
+    return int.from_bytes(hashlib.blake2b(text.encode(), digest_size=8).digest(), "little")
 
 
 class Population:
@@ -147,10 +158,10 @@ class Population:
         """
         n = len(self)
         check_told_once(self._asked, self.generation)
-        told = np.ascontiguousarray(finite_numbers("fitness", fitness))
-        if told.shape != (n,):
+        values = np.ascontiguousarray(finite_numbers("fitness", fitness))
+        if values.shape != (n,):
             raise ValueError(
-                f"fitness has shape {told.shape}, expected ({n},): one number for each genome asked."
+                f"fitness has shape {values.shape}, expected ({n},): one number for each genome asked."
             )
         room = self._genomes.innovation.shape[1]
         hidden_room = self._genomes.hidden.shape[1]
@@ -162,7 +173,7 @@ class Population:
             parents = self._parents.copy()
             next_generation(
                 self._genomes,
-                told,
+                values,
                 species_of,
                 species,
                 self._rules,

@@ -9,7 +9,7 @@ import pytest
 
 from realitygap.evolution import NeatSettings
 from realitygap.kernels.neat.block import RunRows
-from realitygap.runs import Condition, frame_of, replay, run_rows
+from realitygap.runs import Condition, replay, run_replicates, run_rows
 from realitygap.runs import _runs as runs_module
 from tests.kernels.genome_arrays import from_arrays, rules_of, to_arrays
 from tests.reference import run as reference
@@ -190,7 +190,7 @@ def test_a_run_that_outgrows_its_room_equals_one_with_much_room(
 @pytest.mark.parametrize("name", CONDITIONS)
 def test_every_row_can_be_shown_again(name: str) -> None:
     condition = condition_of(name)
-    frame = frame_of(condition, 1, run_rows(condition, 1, 1))
+    frame = run_replicates(condition, 1, 1)
     for row in frame.iter_rows(named=True):
         trajectory = replay(condition, row)  # says so itself where the cells differ
         assert list(trajectory.cells) == row["cells"]

@@ -9,7 +9,7 @@ from realitygap.evolution import Genome, NeatSettings, Population, decode_all
 from realitygap.kernels.tasks import double_pole, run
 from realitygap.kernels.tasks.xor import try_xor
 from realitygap.runs import TaskRun, run_task
-from realitygap.runs import _classical as classical_module
+from realitygap.runs import _published as classical_module
 from realitygap.study import task_settings
 from realitygap.tasks import CLASSICAL_TASKS
 from tests.reference.effort import COMPILED

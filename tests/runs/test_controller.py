@@ -9,7 +9,7 @@ from realitygap.errors import StudyError
 from realitygap.evolution import Genome
 from realitygap.records import ResultsFolder
 from realitygap.report import export_individual
-from realitygap.runs import Condition, frame_of, genome_of, run_rows
+from realitygap.runs import Condition, genome_of, run_replicates
 from realitygap.study import parse_study, run_study
 from realitygap.tasks import ControllerSettings
 
@@ -87,10 +87,10 @@ def test_mistakes_of_a_study_file_have_their_place():
 @pytest.mark.parametrize("selection", ["coverage", "novelty"])
 def test_whole_runs_of_jyro_are_those_by_generations(selection):
     condition = Condition(name="a", selection=selection, controller=DECLARED, neat=SMALL)
-    whole, staged = (frame_of(condition, 0, run_rows(condition, 0, 2, staged=each)) for each in (False, True))
+    whole, staged = (run_replicates(condition, 0, 2, staged=each) for each in (False, True))
     assert whole.equals(staged)
     others = condition.model_copy(update={"controller": ControllerSettings(inputs=DECLARED["inputs"])})
-    assert not whole["cells"].equals(frame_of(others, 0, run_rows(others, 0, 2))["cells"])
+    assert not whole["cells"].equals(run_replicates(others, 0, 2)["cells"])
 
 
 @pytest.mark.parametrize("platform", ["jyro", "sim"])

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 
 from realitygap.evolution import Genome, NeatSettings, Population
 from realitygap.runs import MAZE_REWARDS, MazeTrials, run_maze
-from realitygap.runs._mazes import _EndsArchive
+from realitygap.runs._published import _EndsArchive
 from realitygap.tasks import MAZE_TASKS, MazeAgent, MazeTask
-from realitygap.tasks._mazes import UNIT
+from realitygap.tasks._published import UNIT
 from realitygap.world import Arena, Goal, Grid, Pose, load_arena
 from tests.reference import maze as reference
 from tests.reference.effort import COMPILED, cases

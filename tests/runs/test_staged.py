@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from realitygap.runs import Condition, frame_of, run_rows
+from realitygap.runs import Condition, run_replicates
 
 pytestmark = pytest.mark.slow
 
@@ -32,16 +32,16 @@ VARIANTS: list[dict[str, Any]] = [
 @pytest.mark.parametrize("variant", VARIANTS, ids=str)
 def test_staged_road_gives_the_rows_of_the_whole_run_kernel(variant: dict[str, Any]) -> None:
     condition = Condition(name="c", **{"pair": False, **variant})
-    whole = frame_of(condition, 3, run_rows(condition, 3, 37))
-    staged = frame_of(condition, 3, run_rows(condition, 3, 37, staged=True))
+    whole = run_replicates(condition, 3, 37)
+    staged = run_replicates(condition, 3, 37, staged=True)
     assert staged.equals(whole)
 
 
 def test_rows_do_not_depend_on_the_block(monkeypatch: pytest.MonkeyPatch) -> None:
     condition = Condition(name="c", selection="novelty")
-    whole = frame_of(condition, 0, run_rows(condition, 0, 40, staged=True))
+    whole = run_replicates(condition, 0, 40, staged=True)
     monkeypatch.setattr("realitygap.runs._staged.BLOCK_TRIALS", 8)
     monkeypatch.setattr("realitygap.runs._staged.LEAST_RUNS", 7)
-    assert frame_of(condition, 0, run_rows(condition, 0, 40, staged=True)).equals(whole)
-    alone = frame_of(condition, 25, run_rows(condition, 25, 1, staged=True))
+    assert run_replicates(condition, 0, 40, staged=True).equals(whole)
+    alone = run_replicates(condition, 25, 1, staged=True)
     assert alone.equals(whole.filter(whole["replicate"] == 25))

@@ -12,7 +12,7 @@ import realitygap
 from realitygap.errors import RecordError, StudyError
 from realitygap.records import ResultsFolder
 from realitygap.report import save_view, write_report
-from realitygap.runs import Condition, frame_of, replay, run_replicates, run_rows
+from realitygap.runs import Condition, replay, run_replicates
 from realitygap.study import Study, load_study, parse_study, run_study
 from realitygap.tasks import PythonTask
 
@@ -209,9 +209,9 @@ def test_a_compiled_function_reads_the_kernels_arrays_and_says_the_same(tmp_path
 @pytest.mark.slow
 def test_portions_of_trials_of_which_every_step_is_kept_change_nothing(tmp_path, monkeypatch):
     condition = with_task(tmp_path, PYTHON_TASK)
-    whole = frame_of(condition, 0, run_rows(condition, 0, 9))
+    whole = run_replicates(condition, 0, 9)
     monkeypatch.setattr("realitygap.platforms._try.TRACE_BYTES", 1)
-    assert frame_of(condition, 0, run_rows(condition, 0, 9)).equals(whole)
+    assert run_replicates(condition, 0, 9).equals(whole)
 
 
 def test_the_text_of_the_file_is_part_of_the_condition(tmp_path):

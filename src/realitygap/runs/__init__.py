@@ -1,26 +1,24 @@
 """One evolution from one seed, and many of them in parallel."""
 
-from ._classical import TaskRun, run_task
 from ._condition import NAME_PATTERN, Condition, Selection
-from ._evolution import Asked, Evolution, Told, named, population_of
-from ._mazes import MAZE_REWARDS, MazePath, MazeReward, MazeRun, MazeTrials, run_maze
+from ._evolution import Evolution, Individual, SelectionScores, named, population_of
+from ._published import MAZE_REWARDS, MazePath, MazeReward, MazeRun, MazeTrials, TaskRun, run_maze, run_task
 from ._replay import genome_of, partners_of, replay
-from ._runs import frame_of, prepare_kernels, run_replicates, run_rows
+from ._runs import prepare_kernels, run_replicates, run_rows
 
 __all__ = [
     "MAZE_REWARDS",
     "NAME_PATTERN",
-    "Asked",
     "Condition",
     "Evolution",
+    "Individual",
     "MazePath",
     "MazeReward",
     "MazeRun",
     "MazeTrials",
     "Selection",
+    "SelectionScores",
     "TaskRun",
-    "Told",
-    "frame_of",
     "genome_of",
     "named",
     "partners_of",

@@ -18,7 +18,7 @@ N_OUTPUTS = 2
 
 
 @dataclass(frozen=True)
-class Asked:
+class Individual:
     """An individual that is to be tried.
 
     Attributes:
@@ -38,7 +38,7 @@ class Asked:
 
 
 @dataclass(frozen=True)
-class Told:
+class SelectionScores:
     """The scores by which selection judges a generation.
 
     Attributes:
@@ -83,14 +83,14 @@ class Evolution:
             NoveltyArchive(condition.novelty, columns=grid.columns, rows=grid.rows) if is_novelty else None
         )
 
-    def ask(self) -> list[Asked]:
+    def ask(self) -> list[Individual]:
         """Return this generation, in the order in which `tell` wants their scores."""
         self._asked = self.generation
         condition = self._condition
         if condition.selection == "random":
-            return [Asked(named(genome, condition), 0, ()) for genome in self._unrelated()]
+            return [Individual(named(genome, condition), 0, ()) for genome in self._unrelated()]
         return [
-            Asked(
+            Individual(
                 named(genome, condition),
                 int(species),
                 tuple(int(parent) for parent in parents if parent >= 0),
@@ -100,7 +100,7 @@ class Evolution:
             )
         ]
 
-    def tell(self, scores: Sequence[float], cells: Sequence[Sequence[int]]) -> Told:
+    def tell(self, scores: Sequence[float], cells: Sequence[Sequence[int]]) -> SelectionScores:
         """Take what a generation is worth, and breed the next one.
 
         Args:
@@ -118,14 +118,14 @@ class Evolution:
             if len(given) != n:
                 raise ValueError(f"There are {what} of {len(given)} individuals, expected {n}.")
         if self._archive is None:
-            told = Told(tuple(scores), (None,) * n)
+            values = SelectionScores(tuple(scores), (None,) * n)
         else:
             novelty = tuple(float(value) for value in self._archive.update(cells))
-            told = Told(novelty, novelty)
+            values = SelectionScores(novelty, novelty)
         if self._condition.selection != "random":
-            self._population.tell(told.fitness)
+            self._population.tell(values.fitness)
         self.generation += 1
-        return told
+        return values
 
     def _unrelated(self) -> list[Genome]:
         """Return networks without parents, others in each generation."""

@@ -101,7 +101,7 @@ def _difference(condition: Condition, trajectory: Trajectory, row: Mapping[str, 
     if list(trajectory.cells) != cells:
         pairs = zip(trajectory.cells, cells, strict=False)
         place = next(
-            (k for k, (one, other) in enumerate(pairs) if one != other),
+            (k for k, (repeated, recorded) in enumerate(pairs) if repeated != recorded),
             min(len(cells), len(trajectory.cells)),
         )
         return (

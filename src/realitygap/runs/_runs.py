@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import polars as pl
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
 from realitygap._forked import use_polars
 from realitygap.errors import OutgrownError, whole_number
@@ -61,7 +61,7 @@ def run_rules(condition: Condition) -> RunRules:
 def _empty_rows(condition: Condition, n_runs: int, n_cells: int, room: int, hidden_room: int) -> RunRows:
     shape = (n_runs, condition.neat.generations, condition.neat.population)
 
-    def zeros(dtype: Any, *more: int) -> NDArray[Any]:
+    def zeros(dtype: DTypeLike, *more: int) -> NDArray[Any]:
         return np.zeros((*shape, *more), dtype)
 
     return RunRows(
@@ -179,13 +179,16 @@ def _least(condition: Condition) -> Condition:
     return condition.model_copy(update={"on": short, "neat": neat})
 
 
-def run_replicates(condition: Condition, first_replicate: int, n_runs: int) -> pl.DataFrame:
+def run_replicates(
+    condition: Condition, first_replicate: int, n_runs: int, *, staged: bool = False
+) -> pl.DataFrame:
     """Run `n_runs` runs of a condition.
 
     Args:
         condition: Condition as resolved.
         first_replicate: Number of the first run.
         n_runs: Number of runs, at least 1.
+        staged: As in `run_rows`.
 
     Returns:
         One row for each individual, with the columns of the records, sorted by replicate, generation, and individual.
@@ -194,10 +197,10 @@ def run_replicates(condition: Condition, first_replicate: int, n_runs: int) -> p
     Raises:
         TypeError, ValueError: As `run_rows`.
     """
-    return frame_of(condition, first_replicate, run_rows(condition, first_replicate, n_runs))
+    return _frame_of(condition, first_replicate, run_rows(condition, first_replicate, n_runs, staged=staged))
 
 
-def frame_of(condition: Condition, first_replicate: int, rows: RunRows) -> pl.DataFrame:
+def _frame_of(condition: Condition, first_replicate: int, rows: RunRows) -> pl.DataFrame:
     """Return the rows of runs as a frame with the columns of the records."""
     use_polars()
     n_runs, n_generations, n = rows.fitness.shape
@@ -228,7 +231,7 @@ def frame_of(condition: Condition, first_replicate: int, rows: RunRows) -> pl.Da
         }
     ).to_struct("genome")
     novelty = pl.Series("novelty", flat(rows.novelty)).fill_nan(None)
-    extra: dict[str, Any] = {}
+    extra: dict[str, pl.Series | NDArray[np.float64]] = {}
     if condition.on.records_draws:
         extra["drawn"] = list_column(flat(rows.drawn), np.full(total, rows.drawn.shape[-1]))
     if condition.coverage is None:

@@ -8,12 +8,9 @@ from typing import Any
 from realitygap.errors import did_you_mean
 from realitygap.settings import Settings
 
-from ._avoid import AvoidTask
 from ._coverage import CoverageTask
-from ._goal import GoalTask
-from ._light import LightTask
 from ._python import PYTHON, PythonTask
-from ._wall import WallTask
+from ._step_tasks import AvoidTask, GoalTask, LightTask, WallTask
 
 TASKS: dict[str, type[Settings]] = {
     "coverage": CoverageTask,

@@ -106,7 +106,7 @@ def observed_trajectories(trials: Sequence[TrialRecord], arena: Arena) -> Trajec
         coverage_ends=np.array(
             [_cells_at_ends(trial.poses, arena) / n_cells if has_poses else np.nan for trial in trials]
         ),
-        n_stalls=np.array([int(each[1:].sum()) for each in stalled], np.int32),
+        n_stalls=np.array([int(steps[1:].sum()) for steps in stalled], np.int32),
     )
 
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -136,6 +136,6 @@ class Trajectories:
         return self.readings_of("light")
 
 
-def _trials_first(array: NDArray[Any]) -> NDArray[np.float64]:
+def _trials_first(array: NDArray[np.floating]) -> NDArray[np.float64]:
     """Return an array of kernels (t, k, n) as (n, t, k)."""
     return np.ascontiguousarray(array.transpose(2, 0, 1), np.float64)

@@ -465,7 +465,7 @@ def _check_network(form: _json.NetworkForm, where: str) -> None:
     known = set(range(form.n_inputs)) | numbers
     problems = {
         "n_inputs counts the constant one, expected another besides": form.constant and form.n_inputs < 2,
-        "expected node output and hidden node once, numbered after the inputs": (
+        "expected each output and hidden node once, numbered after the inputs": (
             len(numbers) != len(form.nodes)
             or len(numbers) < form.n_outputs
             or numbers != set(range(form.n_inputs, form.n_inputs + len(numbers)))

@@ -25,17 +25,15 @@ from scipy import stats
 from realitygap.gap import (
     GapSide,
     bootstrap,
-    interval,
     mean_maximum_rank_violation,
     measure_gap,
-    plan_correlation,
     rank_violation_interval,
     rms_interval,
     square_differences,
 )
+from realitygap.stats import Ends, percentile_interval, plan_correlation
 
 Values = NDArray[np.float64]
-Interval = tuple[float | None, float | None]
 
 STUDIES = 4_000
 RESAMPLES = 400
@@ -133,7 +131,7 @@ def true_rms(setting: Setting, rng: np.random.Generator) -> float:
     return math.hypot(setting.level, setting.spread)
 
 
-def rms_ends(source: Values, target: Values, rng: np.random.Generator) -> Interval:
+def rms_ends(source: Values, target: Values, rng: np.random.Generator) -> Ends | None:
     """Return the interval of the RMS gap as `measure_gap` does, with fewer resamples."""
     squares = square_differences(source[None], target[None])[0]
     resampled = squares[rng.integers(0, len(squares), (RESAMPLES, len(squares)))].mean(axis=1)
@@ -151,20 +149,21 @@ def true_violation(setting: Setting, rng: np.random.Generator) -> float:
     return float(np.mean([violation(source[None], target[None]) for source, target in drawn]))
 
 
-def violation_ends(source: Values, target: Values, rng: np.random.Generator) -> Interval:
+def violation_ends(source: Values, target: Values, rng: np.random.Generator) -> Ends | None:
     """Return the interval of the MMRV as `measure_gap` does."""
     if violation(source[None], target[None])[0] > 0:
         return rank_violation_interval(source.mean(axis=1), target.mean(axis=1))
     sides = GapSide("sim", "SIM", source), GapSide("target", "SIM", target)
     drawn = bootstrap({"mmrv": violation}, *sides, RESAMPLES, rng, smooth=True)["mmrv"]
-    return 0.0, interval(drawn, len(source))[1]
+    ends = percentile_interval(drawn, len(source))
+    return None if ends is None else (0.0, ends[1])
 
 
-Ends = Callable[[Values, Values, np.random.Generator], Interval]
+Method = Callable[[Values, Values, np.random.Generator], Ends | None]
 Truth = Callable[[Setting, np.random.Generator], float]
 
 
-def misses(ends: Ends, truth: Truth, studies: int) -> Iterator[list[str]]:
+def misses(ends: Method, truth: Truth, studies: int) -> Iterator[list[str]]:
     """Yield the rows of a table of misses, its head first."""
     yield [
         "controllers", "trials in simulation", "on the target", "level", "spread", "differences", "truth",
@@ -173,7 +172,9 @@ def misses(ends: Ends, truth: Truth, studies: int) -> Iterator[list[str]]:
     for number, setting in enumerate(SETTINGS):
         rng = np.random.default_rng([16, number])
         true = truth(setting, rng)
-        low, high = np.array([ends(*study(setting, rng), rng) for _ in range(studies)], float).T
+        low, high = np.array(
+            [ends(*study(setting, rng), rng) or (np.nan, np.nan) for _ in range(studies)], float
+        ).T
         above, below = (f"{100 * share:.1f}" for share in ((high < true).mean(), (low > true).mean()))
         numbers = [str(each) for each in setting[:3]] + [f"{each:g}" for each in setting[3:5]]
         yield [*numbers, setting.shape, f"{true:.3f}", above, below, f"{(high - low).mean():.3f}"]

@@ -28,9 +28,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import binom
 
-from realitygap.report._effects import mean_interval
-from realitygap.report._permutation import holm
-from realitygap.report._questions import Share
+from realitygap.stats import Estimate, bca_mean, exact_share_interval, holm
 
 DOCS = Path(__file__).parent
 PAGES = (DOCS / "explanations" / "calibration.md", DOCS / "explanations" / "inference.md")
@@ -55,27 +53,31 @@ Row = dict[str, Any]
 
 def over_robots(rows: Sequence[Row]) -> str:
     """Return the 95 % interval of the share held, over robots, as the parameters of a robot are not independent."""
-    interval = mean_interval(np.array([np.mean(list(row["held"].values())) for row in rows]))
-    return "–" if interval is None else f"{100 * interval.low:.1f} to {100 * interval.high:.1f} %"
+    share = bca_mean(np.array([np.mean(list(row["held"].values())) for row in rows]))
+    return "–" if share.ends is None else f"{100 * share.low:.1f} to {100 * share.high:.1f} %"
 
 
-def held_by_name(rows: Sequence[Row]) -> dict[str, Share]:
+def held_by_name(rows: Sequence[Row]) -> dict[str, Estimate]:
     """Return for each parameter how many intervals hold it, of how many robots."""
     return {
-        name: Share(sum(row["held"][name] for row in rows), len(rows))
+        name: exact_share_interval(sum(row["held"][name] for row in rows), len(rows))
         for name in (rows[0]["held"] if rows else ())
     }
 
 
-def bounds(part: Share) -> str:
+def count(part: Estimate) -> int:
+    """Return how many of n robots a share is."""
+    return round(part.value * part.n)
+
+
+def bounds(part: Estimate) -> str:
     """Return the exact 95 % interval of a share in percent."""
-    low, high = part.interval
-    return f"{100 * low:.0f} to {100 * high:.0f} %"
+    return f"{100 * part.low:.0f} to {100 * part.high:.0f} %"
 
 
-def chance(part: Share) -> float:
+def chance(part: Estimate) -> float:
     """Return the probability of so few or fewer if the true share is the goal."""
-    return float(binom.cdf(part.count, part.n, GOAL))
+    return float(binom.cdf(count(part), part.n, GOAL))
 
 
 def below(groups: dict[str, Sequence[Row]], column: str) -> str:
@@ -93,7 +95,7 @@ def below(groups: dict[str, Sequence[Row]], column: str) -> str:
     for k in listed:
         group, name, part = found[k]
         lines.append(
-            f"| `{group}` | `{name}` | {part.count} of {part.n} | {bounds(part)} | {chances[k]:.2g} | "
+            f"| `{group}` | `{name}` | {count(part)} of {part.n} | {bounds(part)} | {chances[k]:.2g} | "
             f"{corrected[k]:.2g} |"
         )
     n = max(part.n for *_, part in found)
@@ -206,7 +208,7 @@ def each(rows: Sequence[Row]) -> str:
         for observe, some in groups.items():
             part = held[observe][name]
             near = [row["near"][name] for row in some if name in row["near"]]
-            line += [part.count, bounds(part), len(near), sum(near)]
+            line += [count(part), bounds(part), len(near), sum(near)]
         lines.append(line)
     return _csv(lines)
 
@@ -215,7 +217,7 @@ def each_of_kinds(rows: Sequence[Row]) -> str:
     """The same of calibrations of one kind of parameters."""
     lines: list[list[object]] = [["calibrate", "parameter", "robots", "held", "95 % interval"]]
     lines += [
-        [kind, name, part.n, part.count, bounds(part)]
+        [kind, name, part.n, count(part), bounds(part)]
         for kind, some in by_kind(rows).items()
         for name, part in held_by_name(some).items()
     ]

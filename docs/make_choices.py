@@ -29,7 +29,7 @@ def table(folder: ResultsFolder) -> str:
     writer.writerow(COLUMNS)
     for group in compare_choices(folder):
         for choice in group:
-            low, high = ("", "") if choice.interval is None else (choice.interval.low, choice.interval.high)
+            low, high = choice.interval or ("", "")
             numbers = [f"{value:.3f}" for value in (choice.median, low, high)]
             effect = f"{choice.effect:+.3f}".replace("-", "−")
             writer.writerow([choice.condition, choice.baseline, choice.change, choice.n, *numbers, effect])

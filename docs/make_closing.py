@@ -39,8 +39,9 @@ from realitygap.report import (
     twin_table,
     why_table,
 )
+from realitygap.stats import median_interval
 from realitygap.study import summarize_closing
-from realitygap.study._closing.summary import is_met, median_interval
+from realitygap.study._closing.summary import is_met
 
 HERE = Path(__file__).parent
 TABLES = HERE / "data" / "closing"
@@ -356,7 +357,7 @@ def kind_table(summary: dict[str, Any]) -> Iterable[Sequence[str]]:
             after = (target - source) ** 2
             left = after.mean(axis=1) - _rms(summary, observe) ** 2
             falls = _falls(before[:, part], after[:, part])
-            over_twins = median_interval(falls.tolist())
+            over_twins = median_interval(falls)
             low, high = _over_seeds(summary, before[:, part], after[:, part], halves=name == "all")
             if name == "all":
                 within = f"{_percent(np.median(1 - _rms(summary, observe) / _rms(summary, 'none')))} %"
@@ -373,8 +374,8 @@ def kind_table(summary: dict[str, Any]) -> Iterable[Sequence[str]]:
                 name,
                 observe,
                 *(f"{np.median(np.sqrt(each[:, part].mean(axis=1))):.3f}" for each in (before, after)),
-                f"{_percent(over_twins['estimate'])} %",
-                f"{_percent(over_twins['low'])} to {_percent(over_twins['high'])} %",
+                f"{_percent(over_twins.value)} %",
+                f"{_percent(over_twins.low)} to {_percent(over_twins.high)} %",
                 f"{_percent(low)} to {_percent(high)} %",
                 within,
             )

@@ -19,7 +19,8 @@ from typing import Any
 from make_closing import done_parts, results_in, table, verdicts
 
 from realitygap.report import GOAL_HEAD, draw_closing, goal_table, not_counted
-from realitygap.study._closing.summary import KINDS, median_interval, pooled_fall
+from realitygap.stats import Estimate, median_interval
+from realitygap.study._closing.summary import KINDS, pooled_fall
 
 HERE = Path(__file__).parent
 TABLES = HERE / "data" / "closing-fresh"
@@ -97,7 +98,7 @@ def again_table(stored: Summary, again: Summary) -> Iterable[Sequence[str]]:
             gaps = [(pair[0]["rms"], _gap_with(numbers, pair[0], pair[fit])) for pair in pairs]
             falls = [1 - after["estimate"] / before["estimate"] for before, after in gaps]
             figures += [
-                f"{median_interval([b['estimate'] for _, b in gaps])['estimate']:.3f}",
+                f"{median_interval([b['estimate'] for _, b in gaps]).value:.3f}",
                 *_span(median_interval(falls)),
             ]
         yield (numbers, str(len(pairs)), *figures)
@@ -134,16 +135,15 @@ def _fall(pairs: Sequence[tuple[float, float]], seeds: Sequence[str]) -> Sequenc
         [(sum(each) / len(rows)) ** 0.5 for each in zip(*rows, strict=True)] for rows in squares.values()
     ]
     pooled = pooled_fall([a for a, _ in roots], [b for _, b in roots])
-    medians = [median_interval(values)["estimate"] for values in (before, after)]
+    medians = [median_interval(values).value for values in (before, after)]
     spans = [_span(figure) for figure in (over_twins, pooled)]
     return (*(f"{value:.3f}" for value in medians), *spans[0], *spans[1])
 
 
-def _span(figure: Summary) -> tuple[str, str]:
+def _span(figure: Estimate) -> tuple[str, str]:
     """Return a share and its interval in percent."""
-    estimate, low, high = (figure[name] for name in ("estimate", "low", "high"))
-    interval = "–" if low is None else f"{_percent(low)} to {_percent(high)} %"
-    return f"{_percent(estimate)} %", interval
+    interval = "–" if figure.ends is None else f"{_percent(figure.low)} to {_percent(figure.high)} %"
+    return f"{_percent(figure.value)} %", interval
 
 
 def _percent(value: float) -> str:

@@ -23,12 +23,9 @@ import polars as pl
 
 from realitygap import ResultsFolder, run_study
 from realitygap.evolution import DISTANCES
-from realitygap.gap import Estimate
 from realitygap.report import (
     DistanceAudit,
-    Interval,
     audit_distance,
-    bca_interval,
     compare_choices,
     compare_conditions,
     draw_choices,
@@ -36,7 +33,7 @@ from realitygap.report import (
     measure_variety,
 )
 from realitygap.report._distance_audit import random_walk
-from realitygap.report._effects import difference_of_means, mean_interval
+from realitygap.stats import Ends, Estimate, bca_interval, bca_mean, difference_of_means
 
 HERE = Path(__file__).parent
 TABLES = HERE / "data" / "distances"
@@ -72,12 +69,10 @@ def weights(audits: dict[str, DistanceAudit]) -> str:
     rows = [
         [
             name,
-            f"{each.front_over_back.estimate:.2f}",
+            f"{each.front_over_back.value:.2f}",
             _span(each.front_over_back, ".2f"),
-            "all alike"
-            if each.order_correlation.estimate is None
-            else _signed(each.order_correlation.estimate),
-            "" if each.order_correlation.estimate is None else _span(each.order_correlation),
+            "all alike" if each.order_correlation.value is None else _signed(each.order_correlation.value),
+            "" if each.order_correlation.value is None else _span(each.order_correlation),
             f"{each.highest_over_lowest:.2f}",
         ]
         for name, each in audits.items()
@@ -94,7 +89,7 @@ def lengths(audits: dict[str, DistanceAudit]) -> str:
         for straight in STRAIGHT:
             usual = straight == audit.straight
             found = (audit if usual else audit_distance(name, straight=straight, n_walks=10)).confounds[0]
-            row.append(f"{_signed(found.correlation.estimate)} ({_span(found.correlation)})")
+            row.append(f"{_signed(found.correlation.value)} ({_span(found.correlation)})")
         rows.append(row)
     return _csv(["Distance", *(f"straight on {100 * each:.0f} %" for each in STRAIGHT)], rows)
 
@@ -109,7 +104,7 @@ def on_trials(study: ResultsFolder) -> str:
             rows.append(
                 [
                     name,
-                    *(f"{_signed(each.correlation.estimate)} ({_span(each.correlation)})" for each in chosen),
+                    *(f"{_signed(each.correlation.value)} ({_span(each.correlation)})" for each in chosen),
                 ]
             )
     rows.append(["shorter within longer", *(f"{100 * each.contained:.0f} %" for each in chosen)])
@@ -133,8 +128,8 @@ def coverage(study: ResultsFolder) -> str:
         ]
         if each is not None:
             row += [
-                f"{_signed(each.difference, '.3f')} ({_span(each.difference_interval, '+.3f')})",
-                f"{each.a12:.2f} ({_span(each.a12_interval, '.2f')})",
+                f"{_signed(each.size, '.3f')} ({_span(each.difference, '+.3f')})",
+                f"{each.a12.value:.2f} ({_span(each.a12, '.2f')})",
                 f"{each.p_holm:.2g}" if each.p_holm >= 1e-4 else "< 0.0001",
                 "" if each.detectable is None else f"{each.detectable:.3f}",
                 each.difference_verdict.partition(";")[0],
@@ -169,7 +164,7 @@ def behaviors(study: ResultsFolder) -> str:
             difference = "" if name == "paper" else _signed((one - other).mean())
             moved[what] = f"{difference} ({_span(interval)})" if difference else ""
         goes_with = frame["novelty"].drop_nulls().to_numpy()
-        novel = f"{_signed(goes_with.mean())} ({_span(mean_interval(goes_with))})" if len(goes_with) else ""
+        novel = f"{_signed(goes_with.mean())} ({_span(bca_mean(goes_with))})" if len(goes_with) else ""
         rows.append(
             [
                 name,
@@ -180,7 +175,7 @@ def behaviors(study: ResultsFolder) -> str:
                 f"{frame['row'].mean():.2f}",
                 moved["row"],
                 novel,
-                f"{variety[name].mean():.3f} ({_span(mean_interval(variety[name]), '.3f')})",
+                f"{variety[name].mean():.3f} ({_span(bca_mean(variety[name]), '.3f')})",
             ]
         )
     head = ["Condition", "cells of a trial", "less paper’s", "mean column", "less paper’s", "mean row"]
@@ -244,10 +239,9 @@ def _signed(value: float, form: str = "+.2f") -> str:
     return text.replace("-", "−")
 
 
-def _span(interval: Interval | Estimate | None, form: str = "+.2f") -> str:
-    if interval is None:
-        return ""
-    return " to ".join(f"{bound:{form}}".replace("-", "−") for bound in (interval.low, interval.high))
+def _span(interval: Ends | Estimate | None, form: str = "+.2f") -> str:
+    ends = interval.ends if isinstance(interval, Estimate) else interval
+    return " to ".join(f"{end:{form}}".replace("-", "−") for end in ends or ())
 
 
 def _csv(head: list[str], rows: Iterable[list[object]]) -> str:

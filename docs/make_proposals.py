@@ -17,7 +17,8 @@ from pathlib import Path
 import polars as pl
 
 from realitygap import ResultsFolder, run_study
-from realitygap.report import Interval, compare_choices, compare_conditions, draw_choices
+from realitygap.report import compare_choices, compare_conditions, draw_choices
+from realitygap.stats import Ends
 
 HERE = Path(__file__).parent
 TABLES = HERE / "data" / "proposals"
@@ -39,8 +40,8 @@ def table(folder: ResultsFolder) -> str:
             row += [f"{choice.median:.3f}", _span(choice.interval, ".3f")]
             each = compared.get((choice.condition, choice.baseline))
             if each is not None:
-                row += [_signed(each.difference), _span(each.difference_interval, "+.3f")]
-                row += [f"{each.a12:.3f}", _span(each.a12_interval, ".3f")]
+                row += [_signed(each.size), _span(each.difference.ends, "+.3f")]
+                row += [f"{each.a12.value:.3f}", _span(each.a12.ends, ".3f")]
             writer.writerow([*row, *[""] * (9 - len(row)), f"{_nodes(folder, choice.condition):.2f}"])
     return file.getvalue()
 
@@ -56,10 +57,8 @@ def _signed(value: float) -> str:
     return f"{value:+.3f}".replace("-", "−")
 
 
-def _span(interval: Interval | None, form: str) -> str:
-    if interval is None:
-        return ""
-    return f"{interval.low:{form}} to {interval.high:{form}}".replace("-", "−")
+def _span(interval: Ends | None, form: str) -> str:
+    return " to ".join(f"{end:{form}}".replace("-", "−") for end in interval or ())
 
 
 def main() -> None:

@@ -21,10 +21,10 @@ import numpy as np
 import polars as pl
 
 from realitygap import ResultsFolder, run_study, write_report
-from realitygap.report import Interval, bca_interval, compare_conditions, holm
+from realitygap.report import compare_conditions
 from realitygap.report._comparisons import MARGIN, is_within, paired_values
-from realitygap.report._effects import difference_of_means
 from realitygap.report._tally import Tally, read_tally
+from realitygap.stats import Estimate, bca_interval, difference_of_means, holm
 
 HERE = Path(__file__).parent
 TABLES = HERE / "data" / "reproduced"
@@ -112,8 +112,8 @@ def comparisons(folder: ResultsFolder) -> str:
             each.one,
             each.other,
             each.n,
-            _signed(each.difference),
-            _span(each.difference_interval),
+            _signed(each.size),
+            _span(each.difference),
             f"{each.p_holm:.2g}" if each.p_holm >= 1e-4 else "< 0.0001",
             each.difference_verdict,
             "" if each.is_shown else each.equivalence,
@@ -172,8 +172,8 @@ def _signed(value: float) -> str:
     return f"{value:+.3f}".replace("-", "−")
 
 
-def _span(interval: Interval | None) -> str:
-    return "" if interval is None else f"{_signed(interval.low)} to {_signed(interval.high)}"
+def _span(estimate: Estimate) -> str:
+    return "" if estimate.ends is None else f"{_signed(estimate.low)} to {_signed(estimate.high)}"
 
 
 def _csv(head: list[str], rows: Iterable[list[object]]) -> str:

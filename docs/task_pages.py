@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from realitygap.runs import MAZE_REWARDS
+from realitygap.stats import exact_share_interval
 from realitygap.tasks import (
     CLASSICAL_TASKS,
     MAZE_TASKS,
@@ -58,8 +59,8 @@ def resampled(statistic: Callable[..., Any], *samples: NDArray[np.float64]) -> s
 
 def share_interval(solved: int, n: int) -> str:
     """So many runs of so many, with the exact 95 % interval of their share."""
-    low, high = stats.binomtest(solved, n).proportion_ci(method="exact")
-    return f"{solved} of {n} [{low:.0%}, {high:.0%}]"
+    share = exact_share_interval(solved, n)
+    return f"{solved} of {n} [{share.low:.0%}, {share.high:.0%}]"
 
 
 def maze_line(maze: str, reward: str) -> str:
@@ -248,8 +249,8 @@ def xor_sizes() -> str:
 
 def share_failed(solved: int, n: int) -> str:
     """The share of runs that failed and its exact 95 % interval."""
-    ends = stats.binomtest(n - solved, n).proportion_ci()
-    return f"{100 * (n - solved) / n:.0f} % of {n} [{100 * ends.low:.0f}, {100 * ends.high:.0f}]"
+    share = exact_share_interval(n - solved, n)
+    return f"{100 * (n - solved) / n:.0f} % of {n} [{100 * share.low:.0f}, {100 * share.high:.0f}]"
 
 
 def ablations() -> str:

@@ -10,8 +10,9 @@ import pytest
 
 from realitygap.errors import RealityGapError
 from realitygap.evolution import NearestArchive, NoveltyArchive, NoveltySettings, PaperArchive, Population
-from realitygap.gap import Estimate, GapResult, GapSide, Why
+from realitygap.gap import GapResult, GapSide, Why
 from realitygap.records import ResultsFolder, Trial, TrialRecord
+from realitygap.stats import Estimate
 from realitygap.study import GapBetween, Strategist, TransferResult, load_study
 from realitygap.trials import Trajectory
 from realitygap.world import Calibration

@@ -16,16 +16,16 @@ from realitygap.calibration import motion_log, place_ranks
 from realitygap.emulator import BoxOnWheels, Emulator, Faults, serve_tcp
 from realitygap.errors import RealityGapError
 from realitygap.evolution import Genome, NearestArchive, NeatSettings, PaperArchive, Population
-from realitygap.gap import controllers_for_margin, equivalence_power, plan_margin
 from realitygap.logs import read_range_table
 from realitygap.platforms import JyroPlatform, SimEnsemble, SimPlatform, SimWorld, open_target, try_genomes
 from realitygap.records import TrialRecord, trial_from_dict, trial_to_dict
-from realitygap.report import audit_distance, median_interval
+from realitygap.report import audit_distance
 from realitygap.robots import Command, Observation, VirtualClock, check_command, check_observation, jyro
 from realitygap.robots.scribbler import Scribbler
 from realitygap.robots.thymio import Thymio
 from realitygap.robots.twin import sample_twin
 from realitygap.runs import Condition, Evolution
+from realitygap.stats import controllers_for_margin, equivalence_power, median_interval, plan_margin
 from realitygap.study import parse_study
 from realitygap.tasks import WallTask
 from realitygap.trials import NoiseKey, TrialPlan, run_trial

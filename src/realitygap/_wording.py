@@ -7,15 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TYPE_CHECKING
 
-
-class _Bounds(Protocol):
-    @property
-    def low(self) -> float: ...
-
-    @property
-    def high(self) -> float: ...
+if TYPE_CHECKING:  # the help of a command needs no NumPy
+    from realitygap.stats import Estimate
 
 
 @dataclass(frozen=True)
@@ -82,22 +77,21 @@ def signed(value: float, digits: int = 3) -> str:
     return text.replace("−", "±").replace("+", "±") if float(f"{value:.{digits}f}") == 0 else text
 
 
-def span(interval: _Bounds | None, digits: int = 3, *, signs: bool = False) -> str:
-    """Return bounds in words; a dash without an interval."""
-    if interval is None:
+def span(estimate: Estimate, digits: int = 3, *, signs: bool = False) -> str:
+    """Return the interval in words; a dash without one."""
+    if estimate.ends is None:
         return "–"
-    if signs:
-        return f"{signed(interval.low, digits)} to {signed(interval.high, digits)}"
-    return f"{interval.low:.{digits}f}–{interval.high:.{digits}f}"
+    low, high = (signed(end, digits) if signs else f"{end:.{digits}f}" for end in estimate.ends)
+    return f"{low} to {high}" if signs else f"{low}–{high}"
 
 
-def with_interval(value: float, interval: _Bounds | None, *, signs: bool = False) -> str:
-    """Return a number with its interval in brackets, if it has one."""
-
-    def form(number: float) -> str:
-        return signed(number) if signs else f"{number:.3f}"
-
-    return form(value) + ("" if interval is None else f" [{form(interval.low)}, {form(interval.high)}]")
+def with_interval(estimate: Estimate, *, signs: bool = False) -> str:
+    """Return a number with its interval in brackets, if it has one; a dash without a number."""
+    if estimate.value is None:
+        return "–"
+    numbers = [estimate.value, *(estimate.ends or ())]
+    value, *ends = (signed(number) if signs else f"{number:.3f}" for number in numbers)
+    return f"{value} [{ends[0]}, {ends[1]}]" if ends else value
 
 
 def p_in_words(p: float) -> str:

@@ -44,8 +44,8 @@ def test_no_gap_is_equivalent_at_a_wide_margin_and_keeps_the_order():
     found = measure_gap(*sides(), margin=0.1)
     assert not found.excludes_no_gap
     assert found.equivalence.more["equivalent"] is True
-    assert found.srcc_disattenuated.estimate > 0.9
-    assert found.mmrv.estimate <= 2 * found.mmrv_floor.estimate
+    assert found.srcc_disattenuated.value > 0.9
+    assert found.mmrv.value <= 2 * found.mmrv_floor.value
     assert "no gap is shown" in found.verdict
 
 
@@ -58,25 +58,25 @@ def test_disattenuation_by_noise_is_refused_with_the_trials_that_would_do():
     quality = np.linspace(0.28, 0.32, 20)[:, None]
     noisy = [GapSide(name, "SIM", quality + rng.normal(0, 0.1, (20, 4))) for name in ("one", "other")]
     found = measure_gap(*noisy).srcc_disattenuated
-    assert found.estimate is None
+    assert found.value is None
     assert "does not repeat its own order" in found.refused
 
 
 def test_one_trial_a_controller_carries_level_and_order_but_no_size():
     found = measure_gap(*sides(r=1))
     assert found.level.low is not None
-    assert found.srcc.estimate is not None
+    assert found.srcc.value is not None
     for name in ("rms", "noise_ceiling", "srcc_disattenuated", "mmrv_floor", "energy"):
-        assert getattr(found, name).estimate is None, name
+        assert getattr(found, name).value is None, name
         assert "2" in getattr(found, name).refused, name
     assert "is unknown" in found.verdict
 
 
 def test_four_controllers_carry_no_order_and_no_interval():
     found = measure_gap(*sides(c=4))
-    assert found.srcc.estimate is None
+    assert found.srcc.value is None
     assert "1 of 24" in found.srcc.refused
-    assert found.level.estimate is not None
+    assert found.level.value is not None
     assert found.level.low is None
     assert "at least 5 are needed" in found.level.refused
 
@@ -108,7 +108,7 @@ def test_a_side_must_be_finite_and_whole():
 def test_a_target_that_is_always_worse_leaves_a12_an_interval():
     one, other = sides(c=5, noise=0.001)
     found = measure_gap(one, GapSide("twin", "TWIN", other.values - 0.5)).a12
-    assert found.estimate == 0.0
+    assert found.value == 0.0
     assert found.low == 0.0
     assert found.high == pytest.approx(1 - 0.025 ** (1 / 5))
 

@@ -4,7 +4,13 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from realitygap.gap import mean_maximum_rank_violation, rank_violation_floor, rank_violation_interval
+from realitygap.gap import (
+    mean_maximum_rank_violation,
+    rank_violation_floor,
+    rank_violation_interval,
+    reliability,
+    trials_for_reliability,
+)
 
 # Success of RT-2-X, RT-1 (converged, 15 %), RT-1-X, RT-1 (begin) and Octo-Base in simulation (visual matching) and on
 # the robot: Li et al. (2024), as in `simpler_env/utils/metrics.py` of simpler-env/SimplerEnv.
@@ -122,3 +128,17 @@ def test_each_end_misses_at_most_5_percent_of_normal_studies(c, spread):
     low, high = np.array([rank_violation_interval(*pair) for pair in pairs]).T
     assert (low > true).sum() < 100
     assert (high < true).sum() < 100
+
+
+@pytest.mark.parametrize("trials", [5, 10])
+def test_reliability_is_the_share_of_variance_that_is_not_noise(trials):
+    # 3,000 controllers: standard error about 0.02; ranks of normal values correlate a little less
+    rng = np.random.default_rng(trials)
+    values = rng.normal(0, 1, (3_000, 1)) + rng.normal(0, 2, (3_000, trials))
+    assert reliability(values[None], rng, 20)[0] == pytest.approx(1 / (1 + 4 / trials), abs=0.04)
+
+
+def test_trials_for_a_reliability_undo_spearman_and_brown():
+    # 0.2 with 4 trials: one trial has 1/17, and 16 trials 0.5
+    assert trials_for_reliability(0.2, 4, 0.5) == 16
+    assert trials_for_reliability(0.0, 4, 0.5) is None

@@ -24,7 +24,7 @@ def test_its_mean_over_controllers_has_an_interval_at_each_step():
     found = replay_error(observed, replayed, np.repeat(np.arange(6), 2))
     spread = 2.571 * off.std(ddof=1) / np.sqrt(6)  # t with 5 degrees of freedom
     assert found.at_end.n == 6
-    assert found.at_end.estimate == pytest.approx(off.mean())
+    assert found.at_end.value == pytest.approx(off.mean())
     assert found.at_end.high == pytest.approx(off.mean() * np.exp(spread / off.mean()), rel=1e-3)
     told = found.to_dict()
     assert told["trials"] == 12

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from realitygap.gap import Estimate, Why, explain_gap
+from realitygap.gap import Why, explain_gap
+from realitygap.stats import Estimate
 
 
 def differences(falls, noise=0.0, c=12, draws=3):
@@ -19,10 +20,10 @@ def explained(apart):
 
 def test_parts_carry_what_they_take_and_add_up():
     found = explained(differences((0.2, 0.05)))
-    assert [each.estimate for each in found.falls] == pytest.approx([0.2, 0.05])
-    assert found.before.estimate == pytest.approx(0.3)
-    assert found.after.estimate == pytest.approx(0.05)
-    assert found.change.estimate == pytest.approx(-0.25)
+    assert [each.value for each in found.falls] == pytest.approx([0.2, 0.05])
+    assert found.before.value == pytest.approx(0.3)
+    assert found.after.value == pytest.approx(0.05)
+    assert found.change.value == pytest.approx(-0.25)
     assert found.order == [0, 1]
     assert found.advice.startswith("Change this next: motor, which explains most, 0.200 [0.200, 0.200]")
     assert "is outside these numbers" in found.advice

@@ -71,13 +71,13 @@ def test_three_runs_against_three_show_nothing(audit):
         assert pair.smallest_p == pytest.approx(0.1)
         assert pair.p >= 0.1
         assert not pair.can_claim
-        assert pair.a12_interval is None
-        assert pair.difference_interval is None
+        assert pair.a12.ends is None
+        assert pair.difference.ends is None
         assert pair.runs_for_a_claim == 5
         assert pair.verdict == "no claim possible; 5 runs each at least"
         assert pair.detectable > 3
     first = audit.pairs[0]
-    assert (first.one, first.other, first.a12) == ("Physical robot", "10% Noise (Sim)", 1.0)
+    assert (first.one, first.other, first.a12.value) == ("Physical robot", "10% Noise (Sim)", 1.0)
     assert (first.p, first.p_holm) == (pytest.approx(0.1), pytest.approx(0.6))
     assert audit.conditions[0].mean == pytest.approx(0.449)
     assert {each.median_low for each in audit.conditions} == {None}
@@ -98,9 +98,9 @@ def test_enough_runs_show_what_is_there(tmp_path):
     audit = audit_results(write(tmp_path / "t.csv", *rows(low=low, high=high)))
     (pair,) = audit.pairs
     assert pair.verdict == "high above low"
-    assert pair.difference_interval.high < 0
-    assert pair.a12 == 0
-    assert pair.a12_interval.method == "Newcombe", "no resample differs where all runs are above"
+    assert pair.difference.high < 0
+    assert pair.a12.value == 0
+    assert pair.a12.method == "Newcombe", "no resample differs where all runs are above"
     assert audit.denominator is None
     assert audit.doubtful == []
     assert audit.conditions[0].median_low is not None
@@ -110,8 +110,8 @@ def test_four_runs_have_newcombes_interval(tmp_path):
     audit = audit_results(write(tmp_path / "t.csv", *rows(a=[1, 2, 3, 4], b=[5, 6, 7, 8])))
     (pair,) = audit.pairs
     assert pair.p == pytest.approx(2 / 70)
-    assert pair.a12_interval.method == "Newcombe"
-    assert pair.a12_interval.high < 0.5
+    assert pair.a12.method == "Newcombe"
+    assert pair.a12.high < 0.5
     assert pair.verdict == "b above a"
 
 

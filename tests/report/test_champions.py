@@ -41,9 +41,9 @@ def test_champions_are_the_best_of_each_run_and_tried_anew(tiny_study):
 
 def test_luck_is_what_is_lost_and_few_champions_have_no_interval(tiny_study):
     found = retry_champions(tiny_study)[0]
-    assert found.luck == pytest.approx(found.reported.mean() - found.fresh.mean())
-    assert found.luck_interval is None
-    assert found.expected_interval is None
+    assert found.luck.value == pytest.approx(found.reported.mean() - found.fresh.mean())
+    assert found.luck.ends is None
+    assert found.expected_mean.ends is None
 
 
 def test_rows_of_another_key_are_not_tried(out):

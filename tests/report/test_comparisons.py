@@ -5,8 +5,9 @@ import pytest
 from scipy import stats
 
 from realitygap._wording import p_in_words, signed
-from realitygap.report import compare_conditions, holm, sign_flip_p
+from realitygap.report import compare_conditions
 from realitygap.report._comparisons import Samples
+from realitygap.stats import holm, sign_flip_p
 from tests.report.results import describe, random_runs, settings, write_results
 
 
@@ -49,11 +50,11 @@ def test_paired_runs_are_compared_in_pairs_and_numbers_are_those_of_their_method
     )
     (found,) = compare_conditions(folder)
     assert (found.one, found.other, found.n, found.n_other, found.paired) == ("b", "a", 12, 12, True)
-    assert found.difference == pytest.approx((high - low).mean() / 72)
+    assert found.difference.value == pytest.approx((high - low).mean() / 72)
     assert found.p == pytest.approx(sign_flip_p((high - low) / 72))
     assert found.p_holm == found.p
-    assert found.difference_interval.low <= found.difference <= found.difference_interval.high
-    assert found.a12_interval.method == "BCa"
+    assert found.difference.low <= found.difference.value <= found.difference.high
+    assert found.a12.method == "BCa"
     assert found.label == "SIM"
     assert found.is_shown
     assert found.verdict == "b above a"
@@ -69,9 +70,9 @@ def test_unpaired_runs_are_relabeled(out):
     assert not found.paired
     assert (found.n, found.n_other) == (6, 5)
     assert found.p == pytest.approx(2 / 462)
-    assert found.a12 == 1.0
-    assert found.a12_interval.method == "Newcombe"
-    assert found.difference_interval is None
+    assert found.a12.value == 1.0
+    assert found.a12.method == "Newcombe"
+    assert found.difference.ends is None
 
 
 def test_only_runs_that_both_have_make_pairs(out):
@@ -91,7 +92,7 @@ def test_three_runs_can_claim_nothing_however_far_apart(out):
         assert each.p == 0.25
         assert not each.can_claim
         assert not each.is_shown
-        assert each.a12_interval is None
+        assert each.a12.ends is None
         assert "no claim possible: with n = 3" in each.verdict
         assert each.runs_for_a_claim == 7
         assert each.verdict.endswith("7 runs at least")
@@ -163,8 +164,8 @@ def test_equal_runs_and_single_runs_are_no_accident(out):
     conditions = [_paired("a", noise=0.1), _paired("b", noise=0.5)]
     folder = write_results(out / "equal", conditions, {"a": _runs([20] * 12), "b": _runs([20] * 12)})
     (found,) = compare_conditions(folder)
-    assert (found.p, found.a12, found.difference, found.detectable) == (1.0, 0.5, 0.0, None)
-    assert found.difference_interval is None
+    assert (found.p, found.a12.value, found.difference.value, found.detectable) == (1.0, 0.5, 0.0, None)
+    assert found.difference.ends is None
     folder = write_results(out / "one", conditions, {"a": _runs([20]), "b": _runs([30])})
     (found,) = compare_conditions(folder)
     assert found.p == 1.0

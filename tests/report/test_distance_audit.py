@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import itertools
 import json
-import math
 import xml.etree.ElementTree as ET
 
 import numpy as np
 import pytest
-from scipy import stats
 
 from realitygap.errors import RecordError
 from realitygap.evolution import DISTANCES, sorted_cells_distance
 from realitygap.records import ResultsFolder
 from realitygap.report import NARROW, audit_distance, distance_notes, draw_distance, save_distance
-from realitygap.report._distance_audit import changed_walk, random_walk, spearman, weight_bias
+from realitygap.report._distance_audit import changed_walk, random_walk, weight_bias
 from realitygap.study import run_study
 
 pytestmark = pytest.mark.slow
@@ -68,12 +66,12 @@ def test_sorted_the_other_way_the_lower_rows_weigh_most():
 def test_the_papers_distance_is_nearly_one_of_lengths_and_jaccards_is_not(audits):
     """The second bias: Spearman's correlation near 0.94 on random walks."""
     found = {name: audit.confounds[0].correlation for name, audit in audits.items()}
-    assert 0.91 < found["paper"].estimate < 0.97
+    assert 0.91 < found["paper"].value < 0.97
     assert found["paper"].low > 0.9
     assert found["ordered"].low > 0.8
     assert found["jaccard"].high < 0.4
     assert found["alignment"].high < 0.4
-    assert abs(found["final"].estimate) < 0.15
+    assert abs(found["final"].value) < 0.15
     assert audits["paper"].confounds[0].shared > 8 * audits["jaccard"].confounds[0].shared
 
 
@@ -111,19 +109,6 @@ def test_a_random_walk_goes_from_cell_to_next_cell(straight):
             (y, x), (v, u) = divmod(one, 12), divmod(other, 12)
             assert abs(x - u) + abs(y - v) == 1
     assert len({walk[0] for walk in walks}) > 25
-
-
-def test_correlations_are_scipys_and_their_interval_is_wide_enough():
-    rng = np.random.default_rng(2)
-    covered = 0
-    for _ in range(200):
-        one, other = rng.multivariate_normal([0, 0], [[1, 0.6], [0.6, 1]], 60).T
-        found = spearman(one, other)
-        assert found.estimate == pytest.approx(stats.spearmanr(one, other)[0])
-        covered += found.low < 6 / math.pi * math.asin(0.3) < found.high
-    assert covered >= 180  # of 200; fewer than 1 in 1,000 where 95 % hold
-    assert spearman(np.ones(20), np.arange(20.0)).estimate is None
-    assert spearman(np.arange(20.0), np.arange(20.0)).low == 1.0
 
 
 def test_an_audit_is_a_function_of_its_seed(audits):

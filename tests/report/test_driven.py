@@ -168,8 +168,8 @@ def counted_twice(tmp_path, n, second):
 
 def test_two_who_see_the_same_agree_wholly(tmp_path):
     found = counted_twice(tmp_path, 3, lambda cells: cells[::-1])
-    assert (found.n_trials, found.n_cells, found.same, found.kappa) == (3, 216, 1.0, 1.0)
-    assert found.low is None, "no interval of three trials"
+    assert (found.n_trials, found.n_cells, found.same, found.kappa.value) == (3, 216, 1.0, 1.0)
+    assert found.kappa.ends is None, "no interval of three trials"
 
 
 def test_kappa_is_that_of_the_table(tmp_path):
@@ -182,9 +182,9 @@ def test_kappa_is_that_of_the_table(tmp_path):
     n, more = 12 * 72, 12
     observed = (n - more) / n
     expected = (both * (both + more) + (n - both) * (n - both - more)) / n**2
-    assert found.kappa == pytest.approx((observed - expected) / (1 - expected))
-    assert found.low < found.kappa < found.high
-    assert f"{found.kappa:.3f}" in found.sentence
+    assert found.kappa.value == pytest.approx((observed - expected) / (1 - expected))
+    assert found.kappa.low < found.kappa.value < found.kappa.high
+    assert f"{found.kappa.value:.3f}" in found.sentence
 
 
 def test_agreement_needs_trials_counted_by_two_people(tmp_path):

@@ -8,7 +8,7 @@ import re
 import pytest
 
 from realitygap.errors import RecordError
-from realitygap.gap import Estimate, Why
+from realitygap.gap import Why
 from realitygap.report import (
     draw_gap_maps,
     draw_gap_pairs,
@@ -17,6 +17,7 @@ from realitygap.report import (
     refuse_gap_page,
     write_gap_report,
 )
+from realitygap.stats import Estimate
 from realitygap.study import GapBetween, gap_between
 
 pytestmark = pytest.mark.slow
@@ -38,7 +39,7 @@ def test_the_page_has_verdict_measures_figures_and_no_address(gap, tmp_path):
     page = path.read_text("utf-8")
     assert gap.study.result.verdict.split(",")[0] in page
     assert page.count("<figure") == 5
-    assert f"{gap.study.result.rms.estimate:.3f}" in page
+    assert f"{gap.study.result.rms.value:.3f}" in page
     assert "Change this next: motor" in page
     assert not re.search(r"(?:src|href)=\"(?!#)", page)
     (script,) = re.findall(r"<script>(.*?)</script>", page, re.S)

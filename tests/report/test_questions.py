@@ -10,7 +10,6 @@ from realitygap.evolution import sorted_cells_distance
 from realitygap.report import chance_of_best, measure_variety
 from realitygap.report._questions import (
     MOST_BEHAVIORS,
-    Share,
     chances,
     mean_jaccard_distance,
     mean_sorted_distance,
@@ -19,6 +18,7 @@ from realitygap.report._questions import (
     spreads,
 )
 from realitygap.report._tally import read_tally
+from realitygap.stats import exact_share_interval
 from tests.report.results import describe, random_runs, settings, write_results
 
 POINTS = np.array([(column, row) for column in range(12) for row in range(6)], float)
@@ -37,7 +37,7 @@ def test_a_plateau_is_no_better_trial_in_the_last_half_of_the_generations(out):
     falls = [[0.5], [0.2], [0.1], [0.1], [0.1]]
     tally = _tally(out, {"c": [rises, stays, falls]})
     assert plateau_length(5) == 2
-    assert plateaus(tally, "c") == Share(2, 3)
+    assert plateaus(tally, "c") == exact_share_interval(2, 3)
 
 
 def test_one_generation_has_no_plateau(out):
@@ -46,7 +46,7 @@ def test_one_generation_has_no_plateau(out):
 
 def test_share_has_the_exact_interval():
     # Clopper & Pearson's bounds for 0 of 10: 1 - 0.025^(1/10)
-    low, high = Share(0, 10).interval
+    low, high = exact_share_interval(0, 10).ends
     assert low == 0
     assert high == pytest.approx(1 - 0.025**0.1)
 
@@ -56,18 +56,18 @@ def test_spreads_are_against_the_first_noise_level_of_a_selection(out):
     wide = [[[k / 72]] for k in [15, 18, 21, 24, 27, 30] * 3]
     first, second = spreads(_tally(out, {"a": narrow, "b": wide}))
     assert (first.reference, second.reference) == ("a", "a")
-    assert math.isnan(first.ratio)
-    assert second.ratio == pytest.approx(3)
-    assert second.robust_ratio == pytest.approx(3)
-    assert second.ratio_interval.low <= 3 <= second.ratio_interval.high
+    assert first.ratio.value is None
+    assert second.ratio.value == pytest.approx(3)
+    assert second.robust_ratio.value == pytest.approx(3)
+    assert second.ratio.low <= 3 <= second.ratio.high
     assert second.deviation == pytest.approx(np.std([row[0][0] for row in wide], ddof=1))
 
 
 def test_few_runs_have_a_ratio_and_no_interval(out):
     _, second = spreads(_tally(out, {"a": random_runs(3), "b": random_runs(3, seed=1)}))
-    assert second.ratio > 0
-    assert second.ratio_interval is None
-    assert second.robust_interval is None
+    assert second.ratio.value > 0
+    assert second.ratio.ends is None
+    assert second.robust_ratio.ends is None
 
 
 def _behaviors(seed, n=9):

@@ -189,10 +189,10 @@ def test_luck_and_what_was_evolved_apart_are_no_part_of_the_transfer_gap(some):
     ]
     plain = run_gap(sim(), sim(), some, trials=2)
     apart = run_gap(sim(), sim(), champions, trials=2, reevolved=champions)
-    assert apart.luck.estimate == pytest.approx(0.1)
-    assert apart.reevolved.estimate == pytest.approx(apart.level.estimate, abs=0.03)
-    assert plain.luck.estimate is None
-    assert plain.reevolved.estimate is None
+    assert apart.luck.value == pytest.approx(0.1)
+    assert apart.reevolved.value == pytest.approx(apart.level.value, abs=0.03)
+    assert plain.luck.value is None
+    assert plain.reevolved.value is None
     assert apart.rms == plain.rms
 
 
@@ -223,12 +223,10 @@ def test_the_part_that_differs_carries_the_gap():
     )  # fmt: skip
     found = why_gap(calibration, ARENA, [each.genome for each in controllers], target, draws=2, trials=4)
     falls = dict(zip(found.parts, found.falls, strict=True))
-    assert found.after.estimate < 0.5 * found.before.estimate
-    assert falls["turn per step"].estimate == pytest.approx(
-        found.before.estimate - found.after.estimate, abs=1e-6
-    )
-    assert falls["contact"].estimate == 0.0  # the fit did not change it
-    assert falls["body"].estimate == 0.0
+    assert found.after.value < 0.5 * found.before.value
+    assert falls["turn per step"].value == pytest.approx(found.before.value - found.after.value, abs=1e-6)
+    assert falls["contact"].value == 0.0  # the fit did not change it
+    assert falls["body"].value == 0.0
     assert "Change this next: " in found.advice
 
 
@@ -241,7 +239,7 @@ def test_why_has_the_commands_of_the_calibration_last_as_long_as_they_did():
     )  # fmt: skip
     genomes = [each.genome for each in controllers]
     said, given, other = (
-        why_gap(calibration, ARENA, genomes, target, trials=2, **more).before.estimate
+        why_gap(calibration, ARENA, genomes, target, trials=2, **more).before.value
         for more in ({}, {"step_s": 1.0}, {"step_s": 0.5})
     )
     assert said == given != other
@@ -363,7 +361,7 @@ def test_re_evolved_is_only_what_evolved_there(some):
         "were evolved on jyro"
         in run_gap(sim(), sim(), elsewhere, trials=2, reevolved=there).reevolved.refused
     )
-    assert run_gap(sim(), sim(), there, trials=2, reevolved=there).reevolved.estimate is not None
+    assert run_gap(sim(), sim(), there, trials=2, reevolved=there).reevolved.value is not None
 
 
 def test_kept_trials_of_another_simulator_are_not_taken(some, tmp_path):

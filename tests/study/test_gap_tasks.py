@@ -46,7 +46,7 @@ def test_champions_bring_their_task_their_arena_and_their_luck(results, tmp_path
         found = gap_between("sim", "sim", controllers=results[kind], n_controllers=5, trials=2)
         assert found.study.task.name == kind
         assert found.study.arena.name == arena
-        assert found.study.result.luck.estimate is not None
+        assert found.study.result.luck.value is not None
         champions = found.study.controllers
         assert found.study.source.means == pytest.approx([each.fresh_score for each in champions], abs=0.15)
         page = write_gap_report(found, tmp_path / "gap.html").read_text()

@@ -82,9 +82,9 @@ def test_quality_is_the_mean_of_fresh_trials_and_regret_what_is_missing_to_the_b
     found, _, folder = result
     best = max(np.mean(each.scores) for each in found.champions)
     for row, champion in zip(found.strategies, found.champions, strict=True):
-        assert row.quality.estimate == pytest.approx(np.mean(champion.scores))
-        assert row.regret.estimate == pytest.approx(best - np.mean(champion.scores))
-        assert row.quality.low <= row.quality.estimate <= row.quality.high
+        assert row.quality.value == pytest.approx(np.mean(champion.scores))
+        assert row.regret.value == pytest.approx(best - np.mean(champion.scores))
+        assert row.quality.low <= row.quality.value <= row.quality.high
     assert json.loads((folder / "result.json").read_text())["best_known"] == pytest.approx(best)
 
 
@@ -263,7 +263,7 @@ def test_evolution_in_the_true_simulator_does_better_than_plain(calibration, tmp
         "sim-paper", CountingTarget(), ["plain", "calibrated"], 6, out=tmp_path, calibration=calibration,
         runs=40, repeats=4, fresh_trials=10, replicates=4,
     )  # fmt: skip
-    plain, calibrated = (row.quality.estimate for row in found.strategies)
+    plain, calibrated = (row.quality.value for row in found.strategies)
     assert calibrated > plain + 0.03
 
 
@@ -301,7 +301,7 @@ def test_summary_keeps_strategies_and_budgets_apart():
         ("b", 1, 1),
     ]
     assert best == pytest.approx(0.7)
-    assert rows[0].regret.estimate == pytest.approx(0.5)
+    assert rows[0].regret.value == pytest.approx(0.5)
 
 
 def test_nsga2_puts_fronts_first_and_ends_of_a_front_before_its_middle():
@@ -348,7 +348,7 @@ def test_regret_is_to_the_best_that_the_folder_knows(result, calibration, tmp_pa
     alone = transfer("sim-paper", target, ["plain"], [8], out=folder, calibration=calibration, **SMALL)
     assert alone.best_known == pytest.approx(best)
     plain = next(row for row in found.strategies if row.strategy == "plain")
-    assert alone.strategies[0].regret.estimate == pytest.approx(plain.regret.estimate)
+    assert alone.strategies[0].regret.value == pytest.approx(plain.regret.value)
 
 
 def test_intervals_of_few_replicates_cover_as_often_as_they_say():

@@ -17,9 +17,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
-from realitygap import _special as special
 from realitygap.world import RobotModel
 
 from ._evidence import Evidence, Vectors
@@ -138,11 +138,11 @@ def _draw(rng: np.random.Generator, low: Floats, high: Floats, n: int) -> Floats
     ranks = np.argsort(rng.uniform(size=(len(low), n)), axis=1).T
     u = (ranks + rng.uniform(size=ranks.shape)) / n
     return np.asarray(
-        special.ndtri(
+        scipy.special.ndtri(
             np.clip(
-                special.ndtr(low) + u * (special.ndtr(high) - special.ndtr(low)),
-                special.ndtr(-END),
-                special.ndtr(END),
+                scipy.special.ndtr(low) + u * (scipy.special.ndtr(high) - scipy.special.ndtr(low)),
+                scipy.special.ndtr(-END),
+                scipy.special.ndtr(END),
             )
         )
     )

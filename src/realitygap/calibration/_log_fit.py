@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-
-from realitygap import _special as special
+import scipy
 
 from ._log_checks import Contradictions, contradictions
 from ._log_model import MotionLog, encoder_likelihood, pose_likelihood, wheel_ways
@@ -363,8 +362,8 @@ def _draw_above(
 def _normal_above(low: float, rng: np.random.Generator) -> float:
     """Return a draw from a standard normal distribution above `low`."""
     if low < 4.0:
-        below = float(special.ndtr(low))
-        return float(special.ndtri(below + (1.0 - below) * rng.uniform(1e-12, 1.0 - 1e-12)))
+        below = float(scipy.special.ndtr(low))
+        return float(scipy.special.ndtri(below + (1.0 - below) * rng.uniform(1e-12, 1.0 - 1e-12)))
     return low + float(rng.exponential(1.0 / low))
 
 

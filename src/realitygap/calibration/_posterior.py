@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-
-from realitygap import _special as special
+import scipy
 
 from ._scatter import NoisePrior
 from ._simulate import Floats, Ints
@@ -65,10 +64,10 @@ def _cut_normal(rng: np.random.Generator, slope: float, scale: float, room: tupl
 
 
 def _between(rng: np.random.Generator, a: float, b: float) -> float:
-    lower, upper = special.ndtr(a), special.ndtr(b)
+    lower, upper = scipy.special.ndtr(a), scipy.special.ndtr(b)
     if upper - lower < 1e-290:
         return b
-    return float(np.clip(special.ndtri(rng.uniform(lower, upper)), a, b))
+    return float(np.clip(scipy.special.ndtri(rng.uniform(lower, upper)), a, b))
 
 
 def walk(
@@ -157,7 +156,7 @@ def _shares(rng: np.random.Generator, n: int, k: int) -> Floats:
 
 def _few(k: int) -> float:
     """Return the factor by which k reweighted clusters spread too little: Student's interval over the normal one."""
-    return float(special.stdtrit(k - 1, 0.95) / special.ndtri(0.95) * np.sqrt(k / (k - 1)))
+    return float(scipy.special.stdtrit(k - 1, 0.95) / scipy.special.ndtri(0.95) * np.sqrt(k / (k - 1)))
 
 
 def _weighed_anew(rng: np.random.Generator, logs: Floats, proposed: Floats, n: int) -> Ints:

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
-from realitygap import _special as special
 from realitygap.world import Distribution, RobotModel
 
 Floats = NDArray[np.float64]
@@ -67,14 +67,14 @@ def standard_of(prior: Sequence[Parameter], values: Mapping[str, Floats]) -> Flo
     places = [
         (p.scale(np.asarray(values[p.name], np.float64)) - p.scale(p.prior.lowest)) / p.width for p in prior
     ]
-    least = special.ndtr(-4.0)
-    return np.asarray(special.ndtri(np.clip(np.stack(places, axis=1), least, 1 - least)))
+    least = scipy.special.ndtr(-4.0)
+    return np.asarray(scipy.special.ndtri(np.clip(np.stack(places, axis=1), least, 1 - least)))
 
 
 def values_of(prior: Sequence[Parameter], standard: Floats) -> dict[str, Floats]:
     """Return (m,) values of each parameter from points (m, p) on that scale."""
     return {
-        p.name: p.prior.of(np.minimum(special.ndtr(z), 1 - 1e-12))
+        p.name: p.prior.of(np.minimum(scipy.special.ndtr(z), 1 - 1e-12))
         for p, z in zip(prior, standard.T, strict=True)
     }
 

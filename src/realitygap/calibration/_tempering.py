@@ -9,9 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-
-from realitygap import _special as special
 
 Array = NDArray[np.float64]
 
@@ -64,7 +63,9 @@ def _step(values: Array, most: float) -> float:
 
     def kept(step: float) -> float:
         logs = step * values
-        return float(np.exp(2 * special.logsumexp(logs) - special.logsumexp(2 * logs))) / len(values)
+        return float(np.exp(2 * scipy.special.logsumexp(logs) - scipy.special.logsumexp(2 * logs))) / len(
+            values
+        )
 
     if kept(most) >= KEPT:
         return most

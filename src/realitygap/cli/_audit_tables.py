@@ -11,7 +11,8 @@ from realitygap._numbers import significant
 from ._tables import table_of
 
 if TYPE_CHECKING:
-    from realitygap.report import Audit, Interval
+    from realitygap.report import Audit
+    from realitygap.stats import Estimate
 
 _PROBLEMS = {"impossible": "no k/{n}", "cut": "cut, not rounded", "raised": "raised, not rounded"}
 
@@ -72,7 +73,7 @@ def pairs_table(audit: Audit) -> Table:
         _row(
             table,
             f"{each.one} -\n{each.other}",
-            f"{each.a12:.2f}\n{_interval(each.a12_interval)}",
+            f"{each.a12.value:.2f}\n{_interval(each.a12)}",
             f"{each.p:.2g}",
             f"{each.p_holm:.2g}",
             f"{each.smallest_p:.2g}",
@@ -82,8 +83,8 @@ def pairs_table(audit: Audit) -> Table:
     return table
 
 
-def _interval(interval: Interval | None) -> str:
-    return "[none]" if interval is None else f"[{interval.low:.2f}, {interval.high:.2f}]"
+def _interval(share: Estimate) -> str:
+    return "[none]" if share.ends is None else f"[{share.low:.2f}, {share.high:.2f}]"
 
 
 def _columns(table: Table, words: list[str], numbers: list[str]) -> None:

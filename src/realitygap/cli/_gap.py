@@ -18,7 +18,8 @@ from ._code import AllowPlatforms
 from ._json import print_json
 
 if TYPE_CHECKING:
-    from realitygap.gap import Estimate, GapResult, ReplayError, Why
+    from realitygap.gap import GapResult, ReplayError, Why
+    from realitygap.stats import Estimate
     from realitygap.study import GapPlan
     from realitygap.trials import PortObserver
 
@@ -264,7 +265,7 @@ def _print(result: GapResult, replay: ReplayError | None) -> None:
 
 
 def _print_row(title: str, found: Estimate) -> None:
-    number = "-" if found.estimate is None else f"{found.estimate:.3f}"
+    number = "-" if found.value is None else f"{found.value:.3f}"
     ends = "" if found.low is None else f"[{found.low:.3f}, {found.high:.3f}]"
     p = found.more.get("p")
     more = "" if p is None else p_equation(p)
@@ -281,7 +282,7 @@ def _print_why(why: Why) -> None:
     for k in why.order:
         fall, n = why.falls[k], why.numbers[k]
         ends = "" if fall.low is None else f"[{fall.low:.3f}, {fall.high:.3f}]"
-        echo(f"  {why.parts[k]:16}{fall.estimate:>8.3f}  {ends:17} {n} number{'s' if n != 1 else ''}")
+        echo(f"  {why.parts[k]:16}{fall.value:>8.3f}  {ends:17} {n} number{'s' if n != 1 else ''}")
     echo(why.advice)
 
 

@@ -13,7 +13,7 @@ from ._code import AllowPlatforms
 from ._json import print_json
 
 if TYPE_CHECKING:
-    from realitygap.gap import Estimate
+    from realitygap.stats import Estimate
     from realitygap.study import TransferResult
 
 
@@ -153,7 +153,7 @@ def transfer(
 
 def _with_interval(found: Estimate) -> str:
     ends = "" if found.low is None else f" ({found.low:.3f} to {found.high:.3f})"
-    return f"{found.estimate:.3f}{ends}"
+    return f"{found.value:.3f}{ends}"
 
 
 def _print(result: TransferResult) -> None:

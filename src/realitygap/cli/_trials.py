@@ -308,6 +308,6 @@ def _agreement(folder: Path, *, as_json: bool) -> None:
 
     found = measure_agreement(folder)
     if as_json:
-        print_json(vars(found))
+        print_json(found.to_dict())
         return
     echo(found.sentence)

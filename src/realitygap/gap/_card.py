@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from realitygap.drawing import Bar, Card, Disc, Ink, Line, Picture, Shape, Table, Text, card_of
+from realitygap.stats import Estimate
 
-from ._estimate import Estimate
 from ._result import SHOWN, GapResult
 from ._side import GapSide
 
@@ -24,9 +24,9 @@ def gap_card(result: GapResult, pictures: Sequence[Picture] = ()) -> Card:
         found = [(each.title, getattr(result, each.name)) for each in SHOWN if each.name in kind]
         axis = _axis([one for _, one in found])
         rows += [
-            [title, str(one), Bar(one.estimate, one.low, one.high, *axis)]
+            [title, str(one), Bar(one.value, one.low, one.high, *axis)]
             for title, one in found
-            if one.estimate is not None
+            if one.value is not None
         ]
     every = [
         [each.title, str(one), str(one.n), one.refused or each.meaning.format(score=result.score)]
@@ -51,7 +51,7 @@ def gap_card(result: GapResult, pictures: Sequence[Picture] = ()) -> Card:
 
 def _axis(estimates: Sequence[Estimate]) -> tuple[float, float]:
     """Return the ends of an axis that has 0 and all of these."""
-    numbers = [value for one in estimates for value in (one.estimate, one.low, one.high) if value is not None]
+    numbers = [value for one in estimates for value in (one.value, one.low, one.high) if value is not None]
     return min(0.0, *numbers) if numbers else 0.0, max(0.0, *numbers) if numbers else 1.0
 
 

@@ -4,20 +4,37 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
-from . import _bootstrap
-from ._bootstrap import SMALLEST_N, bootstrap, bootstrap_mean, interval
-from ._bounded import range_of_differences
-from ._correlation import reliability, spearman, trials_for_reliability
-from ._energy import ALPHA, energy_distances, energy_test, smallest_energy_p
-from ._equivalence import POWER, prove_equivalence
-from ._estimate import CONFIDENCE, Estimate
-from ._level import mean_difference, rms_of, shares_above, square_differences
-from ._rank_violation import mean_maximum_rank_violation, rank_violation_floor, rank_violation_interval
+from realitygap.stats import (
+    ALPHA,
+    POWER,
+    SMALLEST_N,
+    Ends,
+    Estimate,
+    Method,
+    exact_share_interval,
+    percentile_interval,
+    prove_equivalence,
+    range_of_differences,
+    resampled_means,
+    spearman,
+)
+
+from . import _resampling
+from ._behavior import energy_distances, energy_test, smallest_energy_p
+from ._level import mean_difference, rms_interval, rms_of, shares_above, square_differences
+from ._order import (
+    mean_maximum_rank_violation,
+    rank_violation_floor,
+    rank_violation_interval,
+    reliability,
+    trials_for_reliability,
+)
+from ._resampling import bootstrap
 from ._result import GapResult
-from ._rms_interval import rms_interval
 from ._side import GapSide, Values
 
 SEED = 7
@@ -30,6 +47,10 @@ LEAST_RELIABILITY = 0.2
 
 WANTED_RELIABILITY = 0.5
 """Reliability for which the required number of trials is reported."""
+
+_NO_ORDER_LEFT = (
+    "Noise leaves no order in most resamples, so there is no interval. Drive more trials of each controller."
+)
 
 _FEW_SPLITS = 6
 """Halves in each resample, whose number makes up for how few they are."""
@@ -110,7 +131,7 @@ class _Work:
 
     def _draw_orders(self) -> None:
         """Add statistics of ranks, and the reliability of both sides of the same resamples."""
-        ranks: dict[str, _bootstrap.Statistic] = {"srcc": _srcc}
+        ranks: dict[str, _resampling.Statistic] = {"srcc": _srcc}
         if _mmrv(*self.pair)[0] == 0:  # any other violation has an interval without resamples
             ranks["mmrv"] = _mmrv
         if self.fewest >= 2:
@@ -127,16 +148,19 @@ class _Work:
     def _estimate(
         self, value: float, drawn: Values, change: Callable[[Values], Values] | None = None
     ) -> Estimate:
-        low, high = interval(drawn, self.n)
-        if change is not None and low is not None and high is not None:
-            low, high = (float(change(np.array(end))) for end in (low, high))
-        return self._with_ends(value, low, high)
+        ends = percentile_interval(drawn, self.n)
+        if change is not None and ends is not None:
+            low, high = change(np.array(ends))
+            ends = float(low), float(high)
+        return self._with_ends(value, ends)
 
-    def _with_ends(self, value: float, low: float | None, high: float | None) -> Estimate:
-        if low is None or high is None:
-            return Estimate(value, None, None, self.n, _no_interval(self.n))
+    def _with_ends(self, value: float, ends: Ends | None, method: Method = "percentiles") -> Estimate:
+        if ends is None and self.n < SMALLEST_N:
+            return Estimate.of_few(value, self.n, SMALLEST_N, "controllers")
+        if ends is None:
+            return Estimate(value, None, None, self.n, _NO_ORDER_LEFT)
         # a statistic of ranks lies lower in resamples than in the sample; no interval leaves its estimate out
-        return Estimate(value, min(low, value), max(high, value), self.n)
+        return Estimate(value, min(ends[0], value), max(ends[1], value), self.n, method=method)
 
     # level
 
@@ -156,24 +180,17 @@ class _Work:
             )
         squares = square_differences(*self.pair)[0]
         value = float(rms_of(squares.mean()))
-        resampled = bootstrap_mean(squares, self.n_resamples, self.rng.spawn(1)[0])
-        return self._with_ends(
-            value,
-            *rms_interval(
-                self.target.means - self.source.means, squares, resampled, most=self.differences[1]
-            ),
-        )
+        resampled = resampled_means(squares, self.n_resamples, self.rng.spawn(1)[0])
+        differences = self.target.means - self.source.means
+        return self._with_ends(value, rms_interval(differences, squares, resampled, most=self.differences[1]))
 
     def a12(self) -> Estimate:
         shares = shares_above(self.source.values, self.target.values)
         value = float(shares.mean())
         if self.n >= SMALLEST_N and value in (0.0, 1.0):
-            # all samples are alike; so many controllers could have come out so of a share a little off: Clopper &
-            # Pearson (1934)
-            off = 1 - ((1 - CONFIDENCE) / 2) ** (1 / self.n)
-            low, high = (1 - off, 1.0) if value else (0.0, off)
-            return Estimate(value, low, high, self.n)
-        return self._estimate(value, bootstrap_mean(shares, self.n_resamples, self.rng))
+            # all samples are alike; so many controllers could have come out so of a share a little off
+            return exact_share_interval(self.n if value else 0, self.n)
+        return self._estimate(value, resampled_means(shares, self.n_resamples, self.rng))
 
     # order
 
@@ -202,7 +219,7 @@ class _Work:
         value = float(_mmrv(*self.pair)[0])
         if value == 0:
             return self._estimate(value, self.drawn["mmrv"])
-        return self._with_ends(value, *rank_violation_interval(self.source.means, self.target.means))
+        return self._with_ends(value, rank_violation_interval(self.source.means, self.target.means), "t")
 
     def _no_halves(self) -> Estimate | None:
         if self.fewest < 2:
@@ -225,7 +242,7 @@ class _Work:
             ratios = drawn["srcc"] / np.sqrt(drawn["source"] * drawn["target"])
         value = float(_srcc(*self.pair)[0] / np.sqrt(np.prod(self.reliabilities)))
         found = self._estimate(_within_one(value), ratios, lambda end: np.clip(end, -1.0, 1.0))
-        return Estimate(found.estimate, found.low, found.high, found.n, found.refused, {"unclipped": value})
+        return replace(found, more={"unclipped": value})
 
     def _unreliable(self) -> Estimate | None:
         for side, found in zip((self.source, self.target), self.reliabilities, strict=True):
@@ -258,7 +275,9 @@ class _Work:
                 self.n, "An energy distance needs 2 trials of each controller on both sides."
             )
         distances = energy_distances(one, other)
-        found = self._estimate(float(distances.mean()), bootstrap_mean(distances, self.n_resamples, self.rng))
+        found = self._estimate(
+            float(distances.mean()), resampled_means(distances, self.n_resamples, self.rng)
+        )
         smallest = smallest_energy_p(self.n, self.source.trials, self.target.trials)
         p = energy_test(one, other, self.rng) if smallest < ALPHA else None
         more = {"p": p}
@@ -267,7 +286,7 @@ class _Work:
             if p is not None
             else f"The number of trials allows no p below {smallest:.2f}; twice as many do. "
         )
-        return Estimate(found.estimate, found.low, found.high, self.n, (why + found.refused).strip(), more)
+        return replace(found, refused=(why + found.refused).strip(), more=more)
 
     # equivalence
 
@@ -279,16 +298,16 @@ class _Work:
                 margin=margin,
             )
         found = prove_equivalence(self.target.means - self.source.means, margin, self.source.score_range)
-        more = {"margin": margin, "equivalent": found.equivalent}
+        more: dict[str, float | None] = {"margin": margin, "equivalent": found.equivalent}
         why = ""
         if margin is None:
             why = "No margin was given (--margin), so equivalence is not tested."
         else:
             more["p"] = found.p
-            if not found.equivalent and found.power < POWER:
+            if not found.equivalent and (found.power or 0.0) < POWER:
                 more["equivalent"] = None
-                why = _too_few(self.n, margin, found.power, found.needed)
-        return Estimate(found.difference, found.low, found.high, self.n, why, more)
+                why = _too_few(self.n, margin, found.power or 0.0, found.needed)
+        return replace(found.difference, refused=why, more=more, needed=found.needed if why else None)
 
 
 def _too_few(n: int, margin: float, power: float, needed: int | None) -> str:
@@ -297,15 +316,6 @@ def _too_few(n: int, margin: float, power: float, needed: int | None) -> str:
         f"{n} controllers show equivalence at ±{margin:g} in {100 * power:.0f} of 100 studies, even if there "
         f"is no difference; {would}."
     )
-
-
-def _no_interval(n: int) -> str:
-    if n >= SMALLEST_N:
-        return (
-            "Noise leaves no order in most resamples, so there is no interval. Drive more trials of each "
-            "controller."
-        )
-    return f"{n} controllers are too few for an interval; at least {SMALLEST_N} are needed."
 
 
 def _within_one(value: float) -> float:

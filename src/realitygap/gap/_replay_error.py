@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ._estimate import Estimate
-from ._means import mean_of
+from realitygap.stats import Estimate, mean_interval
+
 from ._side import Values
 
 
@@ -48,14 +48,15 @@ class ReplayError:
             most = np.pi if "heading" in name else np.inf
             found = [self._mean(step, most) for step in getattr(self, name).T]
             values[name] = {
-                end: [getattr(each, end) for each in found] for end in ("estimate", "low", "high")
+                name: [getattr(step, end) for step in found]
+                for name, end in (("estimate", "value"), ("low", "low"), ("high", "high"))
             }
         return values
 
     def _mean(self, values: Values, most: float) -> Estimate:
         """Return the mean of (m,) values from 0 to `most`; trials of one controller count as one."""
         _, which, n = np.unique(self.controllers, return_inverse=True, return_counts=True)
-        return mean_of(np.bincount(which, values) / n, (0.0, most))
+        return mean_interval(np.bincount(which, values) / n, (0.0, most))
 
 
 def replay_error(

@@ -7,8 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from realitygap.drawing import ShownAsCard
-
-from ._estimate import Estimate
+from realitygap.stats import Estimate
 
 COVERAGE = "coverage"
 """The score of the paper's task."""
@@ -198,10 +197,10 @@ def _verdict_of(result: GapResult) -> str:
 
 def _size(result: GapResult) -> str:
     rms, level = result.rms, result.level
-    if rms.estimate is None:
+    if rms.value is None:
         return "the size of the gap is unknown" + _side_if_any(level)
     if rms.high is None:
-        return f"the transfer gap is {rms.estimate:.3f} RMS, from too few controllers for an interval"
+        return f"the transfer gap is {rms.value:.3f} RMS, from too few controllers for an interval"
     if not result.excludes_no_gap:
         return f"no gap is shown (RMS at most {rms.high:.3f})"
     side = _side(level)
@@ -214,22 +213,22 @@ def _side_if_any(level: Estimate) -> str:
 
 
 def _side(level: Estimate) -> str:
-    if level.estimate is None or level.low is None or level.high is None:
+    if level.value is None or level.low is None or level.high is None:
         return ""
     if level.high < 0:
-        return f", and the target does worse by {-level.estimate:.3f}"
+        return f", and the target does worse by {-level.value:.3f}"
     if level.low > 0:
-        return f", and the target does better by {level.estimate:.3f}"
+        return f", and the target does better by {level.value:.3f}"
     return ", to both sides"
 
 
 def _order(result: GapResult) -> str:
     raw, ceiling = result.srcc, result.noise_ceiling
-    if raw.estimate is None:
+    if raw.value is None:
         return ""
-    if ceiling.estimate is None or result.srcc_disattenuated.estimate is None:
-        return f"the correlation over controllers is {raw.estimate:.2f}"
-    return f"the correlation over controllers is {raw.estimate:.2f} where noise allows {ceiling.estimate:.2f}"
+    if ceiling.value is None or result.srcc_disattenuated.value is None:
+        return f"the correlation over controllers is {raw.value:.2f}"
+    return f"the correlation over controllers is {raw.value:.2f} where noise allows {ceiling.value:.2f}"
 
 
 def _equivalence(found: Estimate) -> str:

@@ -7,13 +7,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from realitygap import _special as special
 from realitygap.errors import finite_numbers
+from realitygap.stats import CONFIDENCE, UNBOUNDED, Range, t_interval
 
-from ._bounded import UNBOUNDED, Range, Values, bounded_interval
-from ._estimate import CONFIDENCE
-
-__all__ = ["GapSide", "Values"]
+Values = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -74,8 +71,8 @@ class GapSide:
 
     def intervals(self, confidence: float = CONFIDENCE) -> tuple[Values, Values]:
         """Return both ends of the interval of each controller's mean by t, (c,); the means if there is one trial."""
-        reach = float(special.stdtrit(max(self.trials - 1, 1), (1 + confidence) / 2))
-        return bounded_interval(self.means, np.sqrt(self.noise), reach, self.score_range)
+        freedom = max(self.trials - 1, 1)
+        return t_interval(self.means, np.sqrt(self.noise), freedom, self.score_range, confidence)
 
     @property
     def noise(self) -> Values:

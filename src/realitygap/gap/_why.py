@@ -1,18 +1,18 @@
-"""The share of a gap that each part of the model explains."""
+"""The share of a gap that each part of the model explains: its Shapley value."""
 
 from __future__ import annotations
 
+import itertools
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from ._bootstrap import interval
-from ._estimate import Estimate
-from ._level import rms_of
-from ._rms_interval import rms_interval
-from ._shapley import shapley_values
+from realitygap.stats import SMALLEST_N, Ends, Estimate, percentile_interval
+
+from ._level import rms_interval, rms_of
 from ._side import Values
 
 RESAMPLES = 2_000
@@ -42,7 +42,7 @@ class Why:
     @property
     def order(self) -> list[int]:
         """Places of the parts, the one that carries most first."""
-        return sorted(range(len(self.parts)), key=lambda k: -(self.falls[k].estimate or 0.0))
+        return sorted(range(len(self.parts)), key=lambda k: -(self.falls[k].value or 0.0))
 
     @property
     def advice(self) -> str:
@@ -56,7 +56,7 @@ class Why:
         )
         first = self.order[0]
         fall = self.falls[first]
-        if (fall.estimate or 0.0) <= 0:
+        if (fall.value or 0.0) <= 0:
             return f"Change this next: none of the fitted parts, because none reduces the gap.{left}"
         if (self.change.low or 0.0) > 0:
             return (
@@ -68,7 +68,7 @@ class Why:
         sure = "" if (fall.low or 0.0) > 0 else f"; this may be chance ({_would(fall)})"
         return (
             f"Change this next: {self.parts[first]}, which explains most, {fall} of the RMS gap of "
-            f"{self.before.estimate:.3f}{sure}.{left}"
+            f"{self.before.value:.3f}{sure}.{left}"
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -88,9 +88,9 @@ def _would(fall: Estimate) -> str:
 
     As far as the fit is sure: what its draws differ by does not shrink with controllers.
     """
-    if not fall.estimate or fall.low is None:
+    if not fall.value or fall.low is None:
         return "more controllers are needed"
-    n = max(int(np.ceil(fall.n * ((fall.estimate - fall.low) / fall.estimate) ** 2)), fall.n + 1)
+    n = max(int(np.ceil(fall.n * ((fall.value - fall.low) / fall.value) ** 2)), fall.n + 1)
     if n > MOST:
         return f"more than {MOST:,} controllers are needed to show it"
     return f"about {n} controllers would show it, if the fit is precise enough"
@@ -153,17 +153,48 @@ def _rms(value: float, differences: Values, squares: Values, drawn: Values) -> E
 
 
 def _estimate(value: float, drawn: Values, n: int) -> Estimate:
-    return _with_ends(value, interval(drawn, n), n)
+    return _with_ends(value, percentile_interval(drawn, n), n)
 
 
-def _with_ends(value: float, ends: tuple[float, float] | tuple[None, None], n: int) -> Estimate:
-    low, high = ends
-    if low is None or high is None:
-        return Estimate(
-            float(value),
-            None,
-            None,
-            n,
-            f"{n} controllers are too few for an interval; at least 5 are needed.",
-        )
-    return Estimate(float(value), min(low, float(value)), max(high, float(value)), n)
+def _with_ends(value: float, ends: Ends | None, n: int) -> Estimate:
+    if ends is None:
+        return Estimate.of_few(float(value), n, SMALLEST_N, "controllers")
+    value = float(value)
+    return Estimate(value, min(ends[0], value), max(ends[1], value), n, method="percentiles")
+
+
+# Shapley values
+
+
+def coalitions(n: int) -> list[tuple[bool, ...]]:
+    """Return all 2^n choices of n groups. Choice k includes group g if bit g of k is set."""
+    return [tuple(bool(k >> g & 1) for g in range(n)) for k in range(2**n)]
+
+
+def shapley_values(worth: Values) -> Values:
+    """Return what each of g groups adds on average over all orders of adding them, (b, g).
+
+    Args:
+        worth: (b, 2^g) value of each choice of groups, in the order of `coalitions`.
+
+    Returns:
+        The values, whose sum over groups is the worth of all less that of none.
+
+    Raises:
+        ValueError: The number of columns is not a power of 2.
+
+    Source: Shapley (1953), A Value for n-Person Games; exact, over all choices.
+    """
+    n = round(math.log2(worth.shape[1]))
+    if 2**n != worth.shape[1]:
+        raise ValueError(f"worth has {worth.shape[1]} columns, expected a power of 2.")
+    return np.asarray(worth @ _weights(n))
+
+
+def _weights(n: int) -> Values:
+    weights = np.zeros((2**n, n))
+    for group, k in itertools.product(range(n), range(2**n)):
+        size = k.bit_count() - (k >> group & 1)
+        weight = 1 / (n * math.comb(n - 1, size))
+        weights[k, group] = weight if k >> group & 1 else -weight
+    return weights

@@ -5,9 +5,9 @@ from __future__ import annotations
 from urllib.parse import parse_qsl
 
 from realitygap.errors import RealityGapError
-from realitygap.gap import controllers_for_margin, detectable_difference, spread_of_differences
 from realitygap.platforms import names_a_port, platform_of
 from realitygap.robots import is_in_this_program
+from realitygap.stats import controllers_for_margin, detectable_difference, spread_of_differences
 
 from ._pace import duration
 

@@ -6,8 +6,9 @@ import threading
 from pathlib import Path
 from typing import Any, Self
 
-from realitygap.gap import SHOWN, Estimate
+from realitygap.gap import SHOWN
 from realitygap.report import write_gap_report
+from realitygap.stats import Estimate
 from realitygap.study import GapStudy, gap_between
 
 from ._channel import Channel, Message
@@ -47,7 +48,7 @@ def _measured(study: GapStudy) -> dict[str, Any]:
     measures = [
         (shown.title, _words(getattr(result, shown.name))) for shown in SHOWN if shown.name in MEASURES
     ]
-    rms = None if result.rms.low is None else [result.rms.estimate, result.rms.low, result.rms.high]
+    rms = None if result.rms.low is None else [result.rms.value, result.rms.low, result.rms.high]
     return {"verdict": result.verdict, "measures": measures, "rms": rms, "pairs": pairs_of(study)}
 
 
@@ -72,9 +73,9 @@ def pairs_of(gap: GapStudy) -> dict[str, Any]:
 
 def _words(estimate: Estimate) -> str:
     """Return a measure with its interval, or the reason for its absence."""
-    if estimate.estimate is None:
+    if estimate.value is None:
         return estimate.refused or "not measured"
-    text = f"{estimate.estimate:.3f}"
+    text = f"{estimate.value:.3f}"
     if estimate.low is not None:
         text += f" [{estimate.low:.3f}, {estimate.high:.3f}]"
     return text.replace("-", "−")

@@ -30,11 +30,11 @@ from realitygap.report import (
     draw_paths,
     draw_scores,
     draw_species,
-    median_interval,
     read_tally,
     summarize,
     write_report,
 )
+from realitygap.stats import median_interval
 
 from ._channel import Channel, Message
 from ._figure_cache import keep_figures, keep_rows, keep_thumbnail
@@ -201,12 +201,12 @@ def curves_of(tally: Tally) -> list[dict[str, Any]]:
 
 
 def _point(values: np.ndarray[Any, np.dtype[np.float64]]) -> dict[str, Any]:
-    interval = median_interval(values)
+    interval = median_interval(values).ends
     return {
         "n": len(values),
         "median": round(float(np.median(values)), _DIGITS),
-        "low": None if interval is None else round(interval.low, _DIGITS),
-        "high": None if interval is None else round(interval.high, _DIGITS),
+        "low": None if interval is None else round(interval[0], _DIGITS),
+        "high": None if interval is None else round(interval[1], _DIGITS),
     }
 
 

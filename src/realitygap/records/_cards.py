@@ -10,7 +10,6 @@ from weakref import WeakKeyDictionary
 import numpy as np
 import polars as pl
 
-from realitygap._medians import median_interval
 from realitygap.drawing import Card, Spark, Table, card_of
 from realitygap.errors import RealityGapError
 from realitygap.records._chunk import read_rows
@@ -18,6 +17,7 @@ from realitygap.records._ledger_kinds import Trial
 from realitygap.records._ledger_reader import LedgerReader
 from realitygap.records._listing import LEDGER_NAME
 from realitygap.records._published_results import PublishedResults
+from realitygap.stats import median_interval
 
 MOST_DIGESTED_BYTES = 1_500_000
 MOST_READ_BYTES = 24_000_000
@@ -170,9 +170,7 @@ def _median(best: pl.DataFrame | None) -> str:
     of_runs = best.group_by("replicate").agg(pl.col("best").max())["best"].to_numpy()
     if not np.isfinite(of_runs).all():
         return "–"
-    interval = median_interval(of_runs)
-    ends = "" if interval is None else f" [{interval.low:.3f}, {interval.high:.3f}]"
-    return f"{np.median(of_runs):.3f}{ends}"
+    return str(median_interval(of_runs))
 
 
 def _line(best: pl.DataFrame | None) -> tuple[float, ...]:

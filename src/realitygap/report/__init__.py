@@ -5,14 +5,6 @@ Only records are read; nothing here runs a study. Trials that are drawn are reco
 SVG with the caption that says what was drawn.
 """
 
-from realitygap._medians import (
-    Interval,
-    IntervalRanks,
-    Quartiles,
-    interval_ranks,
-    median_interval,
-    quartiles,
-)
 from realitygap.report._agreement import Agreement, measure_agreement
 from realitygap.report._archive_figure import draw_archive
 from realitygap.report._audit import (
@@ -53,13 +45,6 @@ from realitygap.report._distance_audit import (
 from realitygap.report._distance_figure import draw_distance, save_distance
 from realitygap.report._divergence_figure import Side, compare_trials, draw_divergence, save_divergence
 from realitygap.report._drawing import NARROW, WIDE, Drawing
-from realitygap.report._effects import (
-    a12,
-    bca_interval,
-    detectable_effect,
-    newcombe_interval,
-    runs_needed,
-)
 from realitygap.report._formats import check_ending, save_drawing, save_picture
 from realitygap.report._frame_file import export_frame
 from realitygap.report._gap_maps_figure import draw_gap_maps
@@ -75,7 +60,6 @@ from realitygap.report._networks_figure import draw_networks
 from realitygap.report._page import write_report
 from realitygap.report._paper_audit import Finding, audit_paper
 from realitygap.report._path_figure import draw_paths
-from realitygap.report._permutation import holm, permutation_p, runs_for_a_claim, sign_flip_p, smallest_p
 from realitygap.report._questions import Variety, chance_of_best, measure_variety
 from realitygap.report._score_figure import draw_scores
 from realitygap.report._sensor_figure import save_sensor_figure
@@ -85,6 +69,7 @@ from realitygap.report._summary import SUMMARY_SCHEMA, summarize
 from realitygap.report._tally import Tally, read_tally
 from realitygap.report._task_summary import TASK_SCHEMA, summarize_tasks
 from realitygap.report._trial_figure import ChosenTrial, choose_trial, draw_trial
+from realitygap.stats import interval_ranks, runs_for_a_claim, sign_flip_p, smallest_p
 
 __all__ = [
     "FAMILY_HEAD",
@@ -112,19 +97,14 @@ __all__ = [
     "Drawing",
     "Each",
     "Finding",
-    "Interval",
-    "IntervalRanks",
-    "Quartiles",
     "Side",
     "Subject",
     "Tally",
     "Variety",
-    "a12",
     "audit_distance",
     "audit_notes",
     "audit_paper",
     "audit_results",
-    "bca_interval",
     "chance_of_best",
     "check_ending",
     "choose_moving",
@@ -133,7 +113,6 @@ __all__ = [
     "compare_choices",
     "compare_conditions",
     "compare_trials",
-    "detectable_effect",
     "distance_notes",
     "draw_archive",
     "draw_choices",
@@ -156,20 +135,14 @@ __all__ = [
     "export_individual",
     "family_table",
     "goal_table",
-    "holm",
     "interval_ranks",
     "measure_agreement",
     "measure_variety",
-    "median_interval",
-    "newcombe_interval",
     "not_counted",
-    "permutation_p",
-    "quartiles",
     "read_tally",
     "refuse_gap_page",
     "retry_champions",
     "runs_for_a_claim",
-    "runs_needed",
     "save_arena",
     "save_distance",
     "save_divergence",

@@ -9,12 +9,11 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+import scipy
 
-from realitygap._medians import CONFIDENCE
 from realitygap.errors import LedgerError
 from realitygap.records import LEDGER_NAME, Ledger
-from realitygap.report._effects import BCA_SMALLEST_N, RESAMPLES
-from realitygap.report._permutation import SEED
+from realitygap.stats import BCA_SMALLEST_N, CONFIDENCE, RESAMPLES, SEED, Estimate
 
 
 @dataclass(frozen=True)
@@ -25,33 +24,33 @@ class Agreement:
         n_trials: Number of trials counted by two people.
         n_cells: Total number of judged cells: every reachable cell of each trial.
         same: Share of cells that both judge alike [0..1].
-        kappa: Cohen's kappa: 1 for perfect agreement, 0 for agreement by chance; None if all cells are alike.
-        low: Lower bound of its 95 % interval; None below 10 trials.
-        high: Upper bound of its 95 % interval.
+        kappa: Cohen's kappa: 1 for perfect agreement, 0 for agreement by chance. No value if all cells are alike, and
+            no interval below 10 trials.
     """
 
     n_trials: int
     n_cells: int
     same: float
-    kappa: float | None
-    low: float | None
-    high: float | None
+    kappa: Estimate
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain values, with the ends of the interval of kappa."""
+        kappa = {"kappa": self.kappa.value, "low": self.kappa.low, "high": self.kappa.high}
+        return {"n_trials": self.n_trials, "n_cells": self.n_cells, "same": self.same, **kappa}
 
     @property
     def sentence(self) -> str:
         """Return the agreement in words."""
         trials = "1 trial" if self.n_trials == 1 else f"{self.n_trials} trials"
         counted = f"{trials} counted by two people, {self.n_cells:,} cells"
-        if self.kappa is None:
+        if self.kappa.value is None:
             return f"{counted}: all judged alike, and no kappa without both kinds of cells."
         interval = (
             f"no interval below {BCA_SMALLEST_N} trials"
-            if self.low is None or self.high is None
-            else f"95 % interval {self.low:.3f} to {self.high:.3f}, trials resampled whole"
+            if self.kappa.ends is None
+            else f"95 % interval {self.kappa.low:.3f} to {self.kappa.high:.3f}, trials resampled whole"
         )
-        return (
-            f"{counted}: {100 * self.same:.1f} % judged alike. Cohen's kappa {self.kappa:.3f} ({interval})."
-        )
+        return f"{counted}: {100 * self.same:.1f} % judged alike. Cohen's kappa {self.kappa.value:.3f} ({interval})."
 
 
 def measure_agreement(folder: str | Path) -> Agreement:
@@ -79,9 +78,7 @@ def measure_agreement(folder: str | Path) -> Agreement:
     tables = np.array([_table(first[trial], second[trial], n_cells[trial]) for trial in both], np.float64)
     kappa = float(_kappa(*tables.T))
     same = float(tables[:, [0, 3]].sum() / tables.sum())
-    low, high = _interval(tables)
-    is_number = np.isfinite(kappa)
-    return Agreement(len(both), int(tables.sum()), same, kappa if is_number else None, low, high)
+    return Agreement(len(both), int(tables.sum()), same, _with_interval(kappa, tables))
 
 
 def _counted(ledger: Ledger, role: str) -> dict[int, set[int]]:
@@ -108,17 +105,18 @@ def _kappa(both: Any, one: Any, other: Any, neither: Any, axis: int = -1) -> npt
         return np.asarray((observed - expected) / (1 - expected))
 
 
-def _interval(tables: npt.NDArray[np.float64]) -> tuple[float | None, float | None]:
-    from scipy import stats  # takes a third of a second, which most commands can do without
-
-    if len(tables) < BCA_SMALLEST_N:
-        return None, None
+def _with_interval(kappa: float, tables: npt.NDArray[np.float64]) -> Estimate:
+    """Return kappa with its interval, for (t, 4) tables of t trials."""
+    n = len(tables)
+    value = kappa if np.isfinite(kappa) else None
+    if n < BCA_SMALLEST_N:
+        return Estimate(value, None, None, n, needed=BCA_SMALLEST_N)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # where all resamples give the same there is no interval
-        found = stats.bootstrap(
+        ends = scipy.stats.bootstrap(
             tuple(tables.T), _kappa, paired=True, vectorized=True, confidence_level=CONFIDENCE, method="BCa",
             n_resamples=RESAMPLES, random_state=np.random.default_rng(SEED),
         ).confidence_interval  # fmt: skip
-    if not (np.isfinite(found.low) and np.isfinite(found.high)):
-        return None, None
-    return float(found.low), float(found.high)
+    if not (np.isfinite(ends.low) and np.isfinite(ends.high)):
+        return Estimate(value, None, None, n)
+    return Estimate(value, float(ends.low), float(ends.high), n, method="BCa")

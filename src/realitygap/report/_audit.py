@@ -8,7 +8,7 @@ import itertools
 import math
 import reprlib
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from decimal import Decimal
 from fractions import Fraction
 from pathlib import Path
@@ -18,22 +18,24 @@ import numpy as np
 import numpy.typing as npt
 
 from realitygap._limits import MOST_TABLE_BYTES, read_file
-from realitygap._medians import SMALLEST_N, Interval, median_interval
 from realitygap.errors import TableError, whole_number
-from realitygap.report._effects import (
+from realitygap.report._comparisons import difference_and_share
+from realitygap.stats import (
+    ALPHA,
+    MEDIAN_SMALLEST_N,
     POWER,
     USUAL_EFFECTS,
-    a12,
+    Estimate,
     a12_of_effect,
-    bca_intervals,
     detectable_effect,
-    difference_of_means,
     effect_of_a12,
-    newcombe_interval,
+    holm,
+    median_interval,
+    permutation_p,
+    runs_for_a_claim,
     runs_needed,
-    share_above,
+    smallest_p,
 )
-from realitygap.report._permutation import ALPHA, holm, permutation_p, runs_for_a_claim, smallest_p
 
 COLUMNS = ("condition", "run", "value")
 _MOST_MISTAKES = 20
@@ -94,10 +96,9 @@ class AuditedPair:
         other: Second condition.
         n: Number of runs of `one`.
         n_other: Number of runs of `other`.
-        difference: Mean of `one` minus mean of `other`.
-        difference_interval: BCa; None below 10 runs.
-        a12: Probability that a run of `one` is above a run of `other`; ties count half.
-        a12_interval: BCa interval; Newcombe's below 10 runs; None if not even p < 0.05 is possible.
+        difference: Mean of `one` minus mean of `other`, with its BCa interval; without one below 10 runs.
+        a12: Probability that a run of `one` is above a run of `other`; ties count half. Its interval is BCa, and
+            Newcombe's below 10 runs; it has none if not even p < 0.05 is possible.
         p: Two-sided p of a permutation test of the difference of means.
         p_holm: P value corrected for all pairs of the table.
         smallest_p: Smallest p that this number of runs can give.
@@ -111,10 +112,8 @@ class AuditedPair:
     other: str
     n: int
     n_other: int
-    difference: float
-    difference_interval: Interval | None
-    a12: float
-    a12_interval: Interval | None
+    difference: Estimate
+    a12: Estimate
     p: float
     p_holm: float
     smallest_p: float
@@ -123,13 +122,30 @@ class AuditedPair:
     detectable: float | None
     detectable_a12: float | None
 
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain values, with the interval of each estimate and the verdict."""
+        values: dict[str, Any] = {}
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if isinstance(value, Estimate):
+                ends = {"low": value.low, "high": value.high, "method": value.method}
+                values |= {
+                    field.name: value.value,
+                    f"{field.name}_interval": None if value.ends is None else ends,
+                }
+            else:
+                values[field.name] = value
+        return values | {"verdict": self.verdict}
+
     @property
     def verdict(self) -> str:
         """The conclusion that the pair supports, in words."""
         if not self.can_claim:
             return f"no claim possible; {self.runs_for_a_claim} runs each at least"
         if self.p_holm < ALPHA:
-            higher, lower = (self.one, self.other) if self.difference > 0 else (self.other, self.one)
+            higher, lower = (
+                (self.one, self.other) if (self.difference.value or 0.0) > 0 else (self.other, self.one)
+            )
             return f"{higher} above {lower}"
         return "not shown"
 
@@ -154,10 +170,9 @@ class Audit:
 
     def to_dict(self) -> dict[str, Any]:
         """Return all results as plain values; each pair has its `verdict`."""
-        found = asdict(self)
-        for plain, pair in zip(found["pairs"], self.pairs, strict=True):
-            plain["verdict"] = pair.verdict
-        return found
+        values = asdict(self)
+        values["pairs"] = [pair.to_dict() for pair in self.pairs]
+        return values
 
 
 @dataclass(frozen=True)
@@ -235,15 +250,10 @@ def _audit(rows: Sequence[_Row], denominator: int | None, tell: Tell | None = No
 
 
 def _condition(name: str, values: npt.NDArray[np.float64]) -> AuditedCondition:
-    interval = median_interval(values)
+    deviation = float(values.std(ddof=1)) if len(values) > 1 else None
+    median = median_interval(values)
     return AuditedCondition(
-        name,
-        len(values),
-        float(values.mean()),
-        float(np.median(values)),
-        float(values.std(ddof=1)) if len(values) > 1 else None,
-        interval.low if interval else None,
-        interval.high if interval else None,
+        name, len(values), float(values.mean()), median.value or 0.0, deviation, median.low, median.high
     )
 
 
@@ -263,12 +273,7 @@ def compare_samples(
     pairs = []
     for k, (name, other_name) in enumerate(names):
         one, other = values[name], values[other_name]
-        share = a12(one, other)
-        difference_interval, interval = bca_intervals(
-            [difference_of_means, share_above], one, other, paired=False
-        )
-        if interval is None and floors[k] < ALPHA:
-            interval = newcombe_interval(share, len(one), len(other))
+        difference, share = difference_and_share(one, other, float(floors[k]), paired=False)
         effect = detectable_effect(min(len(one), len(other)), paired=False)
         pairs.append(
             AuditedPair(
@@ -276,10 +281,8 @@ def compare_samples(
                 other=other_name,
                 n=len(one),
                 n_other=len(other),
-                difference=float(one.mean() - other.mean()),
-                difference_interval=difference_interval,
+                difference=difference,
                 a12=share,
-                a12_interval=interval,
                 p=float(raw[k]),
                 p_holm=float(corrected[k]),
                 smallest_p=float(floors[k]),
@@ -434,7 +437,9 @@ def audit_notes(audit: Audit) -> list[str]:
         )
     few = [each.condition for each in audit.conditions if each.median_low is None]
     if few:
-        notes.append(f"Fewer than {SMALLEST_N} runs give no 95 % interval of the median: {', '.join(few)}.")
+        notes.append(
+            f"Fewer than {MEDIAN_SMALLEST_N} runs give no 95 % interval of the median: {', '.join(few)}."
+        )
     needed = ", ".join(
         f"{n} for a {name} effect (A12 {USUAL_EFFECTS[name]})" for name, n in audit.runs_needed.items()
     )

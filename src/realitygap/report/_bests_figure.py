@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from realitygap._medians import SMALLEST_N, Interval, median_interval, quartiles
 from realitygap.drawing import Ink
 from realitygap.report._drawing import (
     Drawing,
@@ -23,6 +22,7 @@ from realitygap.report._drawing import (
 )
 from realitygap.report._marks import MOST_MARKS, Panel, Series
 from realitygap.report._tally import Results, Tally, label_of, read_tally
+from realitygap.stats import MEDIAN_SMALLEST_N, Ends, median_interval, quartiles
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -49,7 +49,7 @@ class _Row:
     replicates: tuple[int, ...]
     n_drawn: int
     median: float
-    interval: Interval | None
+    interval: Ends | None
     published: tuple[float, ...]
 
 
@@ -91,7 +91,7 @@ def _row(tally: Tally, condition: Mapping[str, Any], n_drawn: int) -> _Row:
         tuple(int(run) for run in tally.replicates(name)),
         min(len(values), n_drawn),
         quartiles(values).median if len(values) else float("nan"),
-        median_interval(values),
+        median_interval(values).ends,
         tuple(condition.get("published") or ()),
     )
 
@@ -125,7 +125,7 @@ def _series(
         if not len(row.values):
             continue
         interval = row.interval
-        within = "" if interval is None else f" [{interval.low:.3f}, {interval.high:.3f}]"
+        within = "" if interval is None else f" [{interval[0]:.3f}, {interval[1]:.3f}]"
         text = f"{{name}}: median {{x}}{within}, n = {len(row.values):,}, {row.label}"
         series.append(Series(text, np.array([[row.median, float(index)]]), row.name))
         runs = row.replicates[: row.n_drawn]
@@ -187,7 +187,7 @@ def _draw_row(axes: Axes, row: _Row, index: int, offsets: npt.NDArray[np.float64
         axes, xs, ys, color=Ink.RUN, alpha=0.55, linewidth=1.6 + scale, solid_capstyle="round", zorder=2
     )
     if row.interval is not None:
-        ends = [row.interval.low, row.interval.high]
+        ends = list(row.interval)
         draw_line(
             axes,
             ends,
@@ -245,6 +245,6 @@ def _caption(tally: Tally, rows: Sequence[_Row]) -> str:
     if any(row.n_drawn < len(row.values) for row in rows):
         most = max(row.n_drawn for row in rows)
         parts.append(f"Dots: the first {most:,} runs of a condition; medians and intervals are of all runs.")
-    if counts[-1] < SMALLEST_N:
-        parts.append(f"Fewer than {SMALLEST_N} runs give no interval of 95 %.")
+    if counts[-1] < MEDIAN_SMALLEST_N:
+        parts.append(f"Fewer than {MEDIAN_SMALLEST_N} runs give no interval of 95 %.")
     return " ".join(parts)

@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import polars as pl
 
-from realitygap._medians import Interval
 from realitygap.errors import RecordError, RecordVersionError
 from realitygap.platforms import retry_genomes
-from realitygap.report._effects import bca_interval, difference_of_means, mean_interval
 from realitygap.report._tally import Results, Tally, label_of, read_tally, settings_of
 from realitygap.runs import Condition, genome_of, partners_of
+from realitygap.stats import Estimate, bca_interval, bca_mean, difference_of_means
 from realitygap.trials import NoiseKey
 
 FRESH_TRIALS = 20
@@ -56,19 +55,15 @@ class Champions:
         return np.asarray(self.fresh.mean(axis=1))
 
     @property
-    def luck(self) -> float:
-        """Mean of what champions lose when they are tried again."""
-        return float((self.reported - self.expected).mean())
+    def luck(self) -> Estimate:
+        """Mean of what champions lose when they are tried again, with its BCa interval; without one below 10."""
+        luck = bca_interval(difference_of_means, self.reported, self.expected, paired=True)
+        return replace(luck, value=float((self.reported - self.expected).mean()))
 
     @property
-    def luck_interval(self) -> Interval | None:
-        """The BCa interval of `luck`; None below 10 champions."""
-        return bca_interval(difference_of_means, self.reported, self.expected, paired=True)
-
-    @property
-    def expected_interval(self) -> Interval | None:
-        """The BCa interval of the mean on fresh noise; None below 10 champions."""
-        return mean_interval(self.expected)
+    def expected_mean(self) -> Estimate:
+        """Mean coverage on fresh noise, with its BCa interval; without one below 10 champions."""
+        return bca_mean(self.expected)
 
 
 def retry_champions(folder: Results) -> list[Champions]:

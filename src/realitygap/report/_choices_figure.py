@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from realitygap._medians import SMALLEST_N, Interval, median_interval, quartiles
 from realitygap.drawing import Ink
 from realitygap.report._drawing import (
     Drawing,
@@ -23,6 +22,7 @@ from realitygap.report._drawing import (
 )
 from realitygap.report._marks import Panel, Series
 from realitygap.report._tally import Results, Tally, label_of, read_tally, settings_of
+from realitygap.stats import MEDIAN_SMALLEST_N, Ends, median_interval, quartiles
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -52,7 +52,7 @@ class Choice:
     label: str
     n: int
     median: float
-    interval: Interval | None
+    interval: Ends | None
     effect: float
     other_median: float | None
     published: tuple[float, ...]
@@ -104,7 +104,7 @@ def _choice(tally: Tally, condition: Mapping[str, Any], baseline: str, reference
         label=label_of(condition),
         n=len(values),
         median=median,
-        interval=median_interval(values),
+        interval=median_interval(values).ends,
         effect=0.0 if is_baseline else median - reference,
         other_median=other,
         published=tuple(condition.get("published") or ()),
@@ -184,7 +184,7 @@ def _marks_of_group(group: list[Choice], layout: _Layout) -> Iterator[Series]:
             continue
         y = layout.y_of_marks(start, end)
         interval = choice.interval
-        within = "" if interval is None else f" [{interval.low:.3f}, {interval.high:.3f}]"
+        within = "" if interval is None else f" [{interval[0]:.3f}, {interval[1]:.3f}]"
         effect = "" if choice is group[0] else f", {choice.effect:+.3f} to the baseline".replace("-", "−")
         shown = [(choice.median, f"median {choice.median:.3f}{within}{effect}, n = {choice.n:,}")]
         if choice.other_median is not None:
@@ -222,7 +222,7 @@ def _range_of(groups: list[list[Choice]]) -> tuple[float, float]:
             *choice.published,
             *([choice.other_median] if choice.other_median is not None else []),
         ]
-        shown += [choice.interval.low, choice.interval.high] if choice.interval else []
+        shown += list(choice.interval) if choice.interval else []
     finite = [value for value in shown if math.isfinite(value)] or [0.0, 1.0]
     return max(0.0, math.floor(min(finite) * 20 - 0.2) / 20), min(1.0, math.ceil(max(finite) * 20 + 0.2) / 20)
 
@@ -296,7 +296,7 @@ def _head(axes: Axes, group: list[Choice], x_words: float, layout: _Layout) -> N
 def _draw_reference(axes: Axes, reference: Choice, start: float, end: float) -> None:
     """The baseline's interval and median, over the height of a row's marks; words stay clear of it."""
     if reference.interval is not None:
-        band = [reference.interval.low, reference.interval.high]
+        band = list(reference.interval)
         axes.fill_between(band, start, end, color=Ink.BAND, alpha=0.45, linewidth=0)
     if not math.isnan(reference.median):
         axes.plot([reference.median] * 2, [start, end], color=Ink.OURS, linewidth=0.8, solid_capstyle="butt")
@@ -316,7 +316,7 @@ def _draw_choice(axes: Axes, choice: Choice, y: float, reference: float) -> None
     axes.plot([reference, choice.median], [y, y], color=Ink.OURS, linewidth=0.8, linestyle=(0, (1.5, 1.5)))
     if choice.interval is not None:
         axes.plot(
-            [choice.interval.low, choice.interval.high],
+            list(choice.interval),
             [y, y],
             color=Ink.OURS,
             linewidth=2.2,
@@ -356,7 +356,7 @@ def _write_numbers(axes: Axes, choice: Choice, y: float, layout: _Layout, *, is_
         effect = "±0.000" if effect in ("+0.000", "−0.000") else effect
     middle = "" if math.isnan(choice.median) else f"{choice.median:.3f}"
     if layout.is_wide and choice.interval is not None:
-        middle += f" [{choice.interval.low:.3f}, {choice.interval.high:.3f}]"
+        middle += f" [{choice.interval[0]:.3f}, {choice.interval[1]:.3f}]"
     items = [(far - 2, effect, "bold")]
     if layout.is_wide:
         items.append((far - 44, middle, "normal"))
@@ -457,8 +457,8 @@ def _caption(tally: Tally, groups: list[list[Choice]]) -> str:
         "Each row changes one choice and leaves all others as in the baseline. Dot: the median over runs of "
         f"the best coverage of a run, counted {counted}. {labels}, n = {n} runs for each condition.",
         "Bar: its exact 95 % interval from order statistics. Band: the baseline’s. "
-        if min(counts) >= SMALLEST_N
-        else f"No interval below {SMALLEST_N} runs. ",
+        if min(counts) >= MEDIAN_SMALLEST_N
+        else f"No interval below {MEDIAN_SMALLEST_N} runs. ",
         "Right: the change of the median. Rows are sorted by it.",
     ]
     if any(choice.other_median is not None for choice in choices):

@@ -5,40 +5,37 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 import polars as pl
 
-from realitygap import _special as special
-from realitygap._medians import CONFIDENCE, Interval
 from realitygap._wording import p_in_words, signed, span
-from realitygap.gap import bounded_interval
 from realitygap.report._champions import FRESH_TRIALS, Champions
-from realitygap.report._effects import (
+from realitygap.report._tally import Results, Tally, label_of, read_tally, settings_of
+from realitygap.stats import (
+    ALPHA,
     BCA_SMALLEST_N,
+    CONFIDENCE,
     RESAMPLES,
+    Estimate,
     a12,
     bca_intervals,
     detectable_effect,
+    difference_interval,
     difference_of_means,
-    newcombe_interval,
-    runs_needed,
-    share_above,
-)
-from realitygap.report._permutation import (
-    ALPHA,
-    MONTE_CARLO,
-    MOST_ENUMERATED,
     holm,
+    mean_interval,
+    newcombe_interval,
     permutation_p,
     runs_for_a_claim,
+    runs_needed,
+    share_above,
     sign_flip_p,
     smallest_p,
 )
-from realitygap.report._tally import Results, Tally, label_of, read_tally, settings_of
 
 _MOST_RUNS_NAMED = 100_000
 
@@ -62,10 +59,9 @@ class Comparison:
         n: Number of runs of `one`, or of pairs if `paired`.
         n_other: Number of runs of `other`.
         paired: True if the two draw the same random numbers run by run, so that runs are compared in pairs.
-        difference: Mean of `one` minus mean of `other` [share of the reachable cells].
-        difference_interval: BCa interval of the difference; None if n is too small.
-        a12: Probability that a run of `one` is above a run of `other` [0..1].
-        a12_interval: BCa interval, or Newcombe's if n is too small for it; None if n cannot give p < 0.05.
+        difference: Mean of `one` minus mean of `other` [share of the reachable cells], with its BCa interval.
+        a12: Probability that a run of `one` is above a run of `other` [0..1], with its BCa interval, or Newcombe's if n
+            is too small for it. It has none if n cannot give p < 0.05.
         p: Two-sided p of a permutation test of the difference.
         p_holm: P value corrected for all comparisons of the study.
         best_p: Smallest possible `p_holm` with this number of runs.
@@ -74,8 +70,8 @@ class Comparison:
             comparisons; None without spread.
         runs_for_difference: Number of runs that detect the observed difference in 80 of 100 studies; None above a
             million.
-        equivalence_interval: Its 90 % interval by t, which lies within `MARGIN` if the conditions are equivalent (two
-            one-sided tests at 5 %); None with fewer than 10 runs.
+        equivalence_interval: The difference with its 90 % interval by t, which lies within `MARGIN` if the conditions
+            are equivalent (two one-sided tests at 5 %); without one with fewer than 10 runs.
     """
 
     one: str
@@ -85,17 +81,15 @@ class Comparison:
     n: int
     n_other: int
     paired: bool
-    difference: float
-    difference_interval: Interval | None
-    a12: float
-    a12_interval: Interval | None
+    difference: Estimate
+    a12: Estimate
     p: float
     p_holm: float
     best_p: float
     runs_for_a_claim: int
     detectable: float | None
     runs_for_difference: int | None
-    equivalence_interval: Interval | None
+    equivalence_interval: Estimate
 
     @property
     def can_claim(self) -> bool:
@@ -107,6 +101,11 @@ class Comparison:
         """True if the difference is claimed."""
         return self.p_holm < ALPHA
 
+    @property
+    def size(self) -> float:
+        """The difference as a number; 0 without runs."""
+        return self.difference.value or 0.0
+
     def seen_from(self, condition: str) -> Comparison:
         """Return the comparison with this one of its two conditions first.
 
@@ -114,17 +113,15 @@ class Comparison:
         """
         if condition == self.one:
             return self
-        return dataclasses.replace(
+        return replace(
             self,
             one=self.other,
             other=self.one,
             n=self.n_other,
             n_other=self.n,
-            difference=-self.difference,
-            difference_interval=_mirrored(self.difference_interval, 0.0),
-            a12=1.0 - self.a12,
-            a12_interval=_mirrored(self.a12_interval, 1.0),
-            equivalence_interval=_mirrored(self.equivalence_interval, 0.0),
+            difference=self.difference.mirrored(0.0),
+            a12=self.a12.mirrored(1.0),
+            equivalence_interval=self.equivalence_interval.mirrored(0.0),
         )
 
     @property
@@ -137,13 +134,12 @@ class Comparison:
     @property
     def is_equivalent(self) -> bool | None:
         """True if equivalence within `MARGIN` is shown; None if there are too few runs."""
-        interval = self.equivalence_interval
-        return None if interval is None else interval.low > -MARGIN and interval.high < MARGIN
+        return is_within(self.equivalence_interval)
 
     @property
     def equivalence(self) -> str:
         """Result of the test of equivalence in words, with the margin; empty if there are too few runs."""
-        if self.equivalence_interval is None:
+        if self.is_equivalent is None:
             return ""
         shown = "equivalent" if self.is_equivalent else "not shown equivalent"
         return f"{shown} within ±{MARGIN:g} (90 %: {span(self.equivalence_interval, signs=True)})"
@@ -157,7 +153,7 @@ class Comparison:
                 f"{p_in_words(self.best_p)}; {self.runs_for_a_claim} runs at least"
             )
         if self.is_shown:
-            higher, lower = (self.one, self.other) if self.difference > 0 else (self.other, self.one)
+            higher, lower = (self.one, self.other) if self.size > 0 else (self.other, self.one)
             return f"{higher} above {lower}"
         if self.detectable is None:
             return "not shown"
@@ -168,16 +164,9 @@ class Comparison:
         return f"not shown; n finds {self.detectable:.3f} in 80 %, this difference takes {needed} runs"
 
 
-def _mirrored(interval: Interval | None, total: float) -> Interval | None:
-    """Return the interval of `total` minus the effect."""
-    return (
-        None if interval is None else Interval(total - interval.high, total - interval.low, interval.method)
-    )
-
-
-def is_within(interval: Interval | None) -> bool | None:
-    """Return whether an interval of a difference lies within `MARGIN`; None without one."""
-    return None if interval is None else interval.low > -MARGIN and interval.high < MARGIN
+def is_within(difference: Estimate) -> bool | None:
+    """Return whether the interval of a difference lies within `MARGIN`; None without one."""
+    return None if difference.ends is None else difference.ends[0] > -MARGIN and difference.ends[1] < MARGIN
 
 
 def compare_conditions(folder: Results) -> list[Comparison]:
@@ -264,11 +253,7 @@ class Samples:
 
     def smallest_p(self) -> float:
         """The smallest `p` possible with this number of runs."""
-        if self.paired:
-            return smallest_p(len(self.one))
-        exact = smallest_p(len(self.one), len(self.other))
-        # more relabelings than are listed: p comes from those drawn
-        return max(exact, 2 / (MONTE_CARLO + 1)) if exact < 2 / MOST_ENUMERATED else exact
+        return smallest_p(len(self.one), None if self.paired else len(self.other), as_drawn=True)
 
     def spread(self) -> float:
         """Standard deviation of a difference, or of a run (pooled); NaN with fewer than two."""
@@ -280,21 +265,18 @@ class Samples:
         pooled = ((n - 1) * self.one.var(ddof=1) + (m - 1) * self.other.var(ddof=1)) / (n + m - 2)
         return math.sqrt(float(pooled))
 
-    def equivalence_interval(self) -> Interval | None:
-        """The 90 % interval of the difference by t, for two one-sided tests at 5 %; None with fewer than 10 runs.
+    def equivalence_interval(self) -> Estimate:
+        """The difference with its 90 % interval by t, for two one-sided tests at 5 %; without one below 10 runs.
 
         Source: Schuirmann (1987), Journal of Pharmacokinetics and Biopharmaceutics 15(6); unpaired, Welch (1947).
         """
-        if min(len(self.one), len(self.other)) < BCA_SMALLEST_N:
-            return None
-        groups = [self.one - self.other] if self.paired else [self.one, self.other]
-        parts = np.array([group.var(ddof=1) / len(group) for group in groups])
-        shares = parts / parts.sum() if parts.any() else parts
-        freedom = 1 / max(sum(shares**2 / [len(group) - 1 for group in groups]), 1e-9)
-        reach, error = float(special.stdtrit(freedom, 1 - ALPHA)), math.sqrt(parts.sum())
-        difference = float(self.one.mean() - self.other.mean())
-        low, high = bounded_interval(difference, error, reach, (-1.0, 1.0))
-        return Interval(float(low), float(high), "t")
+        level = 1 - 2 * ALPHA
+        if self.paired:
+            differences = self.one - self.other
+            return mean_interval(differences, (-1.0, 1.0), level=level, smallest=BCA_SMALLEST_N, noun="pairs")
+        return difference_interval(
+            self.one, self.other, (0.0, 1.0), level=level, smallest=BCA_SMALLEST_N, noun="runs"
+        )
 
 
 def paired_values(tally: Tally, one: str, other: str) -> Samples:
@@ -308,7 +290,7 @@ def paired_values(tally: Tally, one: str, other: str) -> Samples:
 def _paired_champions(tally: Tally, one: Champions, other: Champions) -> Samples:
     """Return the means on fresh noise of two conditions, in pairs as `paired_values`."""
     found = _in_pairs(tally, *((each.condition, each.replicates, each.expected) for each in (one, other)))
-    return dataclasses.replace(found, trials=FRESH_TRIALS)
+    return replace(found, trials=FRESH_TRIALS)
 
 
 _Runs = tuple[str, npt.NDArray[np.uint32], npt.NDArray[np.float64]]
@@ -385,15 +367,11 @@ def _comparison(
     best_p: float,
 ) -> Comparison:
     n, m, paired = len(samples.one), len(samples.other), samples.paired
-    share = a12(samples.one, samples.other)
-    difference_interval, interval = bca_intervals(
-        [difference_of_means, share_above], samples.one, samples.other, paired=paired
-    )
+    size, share = difference_and_share(samples.one, samples.other, samples.smallest_p(), paired=paired)
     spread = samples.spread()
     # Bonferroni's level is the strictest that Holm can ask for
     alpha = ALPHA / n_comparisons
     effect = detectable_effect(min(n, m), paired=paired, alpha=alpha)
-    difference = float(samples.one.mean() - samples.other.mean())
     has_spread = math.isfinite(spread) and spread > 0
     return Comparison(
         one=one["name"],
@@ -403,22 +381,37 @@ def _comparison(
         n=n,
         n_other=m,
         paired=paired,
-        difference=difference,
-        difference_interval=difference_interval,
+        difference=size,
         a12=share,
-        a12_interval=interval
-        if interval or samples.smallest_p() >= ALPHA
-        else newcombe_interval(share, n, m),
         p=p,
         p_holm=p_holm,
         best_p=best_p,
         runs_for_a_claim=runs_for_a_claim(n_comparisons, paired=paired),
         detectable=effect * spread if effect is not None and has_spread else None,
-        runs_for_difference=runs_needed(difference / spread, paired=paired, alpha=alpha)
+        runs_for_difference=runs_needed((size.value or 0.0) / spread, paired=paired, alpha=alpha)
         if has_spread
         else None,
         equivalence_interval=samples.equivalence_interval(),
     )
+
+
+def difference_and_share(
+    one: npt.NDArray[np.float64], other: npt.NDArray[np.float64], floor: float, *, paired: bool
+) -> tuple[Estimate, Estimate]:
+    """Return the difference of means and A12 of two conditions, with their intervals.
+
+    Args:
+        one: (n,) and
+        other: (m,) values, in pairs if `paired`.
+        floor: Smallest p that this number of runs can give. A12 of few runs has Newcombe's interval if that is below
+            0.05.
+        paired: True if value k of one belongs to value k of the other.
+    """
+    size, share = bca_intervals([difference_of_means, share_above], one, other, paired=paired)
+    value = a12(one, other)
+    if share.ends is None and floor < ALPHA:
+        share = newcombe_interval(value, len(one), len(other))
+    return replace(size, value=float(one.mean() - other.mean())), replace(share, value=value)
 
 
 def comparisons_frame(comparisons: Sequence[Comparison]) -> pl.DataFrame:
@@ -428,8 +421,10 @@ def comparisons_frame(comparisons: Sequence[Comparison]) -> pl.DataFrame:
         row: dict[str, Any] = {}
         for field in dataclasses.fields(each):
             value = getattr(each, field.name)
-            if field.name.endswith("interval"):
-                row |= {f"{field.name}_{end}": getattr(value, end, None) for end in ("low", "high")}
+            if isinstance(value, Estimate):
+                name = field.name.removesuffix("_interval")
+                row |= {field.name: value.value} if name == field.name else {}
+                row |= {f"{name}_interval_low": value.low, f"{name}_interval_high": value.high}
             else:
                 row[field.name] = value
         rows.append(row | {"conclusion": each.verdict})
@@ -471,11 +466,11 @@ def _row(comparison: Comparison) -> dict[str, str]:
         "n": f"{comparison.n:,}"
         if comparison.n == comparison.n_other
         else f"{comparison.n:,}; {comparison.n_other:,}",
-        "difference": signed(comparison.difference),
-        "difference_interval": span(comparison.difference_interval, signs=True),
-        "a12": f"{comparison.a12:.2f}",
-        "a12_interval": span(comparison.a12_interval, digits=2)
-        + (" *" if comparison.a12_interval and comparison.a12_interval.method == "Newcombe" else ""),
+        "difference": signed(comparison.size),
+        "difference_interval": span(comparison.difference, signs=True),
+        "a12": f"{comparison.a12.value:.2f}",
+        "a12_interval": span(comparison.a12, digits=2)
+        + (" *" if comparison.a12.method == "Newcombe" else ""),
         "p": p_in_words(comparison.p),
         "p_holm": p_in_words(comparison.p_holm),
         "verdict": comparison.verdict,
@@ -508,7 +503,7 @@ def _notes(comparisons: Sequence[Comparison]) -> list[str]:
             f"comparisons {p_in_words(min(1.0, floor * len(comparisons)))}: whatever comes out, it is no "
             f"evidence at the level of {ALPHA}."
         )
-    if any(each.difference_interval is None for each in comparisons):
+    if any(each.difference.ends is None for each in comparisons):
         notes.append(
             f"A dash: no interval. Below n = {BCA_SMALLEST_N} resamples of so few runs vary too little, and "
             "where all resamples are alike there is nothing to go by."
@@ -518,7 +513,7 @@ def _notes(comparisons: Sequence[Comparison]) -> list[str]:
             f"Equivalent: the 90 % interval of the difference by t lies within ±{MARGIN:g}. This is two one-sided "
             "tests at 5 %, not corrected. A difference that is not shown does not prove equivalence."
         )
-    if any(each.a12_interval and each.a12_interval.method == "Newcombe" for each in comparisons):
+    if any(each.a12.method == "Newcombe" for each in comparisons):
         notes.append("Marked *: Newcombe’s interval, which needs no resampling.")
     return notes
 

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from realitygap._medians import SMALLEST_N, median_interval, quartiles
 from realitygap.drawing import Ink
 from realitygap.report._drawing import (
     Drawing,
@@ -24,6 +23,7 @@ from realitygap.report._drawing import (
 from realitygap.report._marks import MOST_MARKS, Series
 from realitygap.report._marks import Panel as MarkedPanel
 from realitygap.report._tally import Results, Tally, label_of, read_tally, settings_of
+from realitygap.stats import MEDIAN_SMALLEST_N, median_interval, quartiles
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -167,8 +167,8 @@ def _series(panel: Panel, n_runs: int, decimals: int) -> tuple[Series, ...]:
     notes = []
     for values in panel.values.T:
         there = values[np.isfinite(values)]
-        interval = median_interval(there)
-        within = "" if interval is None else f" [{interval.low:.{decimals}f}, {interval.high:.{decimals}f}]"
+        interval = median_interval(there).ends
+        within = "" if interval is None else f" [{interval[0]:.{decimals}f}, {interval[1]:.{decimals}f}]"
         medians.append(float(np.median(there)))
         notes.append(f"{within}, n = {len(there):,}")
     text = f"{panel.title}, generation {{x}}: median {{y}}{{label}}"
@@ -322,8 +322,8 @@ def _draw_median(axes: Axes, values: npt.NDArray[np.float64]) -> None:
         there = values[:, generation][np.isfinite(values[:, generation])]
         generations.append(generation)
         medians.append(float(np.median(there)))
-        interval = median_interval(there)
-        bands.append((np.nan, np.nan) if interval is None else (interval.low, interval.high))
+        interval = median_interval(there).ends
+        bands.append(interval or (np.nan, np.nan))
     low, high = np.array(bands).T
     if len(generations) == 1:
         axes.plot([0, 0], [low[0], high[0]], color=Ink.BAND, linewidth=7, solid_capstyle="butt", alpha=0.75)
@@ -338,11 +338,11 @@ def _draw_median(axes: Axes, values: npt.NDArray[np.float64]) -> None:
 def _draw_best_of_runs(axes: Axes, bests: npt.NDArray[np.float64], x: float) -> None:
     """Quartiles as a thin bar, the median's interval as a thick one, the median as a dot."""
     middle = quartiles(bests)
-    interval = median_interval(bests)
+    interval = median_interval(bests).ends
     if len(bests) > 1:
         axes.plot([x, x], [middle.q25, middle.q75], color=Ink.OURS, linewidth=1.0, solid_capstyle="butt")
     if interval is not None:
-        axes.plot([x, x], [interval.low, interval.high], color=Ink.BAND, linewidth=6, solid_capstyle="butt")
+        axes.plot([x, x], interval, color=Ink.BAND, linewidth=6, solid_capstyle="butt")
     axes.plot([x], [middle.median], "o", color=Ink.OURS, markersize=4.2)
 
 
@@ -354,7 +354,7 @@ def _draw_legend(figure: Figure, panels: list[Panel], left: float, top: float, w
         Line2D([], [], color=Ink.RUN, linewidth=0.8, alpha=0.7, label="one run"),
         Line2D([], [], color=Ink.OURS, linewidth=1.7, marker="o", markersize=3.4, label="median"),
     ]
-    if any(len(panel.values) >= SMALLEST_N for panel in panels):
+    if any(len(panel.values) >= MEDIAN_SMALLEST_N for panel in panels):
         handles.append(Patch(facecolor=Ink.BAND, label="95 % interval of the median"))
     if any(len(panel.values) > 1 for panel in panels):
         handles.append(Line2D([], [], color=Ink.OURS, linewidth=1.0, label="quartiles, best of run"))
@@ -412,7 +412,7 @@ def say_runs(panels: list[Panel]) -> str:
 def say_interval(panels: list[Panel]) -> str:
     """Return a sentence on the intervals of the medians."""
     counts = [len(panel.values) for panel in panels]
-    if max(counts) < SMALLEST_N:
-        return f" (no interval: fewer than {SMALLEST_N} runs cannot give one of 95 %)"
-    missing = f", not drawn below {SMALLEST_N} runs" if min(counts) < SMALLEST_N else ""
+    if max(counts) < MEDIAN_SMALLEST_N:
+        return f" (no interval: fewer than {MEDIAN_SMALLEST_N} runs cannot give one of 95 %)"
+    missing = f", not drawn below {MEDIAN_SMALLEST_N} runs" if min(counts) < MEDIAN_SMALLEST_N else ""
     return f" with its exact 95 % interval from order statistics{missing}"

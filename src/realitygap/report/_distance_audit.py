@@ -11,16 +11,15 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import polars as pl
+import scipy
 
-from realitygap import _special as special
-from realitygap._medians import CONFIDENCE
 from realitygap.errors import RecordError, real_number, whole_number
 from realitygap.evolution import BehaviorDistance, CellOrder, behavior_distance, measure_of, pack_behaviors
-from realitygap.gap import Estimate
 from realitygap.kernels.neat import distances
 from realitygap.records import ResultsFolder
 from realitygap.report._questions import grid_of
 from realitygap.report._tally import label_of
+from realitygap.stats import CONFIDENCE, Estimate, rank_correlation
 
 Values = npt.NDArray[np.float64]
 
@@ -68,7 +67,7 @@ class Confound:
     @property
     def shared(self) -> float:
         """Share of the variance of the ranks of distances that is explained by the lengths [0..1]."""
-        found = self.correlation.estimate
+        found = self.correlation.value
         return math.nan if found is None else found**2
 
 
@@ -209,7 +208,7 @@ def _estimate(value: float, resampled: Values, n_walks: int) -> Estimate:
     if math.isnan(value):
         return Estimate.refusal(n_walks, "all cells weigh the same")
     low, high = np.quantile(resampled, _BEYOND)
-    return Estimate(float(value), float(low), float(high), n_walks)
+    return Estimate(float(value), float(low), float(high), n_walks, method="percentiles")
 
 
 # random walks
@@ -289,10 +288,8 @@ def _front_over_back(means: Values) -> Values:
 
 def _trend(means: Values) -> Values:
     """Return Spearman's correlation of means (b, c) with their place, (b,); NaN if all are equal."""
-    from scipy import stats  # takes a third of a second, which most commands can do without
-
     # equal but for the rounding of sums is equal
-    ranks = stats.rankdata(means.round(9), axis=1)
+    ranks = scipy.stats.rankdata(means.round(9), axis=1)
     ranks -= ranks.mean(axis=1, keepdims=True)
     place = np.arange(means.shape[1]) - (means.shape[1] - 1) / 2
     spread = np.sqrt((ranks**2).sum(axis=1) * (place**2).sum())
@@ -329,30 +326,10 @@ def _confound(
         n_pairs=len(apart),
         mean_cells=float(lengths.mean()),
         contained=float((both / np.maximum(1, np.minimum(lengths[0::2], lengths[1::2]))).mean()),
-        correlation=spearman(difference, apart),
+        correlation=rank_correlation(difference, apart),
         length_difference=difference,
         distance=apart,
     )
-
-
-def spearman(one: Values, other: Values) -> Estimate:
-    """Spearman's rank correlation of n pairs, with its interval.
-
-    Source: Bonett & Wright (2000), Psychometrika 65(1), 23-28: Fisher's z with variance (1 + r^2 / 2) / (n - 3).
-    """
-    from scipy import stats  # takes a third of a second, which most commands can do without
-
-    if len(one) < _LEAST_PAIRS or np.ptp(one) == 0 or np.ptp(other) == 0:
-        return Estimate.refusal(
-            len(one), "all pairs are alike in one of the two, or there are fewer than ten"
-        )
-    # two sums of one distance in another order are one distance
-    value = float(np.corrcoef(stats.rankdata(one.round(9)), stats.rankdata(other.round(9)))[0, 1])
-    if abs(value) >= 1:
-        return Estimate(value, value, value, len(one))
-    beyond = special.ndtri(_BEYOND[1]) * math.sqrt((1 + value**2 / 2) / (len(one) - 3))
-    low, high = (math.tanh(math.atanh(value) + side * beyond) for side in (-1, 1))
-    return Estimate(value, low, high, len(one))
 
 
 def _open_for(distance: BehaviorDistance, folder: ResultsFolder | str | Path) -> ResultsFolder:
@@ -421,12 +398,12 @@ def _compared(distance: BehaviorDistance) -> str:
 
 def _weight_note(audit: DistanceAudit) -> str:
     front, trend = audit.front_over_back, audit.order_correlation
-    if trend.estimate is None:
+    if trend.value is None:
         return f"Weight: all cells weigh the same, {audit.leverage.mean():.3g}."
     lead = {1: "low-numbered cells weigh most", -1: "high-numbered cells weigh most", 0: "cells weigh alike"}
     return (
         f"Weight: {lead[weight_bias(audit)]}. The first quarter of cells, as the paper sorts them, counts "
-        f"{front.estimate:.2f} times as much as the last ({front.low:.2f} to {front.high:.2f}); Spearman's correlation "
+        f"{front.value:.2f} times as much as the last ({front.low:.2f} to {front.high:.2f}); Spearman's correlation "
         f"of weight with the place in that order is {in_words(trend)}."
     )
 
@@ -442,7 +419,7 @@ def weight_bias(audit: DistanceAudit) -> int:
 def _length_note(confound: Confound) -> str:
     found = confound.correlation
     where = f"{confound.label}, {confound.of}" if confound.label else confound.of
-    if found.estimate is None:
+    if found.value is None:
         return f"Length, {where}: no correlation, all pairs being alike in one of the two."
     return (
         f"Length, {where}: Spearman's correlation of distance with the difference in cells is {in_words(found)}, "
@@ -462,5 +439,5 @@ def _used_note(audit: DistanceAudit) -> str:
 
 def in_words(found: Estimate) -> str:
     """A correlation with its interval."""
-    signs = [f"{value:+.2f}".replace("-", "−") for value in (found.estimate, found.low, found.high)]
+    signs = [f"{value:+.2f}".replace("-", "−") for value in (found.value, found.low, found.high)]
     return f"{signs[0]} ({signs[1]} to {signs[2]})"

@@ -159,7 +159,7 @@ def _draw_pairs(axes: Axes, confound: Confound, audit: DistanceAudit, *, wide: b
     unit = {"cells": "distance [cells]", "m": "distance [m]", "1": "distance"}[audit.distance.unit]
     axes.set_ylabel(unit, labelpad=3)
     found = confound.correlation
-    text = "no correlation" if found.estimate is None else f"Spearman {in_words(found)}"
+    text = "no correlation" if found.value is None else f"Spearman {in_words(found)}"
     _title(
         axes, "Distance and length", f"{confound.n_pairs:,} pairs of {'random ' if wide else ''}walks: {text}"
     )
@@ -176,13 +176,13 @@ def _draw_correlations(axes: Axes, confounds: list[Confound], names: float, *, w
     for row, each in enumerate(confounds):
         found = each.correlation
         color = Ink.RUN if row == 0 else Ink.OURS
-        if found.estimate is not None and found.low is not None and found.high is not None:
+        if found.value is not None and found.low is not None and found.high is not None:
             draw_line(axes, [found.low, found.high], [row, row], color=color, linewidth=2.2)
-            draw_line(axes, [found.estimate], [row], color=color, marker="o", markersize=5)
+            draw_line(axes, [found.value], [row], color=color, marker="o", markersize=5)
         label = f"{each.label}, {each.of}" if each.label else each.of
         for text, at, x, side in (
             (shorten(label, int(names / 0.075)), 0.0, -6, "right"),
-            ("none" if found.estimate is None else in_words(found), 1.0, 8, "left"),
+            ("none" if found.value is None else in_words(found), 1.0, 8, "left"),
         ):
             write(
                 axes, text, (at, row), (x, 0), 7.5, xycoords=("axes fraction", "data"), ha=side, va="center"

@@ -6,11 +6,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from realitygap._medians import median_interval, quartiles
 from realitygap._wording import Basis, highest, highest_median, joined, p_equation, with_interval
 from realitygap.report._champions import Champions
 from realitygap.report._comparisons import Comparison, same_but_for
 from realitygap.report._tally import Tally, label_of, score_text, settings_of, task_of
+from realitygap.stats import median_interval, quartiles
 
 MOST_FINDINGS = 3
 
@@ -139,16 +139,13 @@ def _best(study: _Study, champions: Sequence[Champions]) -> Finding:
     medians = []
     for name in leaders[:2]:
         values = study.tally.run_bests(name, study.tally.measure)
-        medians.append(with_interval(quartiles(values).median, median_interval(values)))
+        medians.append(with_interval(median_interval(values)))
     recorded = highest_median(leaders, medians)
     if not study.basis.is_fresh:
         return study.find(recorded, _rank(study, leaders[0]), None if study.compared else ("results",))
     by_name = {each.condition: each for each in champions}
     best = highest({name: float(each.expected.mean()) for name, each in by_name.items()})
-    means = [
-        with_interval(float(each.expected.mean()), each.expected_interval)
-        for each in (by_name[name] for name in best[:2])
-    ]
+    means = [with_interval(by_name[name].expected_mean) for name in best[:2]]
     claim = f"the best networks of {joined(best)} have the highest mean coverage: {' and '.join(means)}"
     evidence = f"{_rank(study, best[0])} As recorded, {recorded}.".strip()
     return study.find(claim, evidence, (*(study.tables if study.compared else ("champions",)), "results"))
@@ -159,10 +156,10 @@ def _rank(study: _Study, leader: str) -> str:
     rivals = [each.seen_from(leader) for each in study.compared if leader in (each.one, each.other)]
     if not rivals:
         return ""
-    lower = [each for each in rivals if each.is_shown and each.difference > 0]
+    lower = [each for each in rivals if each.is_shown and each.size > 0]
     if not lower:
         return f"No comparison shows that {leader} covers more than another."
-    nearest = min(lower, key=lambda each: each.difference)
+    nearest = min(lower, key=lambda each: each.size)
     n_others = len(rivals) - len(lower)
     others = (
         f"; no difference to the other {n_others if n_others > 1 else 'one'} is supported" if n_others else ""
@@ -195,7 +192,7 @@ def _nothing(study: _Study) -> Finding:
     runs = _runs(each.n for each in compared)
     claim = f"no difference in coverage between conditions is supported by {runs} each"
     if any(each.can_claim for each in compared):
-        largest = max(compared, key=lambda each: abs(each.difference))
+        largest = max(compared, key=lambda each: abs(each.size))
         evidence = f"The largest is between {largest.one} and {largest.other}: {_difference([largest])}."
     else:
         needed = max(each.runs_for_a_claim for each in compared)
@@ -241,7 +238,7 @@ def _search_sentences(first: str, second: str, found: Sequence[Comparison]) -> t
     """Return a claim on two kinds of search, and its numbers."""
     words, n = (_SEARCHES[first], _SEARCHES[second]), len(found)
     above = [each for each in found if _is_above(each)]
-    below = [each for each in found if each.is_shown and each.difference < 0]
+    below = [each for each in found if each.is_shown and each.size < 0]
     if above and below:
         levels = f"{_at_levels(len(above), n)} and less at {len(below)}"
         return f"{words[0]} covers more than {words[1]}{levels}", _difference(above)
@@ -282,13 +279,13 @@ def _of_noise(study: _Study) -> Finding | None:
         ((low, high),) = levels
         span = f" from {100 * low:g} % to {100 * high:g} %"
     shown = [each for each, _ in extremes if each.is_shown]
-    quoted = max(shown or [each for each, _ in extremes], key=lambda each: abs(each.difference))
+    quoted = max(shown or [each for each, _ in extremes], key=lambda each: abs(each.size))
     score = "coverage" if study.basis.is_fresh else "best coverage"
     what = f"the {score}{_with_searches(tally, shown or [each for each, _ in extremes])}"
     if not shown:
         claim = f"no effect of noise{span} on {what} is supported"
-    elif all(each.difference > 0 for each in shown) or all(each.difference < 0 for each in shown):
-        claim = f"more noise{span} {'raises' if quoted.difference > 0 else 'lowers'} {what}"
+    elif all(each.size > 0 for each in shown) or all(each.size < 0 for each in shown):
+        claim = f"more noise{span} {'raises' if quoted.size > 0 else 'lowers'} {what}"
     else:
         claim = f"more noise{span} raises the {score} in some conditions and lowers it in others"
     evidence = f"{quoted.one} less {quoted.other}: {_difference([quoted])}."
@@ -297,7 +294,7 @@ def _of_noise(study: _Study) -> Finding | None:
     pair = frozenset((quoted.one, quoted.other))
     recorded = next(each for each in study.recorded if frozenset((each.one, each.other)) == pair)
     recorded = recorded.seen_from(quoted.one)
-    value = with_interval(recorded.difference, recorded.difference_interval, signs=True)
+    value = with_interval(recorded.difference, signs=True)
     return study.find(
         claim, f"{evidence} As recorded, luck included: {value}.", (*study.tables, "comparisons")
     )
@@ -314,7 +311,7 @@ def _with_searches(tally: Tally, comparisons: Sequence[Comparison]) -> str:
 def _of_changes(study: _Study) -> Finding | None:
     """Return the number of changes against a baseline that are supported, and the largest."""
     changes = [each for each in study.compared if each.reason == "baseline"]
-    shown = sorted((each for each in changes if each.is_shown), key=lambda each: -abs(each.difference))
+    shown = sorted((each for each in changes if each.is_shown), key=lambda each: -abs(each.size))
     if not changes:
         return None
     if not shown:
@@ -349,21 +346,21 @@ def _limits(study: _Study, conditions: Sequence[Mapping[str, Any]], caveats: Seq
 
 
 def _is_above(comparison: Comparison) -> bool:
-    return comparison.is_shown and comparison.difference > 0
+    return comparison.is_shown and comparison.size > 0
 
 
 def _difference(comparisons: Sequence[Comparison]) -> str:
     """Return the difference with its interval and corrected p; of several, the smallest and the largest p."""
     if len(comparisons) == 1:
         (each,) = comparisons
-        value = with_interval(each.difference, each.difference_interval, signs=True)
+        value = with_interval(each.difference, signs=True)
         return f"{value}, {_p(each.p_holm)}"
     if all(each.is_shown for each in comparisons):
-        nearest = min(comparisons, key=lambda each: abs(each.difference))
-        value = with_interval(nearest.difference, nearest.difference_interval, signs=True)
+        nearest = min(comparisons, key=lambda each: abs(each.size))
+        value = with_interval(nearest.difference, signs=True)
         return f"smallest difference {value}, {_p(max(each.p_holm for each in comparisons), bound=True)}"
-    largest = max(comparisons, key=lambda each: abs(each.difference))
-    value = with_interval(largest.difference, largest.difference_interval, signs=True)
+    largest = max(comparisons, key=lambda each: abs(each.size))
+    value = with_interval(largest.difference, signs=True)
     return f"largest difference {value}, {_p(largest.p_holm)}"
 
 

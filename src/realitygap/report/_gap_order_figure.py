@@ -100,12 +100,12 @@ def _legend(axes: Axes, kinds: list[str]) -> None:
 
 def _order_in_words(gap: GapStudy) -> str:
     raw, ceiling, without = gap.result.srcc, gap.result.noise_ceiling, gap.result.srcc_disattenuated
-    if raw.estimate is None:
+    if raw.value is None:
         return raw.refused
     words = f"Spearman’s correlation {raw}"
-    if ceiling.estimate is not None:
+    if ceiling.value is not None:
         words += f"; noise allows at most {ceiling}"
-    if without.estimate is not None:
+    if without.value is not None:
         words += f"; without noise {without}"
     return words + "."
 
@@ -140,7 +140,7 @@ def draw_gap_differences(gap: GapStudy) -> Drawing:
         axes.axhline(0, color=Ink.MUTED, linewidth=0.7)
         if level.low is not None and level.high is not None:
             axes.axhspan(level.low, level.high, color=Ink.BAND, alpha=0.5, linewidth=0)
-        axes.axhline(level.estimate or 0.0, color=Ink.OURS, linewidth=1.2)
+        axes.axhline(level.value or 0.0, color=Ink.OURS, linewidth=1.2)
         for place, k in enumerate(order):
             draw_line(axes, [place, place], [lower[k], upper[k]], color=Ink.RUN, linewidth=0.8)
         draw_dots(axes, np.arange(n), differences[order], 3.4, color=Ink.TEXT)

@@ -8,7 +8,7 @@ from typing import Any
 from realitygap._version import __version__
 from realitygap._wording import p_equation
 from realitygap.errors import RecordError
-from realitygap.gap import SHOWN, Estimate, GapResult
+from realitygap.gap import SHOWN, GapResult
 from realitygap.records import is_special, refuse_results, write_whole
 from realitygap.report._gap_maps_figure import draw_gap_maps
 from realitygap.report._gap_order_figure import draw_gap_differences, draw_gap_pairs
@@ -17,6 +17,7 @@ from realitygap.report._gap_why_figure import draw_gap_why
 from realitygap.report._page import LABELS
 from realitygap.report._placed import FigureOnPage, hover_content, number_figures
 from realitygap.report._template import render_page
+from realitygap.stats import Estimate
 from realitygap.study import GapBetween
 
 _APART = (
@@ -137,7 +138,7 @@ def _row(result: GapResult, name: str, title: str, meaning: str) -> dict[str, An
     return {
         "title": title,
         "meaning": meaning.format(score=result.score),
-        "estimate": "–" if found.estimate is None else f"{found.estimate:.3f}",
+        "estimate": "–" if found.value is None else f"{found.value:.3f}",
         "interval": "–" if found.low is None else f"{found.low:.3f} to {found.high:.3f}",
         "n": found.n,
         "p": "" if p is None else p_equation(p).removeprefix("p ").removeprefix("= "),

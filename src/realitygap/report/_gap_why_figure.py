@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 def draw_gap_why(why: Why, gap: GapStudy) -> Drawing:
     """A bar for each part of the model: by how much the RMS gap falls when the fit takes the default's place."""
     order = why.order
-    values = [why.falls[k].estimate or 0.0 for k in order]
+    values = [why.falls[k].value or 0.0 for k in order]
     caption = (
         f"What each part of the model carries of the RMS gap in coverage to {gap.target.name} ({gap.target.label}): "
         f"{why.before} with the robot’s defaults (SIM), {why.after} with the fit, {why.before.n} controllers. Bars: "
@@ -39,7 +39,7 @@ def draw_gap_why(why: Why, gap: GapStudy) -> Drawing:
         figure = new_figure(width, high + 0.5)
         axes = place_axes(figure, 1.05, 0.08, width - 1.2, high)
         axes.set_gid("why")
-        ends = [end for each in why.falls for end in (each.low, each.high, each.estimate) if end is not None]
+        ends = [end for each in why.falls for end in (each.low, each.high, each.value) if end is not None]
         low, top = min(0.0, *ends), max(0.005, *ends)
         axes.set_xlim(low - 0.04 * (top - low), top + 0.04 * (top - low))
         axes.set_ylim(len(order) - 0.4, -0.6)

@@ -13,7 +13,6 @@ from typing import Any
 
 import polars as pl
 
-from realitygap._medians import CONFIDENCE, SMALLEST_N, interval_ranks
 from realitygap._version import __version__
 from realitygap.errors import RealityGapError, RecordError, RecordVersionError
 from realitygap.platforms import described_platform, is_physical
@@ -49,6 +48,7 @@ from realitygap.report._summary import summarize
 from realitygap.report._tally import Tally, label_of, read_tally, score_text, settings_of
 from realitygap.report._task_summary import summarize_tasks
 from realitygap.report._template import render_page
+from realitygap.stats import CONFIDENCE, MEDIAN_SMALLEST_N, interval_ranks
 from realitygap.study import load_study, named_studies
 
 REPORT_NAME = "report.html"
@@ -411,7 +411,7 @@ def _interval_notes(summary: pl.DataFrame) -> list[str]:
         ranks = interval_ranks(n)
         if ranks is None:
             notes.append(
-                f"With n = {n} there is no interval: fewer than {SMALLEST_N} runs cannot give one of 95 %."
+                f"With n = {n} there is no interval: fewer than {MEDIAN_SMALLEST_N} runs cannot give one of 95 %."
             )
         else:
             notes.append(

@@ -10,8 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from realitygap.report._audit import compare_samples, doubt
-from realitygap.report._permutation import SEED, smallest_p
 from realitygap.report._tally import Tally, label_of, settings_of
+from realitygap.stats import SEED, smallest_p
 
 INCH_M = 0.0254
 

@@ -5,26 +5,27 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import polars as pl
 
-from realitygap import _special as special
-from realitygap._medians import CONFIDENCE, Interval
 from realitygap.evolution import largest_cell_distance
 from realitygap.report._champions import MOST_RUNS
 from realitygap.report._comparisons import paired_values, same_but_for
-from realitygap.report._effects import (
+from realitygap.report._tally import Results, Tally, read_tally, settings_of
+from realitygap.stats import (
+    SEED,
+    Estimate,
     bca_intervals,
+    exact_share_interval,
+    lattice,
     ratio_of_robust_spreads,
     ratio_of_spreads,
     robust_spread,
 )
-from realitygap.report._permutation import SEED, lattice
-from realitygap.report._tally import Results, Tally, read_tally, settings_of
 from realitygap.world import ArenaSettings
 
 Values = npt.NDArray[np.float64]
@@ -32,31 +33,6 @@ Values = npt.NDArray[np.float64]
 MOST_BEHAVIORS = 40
 """Maximum number of behaviors of a run that are compared in pairs: all of a run of the paper's size, otherwise a
 sample."""
-
-
-@dataclass(frozen=True)
-class Share:
-    """A share of n with its exact interval (Clopper & Pearson 1934)."""
-
-    count: int
-    n: int
-
-    @property
-    def value(self) -> float:
-        """Observed share [0..1]."""
-        return self.count / self.n
-
-    @property
-    def interval(self) -> tuple[float, float]:
-        """Return its bounds, at least 95 %."""
-        beyond = (1 - CONFIDENCE) / 2
-        low = special.betaincinv(self.count, self.n - self.count + 1, beyond) if self.count > 0 else 0.0
-        high = (
-            special.betaincinv(self.count + 1, self.n - self.count, 1 - beyond)
-            if self.count < self.n
-            else 1.0
-        )
-        return float(low), float(high)
 
 
 # plateaus
@@ -67,11 +43,11 @@ def plateau_length(n_generations: int) -> int:
     return n_generations // 2
 
 
-def plateaus(tally: Tally, condition: str) -> Share | None:
+def plateaus(tally: Tally, condition: str) -> Estimate | None:
     """Runs whose best coverage so far does not rise in the last half of their generations.
 
     Returns:
-        The share as two counts; None with fewer than two generations.
+        The share of runs with its exact interval; None with fewer than two generations.
     """
     bests = tally.generation_bests(condition, tally.measure)
     n, generations = bests.shape
@@ -79,7 +55,7 @@ def plateaus(tally: Tally, condition: str) -> Share | None:
     if n == 0 or k == 0:
         return None
     so_far = np.fmax.accumulate(bests, axis=1)
-    return Share(int((so_far[:, -1] == so_far[:, -1 - k]).sum()), n)
+    return exact_share_interval(int((so_far[:, -1] == so_far[:, -1 - k]).sum()), n)
 
 
 # spread
@@ -96,10 +72,8 @@ class Spread:
         robust: Mean distance from the median, in standard deviations of a normal distribution with as much; a few
             extreme runs move it less.
         reference: Condition with which it is compared; its own name if there is none.
-        ratio: `deviation` divided by that of the reference; NaN if that is 0.
-        ratio_interval: BCa interval; None if n is too small.
+        ratio: `deviation` divided by that of the reference, with its BCa interval; refused if that is 0.
         robust_ratio: Ratio of `robust`, like `ratio`.
-        robust_interval: BCa, likewise.
     """
 
     condition: str
@@ -107,10 +81,8 @@ class Spread:
     deviation: float
     robust: float
     reference: str
-    ratio: float
-    ratio_interval: Interval | None
-    robust_ratio: float
-    robust_interval: Interval | None
+    ratio: Estimate
+    robust_ratio: Estimate
 
 
 def spreads(tally: Tally) -> list[Spread]:
@@ -129,21 +101,24 @@ def _reference(condition: Mapping[str, Any], others: Sequence[Mapping[str, Any]]
     return str(condition["name"])
 
 
-def _ratio(one: float, other: float) -> float:
-    return one / other if other > 0 else math.nan
+def _ratio(one: float, other: float, estimate: Estimate) -> Estimate:
+    """Return the ratio of two spreads with the interval of an estimate of it."""
+    if other <= 0:
+        return Estimate.refusal(estimate.n, "The other condition has no spread.")
+    return replace(estimate, value=one / other)
 
 
 def _spread(tally: Tally, condition: str, reference: str) -> Spread:
     own = tally.run_bests(condition, tally.measure)
     samples = paired_values(tally, condition, reference)
-    ratio_interval = robust_interval = None
-    ratio = robust_ratio = math.nan
-    if reference != condition and min(len(samples.one), len(samples.other)) > 1:
-        ratio = _ratio(float(samples.one.std(ddof=1)), float(samples.other.std(ddof=1)))
-        robust_ratio = _ratio(robust_spread(samples.one), robust_spread(samples.other))
-        ratio_interval, robust_interval = bca_intervals(
-            [ratio_of_spreads, ratio_of_robust_spreads], samples.one, samples.other, paired=samples.paired
+    one, other = samples.one, samples.other
+    ratio = robust = Estimate.refusal(min(len(one), len(other)), "There is no other condition with two runs.")
+    if reference != condition and min(len(one), len(other)) > 1:
+        ratio, robust = bca_intervals(
+            [ratio_of_spreads, ratio_of_robust_spreads], one, other, paired=samples.paired
         )
+        ratio = _ratio(float(one.std(ddof=1)), float(other.std(ddof=1)), ratio)
+        robust = _ratio(robust_spread(one), robust_spread(other), robust)
     return Spread(
         condition,
         len(own),
@@ -151,9 +126,7 @@ def _spread(tally: Tally, condition: str, reference: str) -> Spread:
         robust_spread(own),
         reference,
         ratio,
-        ratio_interval,
-        robust_ratio,
-        robust_interval,
+        robust,
     )
 
 

@@ -21,11 +21,9 @@ from realitygap.report._comparisons import (
     comparisons_content,
     same_but_for,
 )
-from realitygap.report._effects import bca_interval, difference_of_means, mean_interval
 from realitygap.report._findings import basis_of
 from realitygap.report._questions import (
     MOST_BEHAVIORS,
-    Share,
     Variety,
     chances,
     measure_variety,
@@ -34,6 +32,7 @@ from realitygap.report._questions import (
     spreads,
 )
 from realitygap.report._tally import Tally, label_of, settings_of
+from realitygap.stats import Estimate, bca_interval, bca_mean, difference_of_means
 
 _SELECTIONS = {"coverage": "objective search", "novelty": "novelty search", "random": "unrelated networks"}
 
@@ -90,7 +89,7 @@ def _deception(
                 "condition": name,
                 "n": share.n,
                 "mean": f"{values.mean():.3f}",
-                "interval": span(mean_interval(values)),
+                "interval": span(bca_mean(values)),
                 "plateaus": _percent(share),
                 "plateaus_interval": _percent_span(share),
             }
@@ -150,27 +149,29 @@ def _apart(comparisons: Sequence[Comparison], names: Mapping[str, str], one: str
     )
     if found is None:
         return f"{words[0]} and {words[1]} not compared"
-    interval = found.difference_interval
-    within = f" ({span(interval, signs=True)})" if interval else ""
+    within = _within(found.difference)
     if found.is_shown:
-        where = "above" if found.difference > 0 else "below"
-        return f"{words[0]} {where} {words[1]} by {abs(found.difference):.3f}{within}"
+        where = "above" if found.size > 0 else "below"
+        return f"{words[0]} {where} {words[1]} by {abs(found.size):.3f}{within}"
     if not found.can_claim:
         why = "too few runs for a claim"
     elif found.is_equivalent:
         why = f"not shown to differ, and equivalent within ±{MARGIN:g}"
     else:
         why = f"not shown to differ, nor to be equivalent within ±{MARGIN:g}"
-    return f"{words[0]} less {words[1]} {signed(found.difference)}{within}, {why}"
+    return f"{words[0]} less {words[1]} {signed(found.size)}{within}, {why}"
 
 
-def _percent(share: Share) -> str:
-    return f"{100 * share.value:.0f} %"
+def _within(difference: Estimate, digits: int = 3) -> str:
+    return "" if difference.ends is None else f" ({span(difference, digits, signs=True)})"
 
 
-def _percent_span(share: Share) -> str:
-    low, high = share.interval
-    return f"{100 * low:.0f}–{100 * high:.0f} %"
+def _percent(share: Estimate) -> str:
+    return f"{100 * (share.value or 0.0):.0f} %"
+
+
+def _percent_span(share: Estimate) -> str:
+    return "–" if share.ends is None else f"{100 * share.ends[0]:.0f}–{100 * share.ends[1]:.0f} %"
 
 
 # champions
@@ -227,10 +228,7 @@ def _difference_between(comparisons: Sequence[Comparison], one: str, other: str)
     for each in comparisons:
         if {each.one, each.other} == {one, other}:
             turned = each.seen_from(one)
-            within = (
-                f" ({span(turned.difference_interval, signs=True)})" if turned.difference_interval else ""
-            )
-            return f"{signed(turned.difference)}{within}"
+            return f"{signed(turned.size)}{_within(turned.difference)}"
     return "–"
 
 
@@ -249,14 +247,15 @@ def _references(key: str, conditions: Sequence[Mapping[str, Any]]) -> dict[str, 
 
 
 def _champion_row(champions: Champions, difference: str) -> dict[str, str]:
+    luck = champions.luck
     return {
         "condition": champions.condition,
         "n": f"{champions.n:,}",
         "reported": f"{champions.reported.mean():.3f}",
         "expected": f"{champions.expected.mean():.3f}",
-        "expected_interval": span(champions.expected_interval),
-        "luck": signed(champions.luck),
-        "luck_interval": span(champions.luck_interval, signs=True),
+        "expected_interval": span(champions.expected_mean),
+        "luck": signed(luck.value or 0.0),
+        "luck_interval": span(luck, signs=True),
         "reference": difference,
     }
 
@@ -275,17 +274,17 @@ def _spread(tally: Tally) -> dict[str, Any]:
                 "deviation": _number(each.deviation),
                 "robust": _number(each.robust),
                 "reference": each.reference if compared else "",
-                "ratio": _number(each.ratio, 2) if compared else "",
-                "ratio_interval": span(each.ratio_interval, 2) if compared else "",
-                "robust_ratio": _number(each.robust_ratio, 2) if compared else "",
-                "robust_interval": span(each.robust_interval, 2) if compared else "",
+                "ratio": _number(each.ratio.value, 2) if compared else "",
+                "ratio_interval": span(each.ratio, 2) if compared else "",
+                "robust_ratio": _number(each.robust_ratio.value, 2) if compared else "",
+                "robust_interval": span(each.robust_ratio, 2) if compared else "",
             }
         )
     return {"rows": rows, "has_ratio": any(row["reference"] for row in rows)}
 
 
-def _number(value: float, digits: int = 3) -> str:
-    return fixed(value, digits) if math.isfinite(value) else "–"
+def _number(value: float | None, digits: int = 3) -> str:
+    return "–" if value is None or not math.isfinite(value) else fixed(value, digits)
 
 
 # variety
@@ -317,14 +316,13 @@ def _variety_row(variety: Variety, objective: Variety | None) -> dict[str, str]:
         ("jaccard", 3, variety.jaccard, None if objective is None else objective.jaccard),
     ):
         row[name] = f"{own.mean():.{digits}f}"
-        row[f"{name}_interval"] = span(mean_interval(own), digits)
+        row[f"{name}_interval"] = span(bca_mean(own), digits)
         row[f"{name}_less"] = "" if other is None else _difference(own, other, digits)
     return row
 
 
 def _difference(one: npt.NDArray[np.float64], other: npt.NDArray[np.float64], digits: int = 3) -> str:
-    interval = bca_interval(difference_of_means, one, other, paired=False)
-    within = f" ({span(interval, digits, signs=True)})" if interval else ""
+    within = _within(bca_interval(difference_of_means, one, other, paired=False), digits)
     return f"{signed(float(one.mean() - other.mean()), digits)}{within}"
 
 

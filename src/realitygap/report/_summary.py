@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 import polars as pl
 
-from realitygap._medians import IntervalRanks, interval_ranks
 from realitygap.records import ResultsFolder
 from realitygap.report._driven import read_driven
 from realitygap.report._tally import (
@@ -22,6 +21,7 @@ from realitygap.report._tally import (
     labeled_conditions,
     no_trials,
 )
+from realitygap.stats import IntervalRanks, interval_ranks
 
 _STATISTICS = ("median", "q25", "q75", "low", "high")
 _MEASURES: tuple[Measure, ...] = ("line", "ends")

@@ -9,9 +9,9 @@ import numpy as np
 import numpy.typing as npt
 import polars as pl
 
-from realitygap._medians import median_interval, quartiles
 from realitygap.records import ResultsFolder
 from realitygap.report._tally import bests_of, label_of, labeled_conditions, task_of
+from realitygap.stats import median_interval, quartiles
 
 TASK_SCHEMA = pl.Schema(
     {
@@ -53,13 +53,13 @@ def summarize_tasks(folder: ResultsFolder | str | Path) -> pl.DataFrame:
 
 def _described(best: npt.NDArray[np.float64]) -> dict[str, float | None]:
     of_runs = best.max(axis=1)
-    middle, interval = quartiles(of_runs), median_interval(of_runs)
+    middle, median = quartiles(of_runs), median_interval(of_runs)
     return {
         "first": float(np.median(best[:, 0])),
         "last": float(np.median(best[:, -1])),
         "median": middle.median,
         "q25": middle.q25,
         "q75": middle.q75,
-        "low": None if interval is None else interval.low,
-        "high": None if interval is None else interval.high,
+        "low": median.low,
+        "high": median.high,
     }

@@ -55,13 +55,13 @@ def transfer_card(result: TransferResult) -> Card:
     ends = [
         value
         for each in result.strategies
-        for value in (each.quality.estimate, each.quality.low, each.quality.high)
+        for value in (each.quality.value, each.quality.low, each.quality.high)
         if value is not None
     ]
     rows = []
     for each in result.strategies:
         quality = each.quality
-        bar = Bar(quality.estimate, quality.low, quality.high, min(0.0, *ends), max(ends)) if ends else ""
+        bar = Bar(quality.value, quality.low, quality.high, min(0.0, *ends), max(ends)) if ends else ""
         simulated = "–" if each.simulated is None else f"{each.simulated:.3f}"
         rows.append([each.strategy, f"{each.budget:,}", str(quality), bar, str(each.regret), simulated])
     heads = ["strategy", "budget", f"{result.score} on the target", "interval", "regret", "in simulation"]

@@ -7,9 +7,9 @@ probability that rises with distance it is 0 instead, and with another it is any
 from __future__ import annotations
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
-from realitygap import _special as special
 from realitygap.world import RangeSensor
 
 from ._readings import Array, Placement, Places, Readings, logistic
@@ -99,7 +99,7 @@ class MixtureReadings(Readings):
     def _at(self, places: Places, values: Array) -> Array:
         back, spread, drop, out = self.parts(places, values)
         edges = self._light(self._edges)
-        below = special.ndtr((edges - back[..., None]) / spread[..., None])
+        below = scipy.special.ndtr((edges - back[..., None]) / spread[..., None])
         below = np.concatenate([np.zeros_like(below[..., :1]), below, np.ones_like(below[..., :1])], axis=2)
         normal = np.diff(below, axis=2)
         even = np.concatenate([[0.0], np.diff(self._edges), [0.0]])
@@ -119,7 +119,7 @@ class MixtureReadings(Readings):
         for first in range(0, len(values), ROWS):
             rows = slice(first, first + ROWS)
             back, spread, drop, out = (part[:, which] for part in self.parts(self.places, values[rows]))
-            normal = special.ndtr((upper - back) / spread) - special.ndtr((lower - back) / spread)
+            normal = scipy.special.ndtr((upper - back) / spread) - scipy.special.ndtr((lower - back) / spread)
             chance = (1.0 - drop - out) * normal + out * np.where(is_inside, self.step, half)
             chance = chance + drop * (readings <= 0.0)
             chance = (1.0 - stray) * chance + stray * self.step

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
-from realitygap import _special as special
 from realitygap.world import RangeSensor
 
 from ._readings import Array, Placement, Places, Readings, logistic
@@ -100,8 +100,6 @@ def _ways(pulses: int) -> Array:
     """Return the number of ways to detect k of e pulses, (e, k); 0 for more than e."""
     e, k = np.mgrid[: pulses + 1, : pulses + 1]
     left = np.maximum(e - k, 0)
-    return np.asarray(
-        np.where(
-            k <= e, np.exp(special.gammaln(e + 1) - special.gammaln(k + 1) - special.gammaln(left + 1)), 0.0
-        )
-    )
+    log_factorials = scipy.special.gammaln([e + 1, k + 1, left + 1])
+    ways = np.exp(log_factorials[0] - log_factorials[1] - log_factorials[2])
+    return np.asarray(np.where(k <= e, ways, 0.0))

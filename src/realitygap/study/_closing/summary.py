@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import scipy
 
-from realitygap import _special as special
 from realitygap._version import __version__
-from realitygap.gap import bounded_interval
 from realitygap.records import read_object
+from realitygap.stats import Estimate, Range, mean_interval, median_interval, share_interval
 from realitygap.world import Fitted
 
 from .plan import ClosingPlan, TwinName, read_plan
@@ -194,9 +194,9 @@ def _family(
         "observe": observe,
         "budget": budget,
         "n": len(values),
-        "rms": median_interval(values),
+        "rms": _row(median_interval(values)),
         "n_counted": len(falls),
-        "fall": median_interval(falls),
+        "fall": _row(median_interval(falls)),
     }
 
 
@@ -213,7 +213,7 @@ def _strategies(twins: Sequence[Row]) -> list[Row]:
         for row in twin.get("transfer", []):
             found.setdefault(row["strategy"], []).append(row["quality"]["estimate"])
     return [
-        {"strategy": name, "n": len(values), **_mean_interval(values, (0.0, 1.0))}
+        {"strategy": name, "n": len(values), **_row(_mean(values, (0.0, 1.0)))}
         for name, values in found.items()
     ]
 
@@ -260,7 +260,7 @@ def _goals_of_platform(plan: ClosingPlan, family: str, twins: Sequence[Row], bud
             yield _goal(name, figure, len(at), FALLS[observe], "at least", [])
         order = [after["gap"]["srcc_disattenuated"] for _, after in at]
         known = [value for value in order if value is not None]
-        figure = _mean_interval(known, (-1.0, 1.0))
+        figure = _mean(known, (-1.0, 1.0))
         yield _goal(f"disattenuated SRCC, {title}", figure, len(known), LEAST_SRCC, "at least", [])
 
 
@@ -310,18 +310,18 @@ def _median_goal(
 
 
 def _goal(
-    name: str, figure: Row, n: int, goal: float, sense: str, why: list[Row], unknown: Sequence[Row] = ()
+    name: str, figure: Estimate, n: int, goal: float, sense: str, why: list[Row], unknown: Sequence[Row] = ()
 ) -> Row:
-    ends = {"low": figure["low"], "high": figure["high"]}
     return {
         "name": name,
-        "figure": figure["estimate"],
-        **ends,
+        "figure": figure.value,
+        "low": figure.low,
+        "high": figure.high,
         "n": n,
         "unknown": list(unknown),
         "goal": goal,
         "sense": sense,
-        "met": is_met(**ends, goal=goal, sense=sense),
+        "met": is_met(figure.low, figure.high, goal, sense),
         "why": why,
     }
 
@@ -332,9 +332,9 @@ def _no_family_worse(plan: ClosingPlan, observe: str, falls: Sequence[tuple[Row,
         family: [value for twin, _, value in falls if twin["family"] == family] for family in plan.families
     }
     medians = {family: median_interval(values) for family, values in by_family.items() if values}
-    worst = min(medians, key=lambda family: medians[family]["estimate"], default=None)
+    worst = min(medians, key=lambda family: medians[family].value or 0.0, default=None)
     figure = medians[worst] if worst is not None else median_interval([])
-    worse = [each for each in falls if medians[each[0]["family"]]["estimate"] < 0 and each[2] < 0]
+    worse = [each for each in falls if (medians[each[0]["family"]].value or 0.0) < 0 and each[2] < 0]
     return _goal(
         f"smallest fall of a family, {observe}" + (f" ({worst})" if worst else ""),
         figure,
@@ -353,12 +353,10 @@ def _wins(counted: Sequence[Row], observe: str, other: str, least: float) -> Row
         if f"posterior, {observe}" in quality and other in quality:
             pairs.append((twin, quality[f"posterior, {observe}"] - quality[other]))
     wins = [1.0 if difference > 0 else 0.5 if difference == 0 else 0.0 for _, difference in pairs]
-    share = float(np.mean(wins)) if wins else None
-    low, high = share_interval(sum(wins), len(wins))
     sense = "at least" if other == "direct" else "more than"
     return _goal(
         f"posterior, {observe}, better than {other}",
-        {"estimate": share, "low": low, "high": high},
+        share_interval(sum(wins), len(wins)),
         len(pairs),
         least,
         sense,
@@ -399,27 +397,12 @@ def _why(row: Row, after: Row, value: float) -> Row:
 # intervals
 
 
-def median_interval(values: Sequence[float]) -> Row:
-    """Return the median, with the 95 % interval between two of the values in order; without one below six of them.
-
-    Source: Conover (1999), Practical Nonparametric Statistics, section 3.2.
-    """
-    from scipy import stats  # takes a third of a second, which most commands can do without
-
-    n = len(values)
-    if not n:
-        return {"estimate": None, "low": None, "high": None}
-    ordered = np.sort(np.asarray(values, float))
-    rank = int(stats.binom.ppf(0.025, n, 0.5))
-    if 2 * stats.binom.cdf(rank, n, 0.5) > 0.05:
-        rank -= 1
-    found: Row = {"estimate": float(np.median(ordered)), "low": None, "high": None}
-    if rank >= 0:
-        found |= {"low": float(ordered[rank]), "high": float(ordered[n - 1 - rank])}
-    return found
+def _row(estimate: Estimate) -> Row:
+    """Return the number and the ends of its interval, as they are in a file."""
+    return {"estimate": estimate.value, "low": estimate.low, "high": estimate.high}
 
 
-def pooled_fall(before: Sequence[float], after: Sequence[float]) -> Row:
+def pooled_fall(before: Sequence[float], after: Sequence[float]) -> Estimate:
     """Return by which share the RMS gap over all sittings falls, with a 95 % interval over sittings.
 
     The gap is the root of the mean square over sittings. The interval is Student's for the logarithm of the ratio, by
@@ -430,40 +413,22 @@ def pooled_fall(before: Sequence[float], after: Sequence[float]) -> Row:
         after: The same after calibration.
 
     Returns:
-        `estimate`, `low`, `high`; None where there are too few sittings, or no gap before.
+        The share, None without a gap before; without an interval if there are too few sittings.
     """
     n = len(before)
     squares = np.square([before, after], dtype=float)
     if not n or not squares[0].any():
-        return {"estimate": None, "low": None, "high": None}
+        return Estimate.refusal(n, "There is no gap before calibration.")
     of_before, of_after = squares.mean(axis=1)
-    found: Row = {"estimate": float(1 - np.sqrt(of_after / of_before)), "low": None, "high": None}
-    if n > 1 and of_after > 0:
-        shares = squares[1] / of_after - squares[0] / of_before
-        reach = float(special.stdtrit(n - 1, 0.975)) * float(np.std(shares, ddof=1)) / (2 * math.sqrt(n))
-        ratio = 1 - found["estimate"]
-        found |= {"low": 1 - ratio * math.exp(reach), "high": 1 - ratio * math.exp(-reach)}
-    return found
+    fall = float(1 - np.sqrt(of_after / of_before))
+    if n < 2 or of_after <= 0:
+        return Estimate.of_few(fall, n, 2, "sittings")
+    shares = squares[1] / of_after - squares[0] / of_before
+    reach = float(scipy.special.stdtrit(n - 1, 0.975)) * float(np.std(shares, ddof=1)) / (2 * math.sqrt(n))
+    return Estimate(fall, 1 - (1 - fall) * math.exp(reach), 1 - (1 - fall) * math.exp(-reach), n, method="t")
 
 
-def _mean_interval(values: Sequence[float], within: tuple[float, float]) -> Row:
-    """Return the mean, with Student's 95 % interval within the range of the values."""
-    n = len(values)
-    if not n:
-        return {"estimate": None, "low": None, "high": None}
-    mean = float(np.mean(values))
-    if n < 2:
-        return {"estimate": mean, "low": None, "high": None}
-    error = float(np.std(values, ddof=1)) / math.sqrt(n)
-    low, high = bounded_interval(mean, error, float(special.stdtrit(n - 1, 0.975)), within)
-    return {"estimate": mean, "low": float(low), "high": float(high)}
-
-
-def share_interval(successes: float, n: int) -> tuple[float | None, float | None]:
-    """Return Wilson's 95 % interval of a share."""
-    if not n:
-        return None, None
-    p, z2 = successes / n, NORMAL_95**2
-    center = (p + z2 / (2 * n)) / (1 + z2 / n)
-    reach = NORMAL_95 * math.sqrt(p * (1 - p) / n + z2 / (4 * n * n)) / (1 + z2 / n)
-    return max(0.0, center - reach), min(1.0, center + reach)
+def _mean(values: Sequence[float], within: Range) -> Estimate:
+    if not values:
+        return Estimate.refusal(0, "There are no values.")
+    return mean_interval(values, within, smallest=2)

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realitygap.errors import StudyError, whole_number
-from realitygap.gap import Needed, check_plan, plan_correlation, plan_effect, plan_margin, trial_reliability
 from realitygap.platforms import open_target
 from realitygap.records import read_observations
+from realitygap.stats import Needed, check_plan, plan_correlation, plan_effect, plan_margin, trial_reliability
 from realitygap.tasks import CoverageTask, Task, score_observed
 from realitygap.trials import those_that_count
 from realitygap.world import Arena, load_arena

@@ -14,19 +14,16 @@ from realitygap.errors import StudyError, whole_number
 from realitygap.evolution import Genome
 from realitygap.gap import (
     CoverageMaps,
-    Estimate,
     GapResult,
     GapSide,
     ReplayError,
     coverage_maps,
-    difference_of_groups,
-    mean_of,
     measure_gap,
-    range_of_differences,
     replay_error,
 )
 from realitygap.platforms import SimTarget, split_spec
 from realitygap.records import OBSERVATIONS, ObservationsFile, Observe, TrialRecord
+from realitygap.stats import Estimate, difference_interval, mean_interval, range_of_differences
 from realitygap.tasks import CoverageTask, Task, score_observed
 from realitygap.trials import Target, TrialPlan, is_whole
 from realitygap.world import Arena, Pose
@@ -314,7 +311,7 @@ def _luck(controllers: Sequence[Controller], task: Task) -> Estimate:
     ]
     if not lost:
         return Estimate.refusal(0, "No controller was selected for its score where it can be tried again.")
-    return mean_of(np.array(lost), range_of_differences(task.score_range))
+    return mean_interval(lost, range_of_differences(task.score_range))
 
 
 def _reevolved(
@@ -345,4 +342,4 @@ def _reevolved(
         )
     here = in_source.means[[k for k, _ in champions]]
     there = side_of(target, on_target, len(reevolved), task).means
-    return difference_of_groups(here, there, task.score_range)
+    return difference_interval(there, here, task.score_range, noun="champions")

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from realitygap import _special as special
 from realitygap.drawing import card_of
-from realitygap.gap import CONFIDENCE, COVERAGE, Estimate, bounded_interval
+from realitygap.gap import COVERAGE
+from realitygap.stats import Estimate, t_interval
 
 
 @dataclass(frozen=True)
@@ -146,7 +146,7 @@ def summarize_transfer(
         scores = np.array([champion.scores for champion in group])
         quality = estimate_mean(scores, score_range)
         low, high = (None if end is None else best - end for end in (quality.high, quality.low))
-        regret = Estimate(best - float(scores.mean()), low, high, quality.n)
+        regret = Estimate(best - float(scores.mean()), low, high, quality.n, method=quality.method)
         simulated = [champion.simulated for champion in group if champion.simulated is not None]
         mean = float(np.mean(simulated)) if simulated else None
         rows.append(Strategist(strategy, budget, quality, regret, mean))
@@ -166,6 +166,5 @@ def estimate_mean(values: NDArray[np.float64], within: tuple[float, float] = (0.
         return Estimate(mean, None, None, r)
     of_trials = float(values.var(axis=1, ddof=1).mean()) / (r * t) if t > 1 else 0.0
     variance = max(float(means.var(ddof=1)) / r, of_trials) if r > 1 else of_trials
-    reach = float(special.stdtrit((r if r > 1 else t) - 1, (1 + CONFIDENCE) / 2))
-    low, high = bounded_interval(mean, math.sqrt(variance), reach, within)
-    return Estimate(mean, float(low), float(high), r)
+    low, high = t_interval(mean, math.sqrt(variance), (r if r > 1 else t) - 1, within)
+    return Estimate(mean, float(low), float(high), r, method="t")

@@ -2,21 +2,28 @@
 
 from __future__ import annotations
 
+import functools
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
-from realitygap import _special as special
+from realitygap.errors import check_finite
 
-from ._bootstrap import SMALLEST_N
-from ._correlation import attenuated, spearman
-from ._equivalence import controllers_for_margin, fewest
-from ._side import Values
+from ._correlation import attenuated, correlation_error, spearman
+from ._estimate import Values
+from ._means import SMALLEST_N
+from ._permutation import ALPHA
+from ._shares import root, share_interval
 
-ALPHA = 0.05
-MOST = 100_000
+POWER = 0.8
+"""Statistical power for which the required n is reported."""
+
+MOST_CONTROLLERS = 100_000
+MOST_RUNS = 1_000_000
 SIMULATED = 2_000
 """Studies that are simulated to check a number: the interval of a power of 0.8 is then ±0.02."""
 
@@ -82,8 +89,8 @@ def plan_effect(
     if n is None:
         return Needed(trials, None)
     means, errors = _simulated(effect, sd, n, seed)
-    found = np.abs(means) > float(special.stdtrit(n - 1, 1 - ALPHA / 2)) * errors
-    return Needed(trials, n, *_share(found))
+    found = np.abs(means) > float(scipy.special.stdtrit(n - 1, 1 - ALPHA / 2)) * errors
+    return _needed(trials, n, found)
 
 
 def detectable_difference(n: int, *, spread: float, noise: float, trials: int, power: float = 0.8) -> float:
@@ -103,13 +110,8 @@ def detectable_difference(n: int, *, spread: float, noise: float, trials: int, p
     _check(noise=noise + spread)
     if n < 2:
         raise ValueError(f"n is {n}, expected 2 or more.")
-    low, high = 0.0, 1.0
-    while _t_power(high, n) < power:
-        low, high = high, 2 * high
-    for _ in range(40):  # far below the digits that anybody reads
-        middle = (low + high) / 2
-        low, high = (middle, high) if _t_power(middle, n) < power else (low, middle)
-    return high * spread_of_differences(spread, noise, trials)
+    effect = detectable_effect(n, paired=True, power=power)
+    return (effect or 0.0) * spread_of_differences(spread, noise, trials)
 
 
 def plan_margin(
@@ -123,8 +125,8 @@ def plan_margin(
     if n is None:
         return Needed(trials, None)
     means, errors = _simulated(0.0, sd, n, seed)
-    reach = float(special.stdtrit(n - 1, 1 - ALPHA)) * errors
-    return Needed(trials, n, *_share(np.abs(means) + reach < margin))
+    reach = float(scipy.special.stdtrit(n - 1, 1 - ALPHA)) * errors
+    return _needed(trials, n, np.abs(means) + reach < margin)
 
 
 def plan_correlation(
@@ -151,12 +153,12 @@ def plan_correlation(
     check_plan(power, correlation=correlation, least=least)
     seen, floor = (attenuated(each, reliability, reliability) for each in (correlation, least))
     n = fewest(lambda n: _z_power(seen, floor, n), power, smallest=SMALLEST_N)
-    while n is not None and n <= MOST:
+    while n is not None and n <= MOST_CONTROLLERS:
         found = _simulated_correlations(correlation, reliability, floor, n, seed)
-        share, low, high = _share(found)
+        needed, share = _needed(trials, n, found), float(found.mean())
         # fewer studies give a wider interval, which is no reason for more controllers
-        if low >= power - SHORT_OF * math.sqrt(SIMULATED / len(found)):
-            return Needed(trials, n, share, low, high)
+        if (needed.low or 0.0) >= power - SHORT_OF * math.sqrt(SIMULATED / len(found)):
+            return needed
         n = max(n + 1, math.ceil(n * min((_reach(power) / _reach(share)) ** 2, 2.0)))
     return Needed(trials, None)
 
@@ -201,25 +203,14 @@ def _check(**values: float) -> None:
             raise ValueError(f"{name} is {value}, expected a number above 0{limit}.")
 
 
-def _t_power(effect: float, n: int) -> float:
-    critical = float(special.stdtrit(n - 1, 1 - ALPHA / 2))
-    center = abs(effect) * math.sqrt(n)
-    found = 1 - float(special.nctdtr(n - 1, center, critical))
-    return found if math.isfinite(found) else float(special.ndtr(center - critical))
-
-
-def _error(correlation: float, n: int) -> float:
-    return math.sqrt((1 + correlation**2 / 2) / (n - 3))
-
-
 def _z_power(seen: float, floor: float, n: int) -> float:
-    apart = (math.atanh(seen) - math.atanh(floor)) / _error(seen, n)
-    return float(special.ndtr(apart - special.ndtri(1 - ALPHA)))
+    apart = (math.atanh(seen) - math.atanh(floor)) / correlation_error(seen, n)
+    return float(scipy.special.ndtr(apart - scipy.special.ndtri(1 - ALPHA)))
 
 
 def _reach(power: float) -> float:
     """Return the distance of a correlation from the floor for a power, in standard errors; it grows with sqrt(n)."""
-    return float(special.ndtri(max(power, 2 * ALPHA)) + special.ndtri(1 - ALPHA))
+    return float(scipy.special.ndtri(max(power, 2 * ALPHA)) + scipy.special.ndtri(1 - ALPHA))
 
 
 def _simulated(mean: float, sd: float, n: int, seed: int) -> tuple[Values, Values]:
@@ -243,13 +234,107 @@ def _simulated_correlations(
     seen = spearman(*(side + noise * rng.normal(size=side.shape) for side in (source, target)))
     seen = np.clip(seen, -1 + 1e-12, 1 - 1e-12)
     errors = np.sqrt((1 + seen**2 / 2) / (n - 3))
-    return np.asarray(np.arctanh(seen) - special.ndtri(1 - ALPHA) * errors > math.atanh(floor))
+    return np.asarray(np.arctanh(seen) - scipy.special.ndtri(1 - ALPHA) * errors > math.atanh(floor))
 
 
-def _share(found: NDArray[np.bool_]) -> tuple[float, float, float]:
-    """Return a share with its interval of 95 %: Wilson (1927)."""
-    n, share = len(found), float(found.mean())
-    z = float(special.ndtri(0.975))
-    center = (share + z * z / (2 * n)) / (1 + z * z / n)
-    reach = z * math.sqrt(share * (1 - share) / n + z * z / (4 * n * n)) / (1 + z * z / n)
-    return share, center - reach, center + reach
+def _needed(trials: int, n: int, found: NDArray[np.bool_]) -> Needed:
+    """Return n controllers with the share of simulated studies that detect the effect."""
+    share = share_interval(int(found.sum()), len(found))
+    return Needed(trials, n, share.value, share.low, share.high)
+
+
+# power
+
+
+def equivalence_power(margin: float, spread: float, n: int, difference: float = 0.0) -> float:
+    """Return the probability that n controllers show equivalence.
+
+    Args:
+        margin: Margin above 0.
+        spread: Standard deviation of differences over controllers.
+        n: Controllers, at least 2.
+        difference: The true one.
+
+    Source: Owen (1965), approximated: the noncentral t distributions of both tests, as if they never missed together
+    (Phillips 1990); within 0.01 of the truth for a power of 0.5 and more.
+    """
+    check_finite({"margin": margin, "spread": spread, "difference": difference})
+    if spread <= 0:
+        return float(abs(difference) < margin)
+    critical = float(scipy.special.stdtrit(n - 1, 1 - ALPHA))
+    scale = math.sqrt(n) / spread
+    passes = sum(_above(n - 1, side * scale, critical) for side in (margin - difference, margin + difference))
+    return float(np.clip(passes - 1, 0.0, 1.0))
+
+
+def controllers_for_margin(margin: float, spread: float, power: float = POWER) -> int | None:
+    """Return the smallest number of controllers that shows equivalence with this power; None if 100,000 do not."""
+    return fewest(lambda n: equivalence_power(margin, spread, n), power)
+
+
+def fewest(
+    power_of: Callable[[int], float], power: float, smallest: int = 2, most: int = MOST_CONTROLLERS
+) -> int | None:
+    """Return the smallest n, from `smallest` on, of which a growing function reaches a power; None if above `most`."""
+    low, high = smallest - 1, smallest
+    while power_of(high) < power:
+        low, high = high, 2 * high
+        if low > most:
+            return None
+    while high - low > 1:
+        middle = (low + high) // 2
+        low, high = (middle, high) if power_of(middle) < power else (low, middle)
+    return high
+
+
+def runs_needed(effect: float, *, paired: bool, alpha: float = ALPHA) -> int | None:
+    """Runs a condition with which a t test finds a difference of `effect` standard deviations so often.
+
+    Args:
+        effect: Difference of means over the standard deviation of a run (`paired`: of a difference).
+        paired: True if runs come in pairs.
+        alpha: Two-sided level.
+
+    Returns:
+        The number, at least 2; None above a million.
+
+    Source: Cohen (1988), chapter 2, by the noncentral t distribution. It assumes normal values; the
+    permutation tests here need about as many.
+    """
+    return fewest(lambda n: _t_power(effect, n, paired, alpha), POWER, most=MOST_RUNS)
+
+
+@functools.lru_cache
+def detectable_effect(n: int, *, paired: bool, alpha: float = ALPHA, power: float = POWER) -> float | None:
+    """Return the smallest difference [standard deviations] that n runs of each condition detect; None below 2 runs.
+
+    Args:
+        n: Number of runs, or of pairs.
+        paired, alpha: Arguments of `runs_needed`.
+        power: Probability of detecting it.
+
+    Source: as `runs_needed`.
+    """
+    if n < 2:
+        return None
+    high = 1.0
+    while _t_power(high, n, paired, alpha) < power:
+        high *= 2
+    return root(lambda effect: _t_power(effect, n, paired, alpha) - power, 0.0, high)
+
+
+def _t_power(effect: float, n: int, paired: bool = True, alpha: float = ALPHA) -> float:
+    """Return the power of a two-sided t test for an effect in standard deviations."""
+    freedom = n - 1 if paired else 2 * n - 2
+    center = abs(effect) * math.sqrt(n if paired else n / 2)
+    critical = float(scipy.special.stdtrit(freedom, 1 - alpha / 2))
+    # a difference found with the wrong sign; beyond 3 it is less than one in 10 million
+    wrong = float(scipy.special.nctdtr(freedom, center, -critical)) if center < 3 else 0.0
+    return _above(freedom, center, critical) + (wrong if math.isfinite(wrong) else 0.0)
+
+
+def _above(freedom: int, center: float, critical: float) -> float:
+    """Return the probability that noncentral t is above a critical value."""
+    share = 1.0 - float(scipy.special.nctdtr(freedom, center, critical))
+    # so far out the noncentral distribution cannot be computed, and a normal one will do
+    return share if math.isfinite(share) else float(scipy.special.ndtr(center - critical))

@@ -3,16 +3,16 @@
 import numpy as np
 import pytest
 
-from realitygap.gap import controllers_for_margin, equivalence_power, prove_equivalence
+from realitygap.stats import controllers_for_margin, equivalence_power, prove_equivalence
 
 
 def test_equivalence_is_shown_where_the_interval_lies_within_the_margin():
     differences = np.array([0.01, -0.02, 0.015, 0.0, -0.01, 0.005])
     shown, not_shown = prove_equivalence(differences, 0.05), prove_equivalence(differences, 0.01)
     assert shown.equivalent
-    assert -0.05 < shown.low < shown.high < 0.05
+    assert -0.05 < shown.difference.low < shown.difference.high < 0.05
     assert not not_shown.equivalent
-    assert not -0.01 < not_shown.low < not_shown.high < 0.01
+    assert not -0.01 < not_shown.difference.low < not_shown.difference.high < 0.01
 
 
 def test_the_false_claim_at_the_margin_is_5_percent():

@@ -8,17 +8,11 @@ from collections.abc import Callable, Iterator, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from realitygap import _special as special
-
-from ._estimate import CONFIDENCE
 from ._side import GapSide, Values
 
 Statistic = Callable[[Values, Values], Values]
 """A function of trials in simulation (b, c, r) and on the target (b, c, q) that returns a number for each sample,
 (b,)."""
-
-SMALLEST_N = 5
-"""Fewer controllers give no interval: by the expansion for small n it would end beyond all resamples."""
 
 _BLOCK = 4_000_000
 """Values of trials that are held at a time."""
@@ -126,30 +120,3 @@ def bootstrap(
         for name, statistic in statistics.items():
             found[name].append(statistic(one, other))
     return {name: np.concatenate(parts) for name, parts in found.items()}
-
-
-def bootstrap_mean(values: Values, n_resamples: int, rng: np.random.Generator) -> Values:
-    """Return the means of resamples, (b,), for values (n,), one of each controller."""
-    return np.asarray(values[rng.integers(0, len(values), (n_resamples, len(values)))].mean(axis=1))
-
-
-def interval(
-    resamples: Values, n: int, confidence: float = CONFIDENCE
-) -> tuple[float, float] | tuple[None, None]:
-    """Return the percentiles of resamples, expanded for few controllers; none below 5.
-
-    Args:
-        resamples: (b,) a statistic of resamples; nan is left out.
-        n: Controllers.
-        confidence: Probability, between 0 and 1.
-
-    Source: Hesterberg (2015), The American Statistician 69(4), 371-386: percentiles are too narrow as if t were
-    normal and n were n - 1, and are taken farther out by as much.
-    """
-    there = resamples[np.isfinite(resamples)]
-    if n < SMALLEST_N or len(there) < len(resamples) / 2:
-        return None, None
-    reach = math.sqrt(n / (n - 1)) * float(special.stdtrit(n - 1, (1 + confidence) / 2))
-    tail = float(special.ndtr(-reach))
-    low, high = np.quantile(there, [tail, 1 - tail])
-    return float(low), float(high)

@@ -3,8 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from realitygap import _medians
-from realitygap.report import interval_ranks, median_interval, quartiles
+from realitygap.stats import _medians, interval_ranks, median_interval, quartiles, share_interval
 
 
 def test_ranks_for_ten_values_are_those_worked_by_hand():
@@ -71,7 +70,6 @@ def test_ranks_counted_in_whole_numbers_are_those_of_scipy(monkeypatch):
 def test_interval_takes_the_values_of_its_ranks_in_any_order():
     values = np.array([7.0, 1.0, 10.0, 4.0, 2.0, 9.0, 3.0, 8.0, 5.0, 6.0])
     interval = median_interval(values)
-    assert interval is not None
     assert (interval.low, interval.high) == (2.0, 9.0)
     assert values[0] == 7.0, "the caller's array was sorted in place"
 
@@ -99,6 +97,16 @@ def test_interval_of_a_discrete_median_covers_at_least_as_often():
     assert covered.mean() > ranks.coverage - 5 * np.sqrt(0.25 / n_samples)
 
 
+def test_intervals_of_medians_and_shares_are_those_of_the_tables():
+    # Conover (1999), table A3: of 10 values ranks 2 and 9 bound the median at 97.9 %; none of 5 at 95 %
+    ten = median_interval(range(1, 11))
+    assert (ten.value, ten.low, ten.high) == (5.5, 2.0, 9.0)
+    assert (median_interval(range(5)).ends, median_interval(range(5)).needed) == (None, 6)
+    assert median_interval(range(6)).low == 0.0
+    # Newcombe (1998), table I, Wilson's: 81 of 263
+    assert share_interval(81, 263).ends == pytest.approx((0.2553, 0.3662), abs=5e-5)
+
+
 def test_quartiles_are_those_worked_by_hand():
     # definition 7: position (n - 1) p, so 0.75, 1.5 and 2.25 between four values
     found = quartiles(np.array([4.0, 1.0, 2.0, 3.0]))
@@ -108,7 +116,8 @@ def test_quartiles_are_those_worked_by_hand():
 def test_one_value_is_its_own_quartiles():
     found = quartiles(np.array([0.25]))
     assert (found.q25, found.median, found.q75) == (0.25, 0.25, 0.25)
-    assert median_interval(np.array([0.25])) is None
+    assert median_interval(np.array([0.25])).ends is None
+    assert median_interval([]).value is None
 
 
 def test_bad_values_are_refused():

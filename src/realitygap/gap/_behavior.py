@@ -1,17 +1,18 @@
-"""Energy distance of behaviors, with a permutation test that never compares different controllers."""
+"""Measures of behavior: energy distances with a test within controllers, and maps of visited cells."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
-from ._side import Values
+from ._side import GapSide, Values
 
 PERMUTATIONS = 999
-ALPHA = 0.05
 
 
 def energy_distances(source: Values, target: Values) -> Values:
@@ -67,12 +68,10 @@ def smallest_energy_p(n: int, r: int, q: int) -> float:
 
 def _matrices(source: Values, target: Values) -> Iterator[Values]:
     """Yield the distances between the trials of each controller, (r + q, r + q)."""
-    from scipy.spatial.distance import cdist  # which takes a while to import, and nothing else needs
-
     if min(source.shape[1], target.shape[1]) < 2:
         raise ValueError("An energy distance needs at least 2 trials of each controller on both sides.")
     both = np.concatenate([source, target], axis=1).astype(float)
-    return (cdist(each, each) for each in both)
+    return (scipy.spatial.distance.cdist(trials, trials) for trials in both)
 
 
 def _shared_out(matrix: Values, is_in_source: NDArray[np.bool_]) -> Values:
@@ -86,3 +85,29 @@ def _shared_out(matrix: Values, is_in_source: NDArray[np.bool_]) -> Values:
     across = (to_source * in_target).sum(axis=1) / (r * q)
     within_target = (in_target @ matrix * in_target).sum(axis=1) / (q * (q - 1))
     return np.asarray(2 * across - within_source - within_target)
+
+
+@dataclass(frozen=True)
+class CoverageMaps:
+    """Shares of trials that cross each cell.
+
+    Attributes:
+        source: (n_cells,) share of trials in simulation that visit a cell [0..1].
+        target: (n_cells,) on the target.
+    """
+
+    source: Values
+    target: Values
+
+    @property
+    def difference(self) -> Values:
+        """Difference of the maps, target minus simulator, (n_cells,) [-1..1]."""
+        return self.target - self.source
+
+
+def coverage_maps(source: GapSide, target: GapSide) -> CoverageMaps | None:
+    """Return the maps of both sides with equal weights of controllers; None if the cells of a side are unknown."""
+    if not (len(source.cells) and len(target.cells)):
+        return None
+    one, other = (side.cells.mean(axis=(0, 1)) for side in (source, target))
+    return CoverageMaps(one, other)

@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from realitygap.gap import (
-    GapSide,
+from realitygap.gap import GapSide, measure_gap
+from realitygap.stats import (
     attenuated,
     check_plan,
     detectable_difference,
-    measure_gap,
     plan_correlation,
     plan_effect,
     plan_margin,

@@ -1,22 +1,20 @@
-"""Effect sizes with intervals, and the number of runs required to detect an effect."""
+"""Bootstraps: intervals from resampled values."""
 
 from __future__ import annotations
 
 import functools
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
+import scipy
 
-from realitygap import _special as special
-from realitygap._medians import CONFIDENCE, Interval
-from realitygap.gap import fewest
-from realitygap.kernels.math.resampling import count_drawn
-from realitygap.report._permutation import ALPHA, SEED
+from ._estimate import CONFIDENCE, Ends, Estimate, Values
+from ._means import SMALLEST_N
+from ._permutation import SEED
 
-Values = npt.NDArray[np.float64]
 Statistic = Callable[[Values, Values, Values], Values]
 """A function of values (u,) and of their counts in b samples of each side, (b, u), that returns (b,)."""
 
@@ -24,33 +22,40 @@ BCA_SMALLEST_N = 10
 """Fewer runs give no bootstrap interval: resamples of so few values vary too little, and it would be too short."""
 
 RESAMPLES = 1_999
-POWER = 0.8
-"""Statistical power for which the required number of runs is reported."""
-
-USUAL_EFFECTS = {"small": 0.56, "medium": 0.64, "large": 0.71}
-"""A12 of what is called a small, medium and large effect (Vargha & Delaney 2000, Table 1)."""
+"""Number of resamples behind a BCa interval."""
 
 NORMAL_MEAN_DISTANCE = math.sqrt(2 / math.pi)
 """Mean distance from the median of a normal distribution [standard deviations]."""
 
-MOST_RUNS = 1_000_000
 _BLOCK = 4_000_000
 
 
-def a12(one: Values, other: Values) -> float:
-    """Return the probability that a run of one condition is above a run of the other; ties count half [0..1].
+def resampled_means(values: Values, n_resamples: int, rng: np.random.Generator) -> Values:
+    """Return the means of resamples, (b,), for independent values (n,)."""
+    return np.asarray(values[rng.integers(0, len(values), (n_resamples, len(values)))].mean(axis=1))
+
+
+def percentile_interval(resamples: Values, n: int, level: float = CONFIDENCE) -> Ends | None:
+    """Return the percentiles of resamples, expanded for few values; None below 5.
 
     Args:
-        one: (n,) and
-        other: (m,) values in any order, n, m >= 1.
+        resamples: (b,) a statistic of resamples; nan is left out.
+        n: Independent values behind the statistic.
+        level: Probability, between 0 and 1.
 
-    Source: Vargha & Delaney (2000), Journal of Educational and Behavioral Statistics 25(2).
+    Source: Hesterberg (2015), The American Statistician 69(4), 371-386: percentiles are too narrow as if t were
+    normal and n were n - 1, and are taken farther out by as much.
     """
-    if len(one) == 0 or len(other) == 0:
-        raise ValueError("one and other need at least one value each.")
-    ordered = np.sort(other)
-    below = np.searchsorted(ordered, one, "left") + np.searchsorted(ordered, one, "right")
-    return float(below.sum() / (2 * len(one) * len(other)))
+    finite = resamples[np.isfinite(resamples)]
+    if n < SMALLEST_N or len(finite) < len(resamples) / 2:
+        return None
+    reach = math.sqrt(n / (n - 1)) * float(scipy.special.stdtrit(n - 1, (1 + level) / 2))
+    tail = float(scipy.special.ndtr(-reach))
+    low, high = np.quantile(finite, [tail, 1 - tail])
+    return float(low), float(high)
+
+
+# with bias and acceleration corrected
 
 
 def difference_of_means(values: Values, one: Values, other: Values) -> Values:
@@ -102,14 +107,8 @@ def _deviations(values: Values, counts: Values) -> Values:
     return np.asarray(np.sqrt(squares / np.maximum(n - 1, 1)))
 
 
-def bca_interval(
-    statistic: Statistic,
-    one: Values,
-    other: Values,
-    *,
-    paired: bool,
-) -> Interval | None:
-    """The bootstrap interval of an effect, corrected for bias and skewness.
+def bca_interval(statistic: Statistic, one: Values, other: Values, *, paired: bool) -> Estimate:
+    """Return an effect with its bootstrap interval, corrected for bias and skewness.
 
     Args:
         statistic: Statistic of two samples, given as counts over their values.
@@ -118,7 +117,7 @@ def bca_interval(
         paired: True if value k of one belongs to value k of the other.
 
     Returns:
-        The interval; None below 10 runs, or if all resamples are equal.
+        The effect; without an interval below 10 runs, or if all resamples are equal.
 
     Raises:
         ValueError: `paired` with samples of different size.
@@ -127,47 +126,55 @@ def bca_interval(
     `scipy.stats.bootstrap`, which draws the same resamples. Differs: they are kept as counts, and what
     is equal but for rounding counts as a tie.
     """
-    (interval,) = bca_intervals([statistic], one, other, paired=paired)
-    return interval
+    (estimate,) = bca_intervals([statistic], one, other, paired=paired)
+    return estimate
 
 
 def bca_intervals(
-    statistics: Sequence[Statistic],
-    one: Values,
-    other: Values,
-    *,
-    paired: bool,
-) -> list[Interval | None]:
-    """Return BCa intervals of several effects of the same samples, which are resampled once."""
+    statistics: Sequence[Statistic], one: Values, other: Values, *, paired: bool
+) -> list[Estimate]:
+    """Return several effects of the same samples, which are resampled once, with their BCa intervals."""
     if paired and len(one) != len(other):
         raise ValueError(f"Pairs need samples of one size, these have {len(one)} and {len(other)} values.")
-    if min(len(one), len(other)) < BCA_SMALLEST_N:
-        return [None] * len(statistics)
+    n = min(len(one), len(other))
+    if n == 0:
+        return [Estimate.refusal(0, "There are no runs.") for _ in statistics]
     values, codes = np.unique(np.concatenate([one, other]), return_inverse=True)
     samples = _Samples(values, codes[: len(one)], codes[len(one) :], paired)
+    observed = [float(statistic(values, *(c[None] for c in samples.counts))[0]) for statistic in statistics]
+    if n < BCA_SMALLEST_N:
+        return [_with_value(Estimate.of_few(value, n, BCA_SMALLEST_N, "runs")) for value in observed]
     resampled = samples.resample(statistics, RESAMPLES)
-    return [_bca(*each, samples) for each in zip(statistics, resampled, strict=True)]
+    return [_with_value(_bca(*parts, samples)) for parts in zip(statistics, observed, resampled, strict=True)]
 
 
-def _bca(statistic: Statistic, resampled: Values, samples: _Samples) -> Interval | None:
+def _with_value(estimate: Estimate) -> Estimate:
+    """Return the estimate; without a number if that is not finite, such as a ratio to a spread of 0."""
+    is_number = estimate.value is not None and math.isfinite(estimate.value)
+    return estimate if is_number else replace(estimate, value=None)
+
+
+def _bca(statistic: Statistic, observed: float, resampled: Values, samples: _Samples) -> Estimate:
+    n = min(len(samples.one), len(samples.other))
+    alike = Estimate(observed, None, None, n, "All resamples are alike, so there is no interval.")
     if not np.isfinite(resampled).all() or np.ptp(resampled) == 0:
-        return None
-    observed = float(statistic(samples.values, *(counts[None] for counts in samples.counts))[0])
+        return alike
     ties = 1e-12 * max(1.0, abs(observed))
     below = ((resampled < observed - ties).mean() + (resampled <= observed + ties).mean()) / 2
-    bias = special.ndtri(below)
+    bias = scipy.special.ndtri(below)
     skewness = samples.acceleration(statistic)
     tails = np.array([(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2])
-    shifted = bias + special.ndtri(tails)
-    bounds = np.quantile(resampled, special.ndtr(bias + shifted / (1 - skewness * shifted)))
+    shifted = bias + scipy.special.ndtri(tails)
+    bounds = np.quantile(resampled, scipy.special.ndtr(bias + shifted / (1 - skewness * shifted)))
     if not np.isfinite(bounds).all():
-        return None
-    return Interval(float(bounds[0]), float(bounds[1]), "BCa")
+        return alike
+    return Estimate(observed, float(bounds[0]), float(bounds[1]), n, method="BCa")
 
 
-def mean_interval(values: Values) -> Interval | None:
-    """Return the BCa interval of a mean; None below 10 values or if all are equal."""
-    return bca_interval(_first_mean, values, values, paired=True)
+def bca_mean(values: Values) -> Estimate:
+    """Return the mean of (n,) values with its BCa interval; without one below 10 values or if all are equal."""
+    estimate = bca_interval(_first_mean, values, values, paired=True)
+    return replace(estimate, value=float(values.mean()))
 
 
 def _first_mean(values: Values, one: Values, _: Values) -> Values:
@@ -230,6 +237,10 @@ class _Samples:
 
 def _counts(draws: npt.NDArray[np.int64], places: npt.NDArray[np.int64], n_values: int) -> Values:
     """Return the counts of each value in each draw (b, n) from a sample of places (m,), (b, u)."""
+    from realitygap.kernels.math.resampling import (
+        count_drawn,  # Numba loads slowly, and medians need none of it
+    )
+
     counts = np.zeros((len(draws), n_values))
     count_drawn(draws, places, counts)
     return counts
@@ -251,91 +262,3 @@ def _draw(n: int, m: int | None, n_resamples: int, block: int) -> Iterator[_Draw
 def _draw_once(n: int, m: int | None, n_resamples: int, block: int) -> list[_Draws]:
     """Return the indices of `_draw`, cached for the next samples of these sizes."""
     return list(_draw(n, m, n_resamples, block))
-
-
-def newcombe_interval(share: float, n: int, m: int) -> Interval:
-    """Return an interval of A12 for few runs, without resampling. It has a width even if all runs are above.
-
-    Args:
-        share: A12 as observed [0..1].
-        n: Number of runs of one condition.
-        m: Number of runs of the other.
-
-    Source: Newcombe (2006), Statistics in Medicine 25(4), 559-573, method 5.
-    """
-    z = special.ndtri((1 + CONFIDENCE) / 2)
-    others = (n + m) / 2 - 1
-
-    def excess(at: float) -> float:
-        variance = at * (1 - at) * (1 + others * ((1 - at) / (2 - at) + at / (1 + at))) / (n * m)
-        return float((at - share) ** 2 - z * z * variance)
-
-    # at 0 and 1 the share itself is a root too, which is not the one that is meant
-    low = 0.0 if share <= 0 else _root(excess, 0.0, min(share, 1 - 1e-9))
-    high = 1.0 if share >= 1 else _root(excess, max(share, 1e-9), 1.0)
-    return Interval(float(low), float(high), "Newcombe")
-
-
-def runs_needed(effect: float, *, paired: bool, alpha: float = ALPHA) -> int | None:
-    """Runs a condition with which a t test finds a difference of `effect` standard deviations so often.
-
-    Args:
-        effect: Difference of means over the standard deviation of a run (`paired`: of a difference).
-        paired: True if runs come in pairs.
-        alpha: Two-sided level.
-
-    Returns:
-        The number, at least 2; None above a million.
-
-    Source: Cohen (1988), chapter 2, by the noncentral t distribution. It assumes normal values; the
-    permutation tests here need about as many.
-    """
-    return fewest(lambda n: _power(effect, n, paired, alpha), POWER, most=MOST_RUNS)
-
-
-@functools.lru_cache
-def detectable_effect(n: int, *, paired: bool, alpha: float = ALPHA) -> float | None:
-    """The smallest difference [standard deviations] that n runs a condition find so often; None below 2.
-
-    Source: as `runs_needed`.
-    """
-    if n < 2:
-        return None
-    high = 1.0
-    while _power(high, n, paired, alpha) < POWER:
-        high *= 2
-    return _root(lambda effect: _power(effect, n, paired, alpha) - POWER, 0.0, high)
-
-
-def _root(function: Callable[[float], float], low: float, high: float) -> float:
-    """Return the point between two bounds at which a function changes its sign, by bisection, to about the last bit."""
-    sign = function(low) > 0
-    while low < (middle := (low + high) / 2) < high:
-        if (function(middle) > 0) == sign:
-            low = middle
-        else:
-            high = middle
-    return middle
-
-
-def _power(effect: float, n: int, paired: bool, alpha: float) -> float:
-    freedom = n - 1 if paired else 2 * n - 2
-    center = abs(effect) * math.sqrt(n if paired else n / 2)
-    critical = float(special.stdtrit(freedom, 1 - alpha / 2))
-    found = 1.0 - float(special.nctdtr(freedom, center, critical))
-    if not math.isfinite(found):
-        # so far out the noncentral distribution cannot be computed, and a normal one will do
-        found = float(special.ndtr(center - critical))
-    # a difference found with the wrong sign; beyond 3 it is less than one in 10 million
-    wrong = float(special.nctdtr(freedom, center, -critical)) if center < 3 else 0.0
-    return found + (wrong if math.isfinite(wrong) else 0.0)
-
-
-def effect_of_a12(share: float) -> float:
-    """The difference of means [standard deviations] of two normal conditions with this A12."""
-    return float(math.sqrt(2) * special.ndtri(share))
-
-
-def a12_of_effect(effect: float) -> float:
-    """Return A12 of two normal conditions whose means differ by `effect` standard deviations."""
-    return float(special.ndtr(effect / math.sqrt(2)))

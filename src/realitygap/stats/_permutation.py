@@ -8,7 +8,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-Values = npt.NDArray[np.float64]
+from ._estimate import Values
 
 ALPHA = 0.05
 """Level: a difference is claimed if its p, corrected by Holm, is below it."""
@@ -135,12 +135,20 @@ def _two_sided(share: float) -> float:
     return min(1.0, 2.0 * share)
 
 
-def smallest_p(n: int, m: int | None = None) -> float:
+def smallest_p(n: int, m: int | None = None, *, as_drawn: bool = False) -> float:
     """The smallest two-sided p that n pairs can give, or with `m` n runs against m.
 
     It is 2 / 2^n, or 2 / (n + m choose n): that of the two most extreme relabelings, without ties.
+
+    Args:
+        n: Number of pairs, or of runs.
+        m: Number of runs of the other condition.
+        as_drawn: True for the p of `permutation_p`, which draws relabelings if there are too many to count.
     """
-    return min(1.0, math.ldexp(1.0, 1 - n) if m is None else 2 / math.comb(n + m, n))
+    if m is None:
+        return min(1.0, math.ldexp(1.0, 1 - n))
+    exact = min(1.0, 2 / math.comb(n + m, n))
+    return max(exact, 2 / (MONTE_CARLO + 1)) if as_drawn and exact < 2 / MOST_ENUMERATED else exact
 
 
 def runs_for_a_claim(n_comparisons: int = 1, *, paired: bool, alpha: float = ALPHA) -> int:

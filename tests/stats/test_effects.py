@@ -8,19 +8,25 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from realitygap.report import Interval, a12, bca_interval, detectable_effect, newcombe_interval, runs_needed
-from realitygap.report._effects import (
+from realitygap.stats import (
     RESAMPLES,
+    SEED,
+    a12,
     a12_of_effect,
+    bca_interval,
+    bca_mean,
+    detectable_effect,
     difference_of_means,
     effect_of_a12,
-    mean_interval,
+    exact_share_interval,
+    newcombe_interval,
     ratio_of_robust_spreads,
     ratio_of_spreads,
     robust_spread,
+    runs_needed,
     share_above,
+    share_interval,
 )
-from realitygap.report._permutation import SEED
 
 SAMPLES = st.lists(st.integers(0, 72).map(lambda k: k / 72), min_size=1, max_size=12).map(np.array)
 
@@ -82,7 +88,7 @@ def test_interval_of_a_mean_is_scipys():
     theirs = stats.bootstrap(
         (values,), np.mean, n_resamples=RESAMPLES, rng=np.random.default_rng(SEED)
     ).confidence_interval
-    ours = mean_interval(values)
+    ours = bca_mean(values)
     assert (ours.low, ours.high) == pytest.approx((theirs.low, theirs.high), rel=1e-6)
 
 
@@ -90,7 +96,7 @@ def test_counts_do_not_change_with_the_block(monkeypatch):
     rng = np.random.default_rng(2)
     one, other = rng.integers(0, 30, 40) / 72, rng.integers(0, 30, 40) / 72
     before = bca_interval(share_above, one, other, paired=True)
-    monkeypatch.setattr("realitygap.report._effects._BLOCK", 1000)
+    monkeypatch.setattr("realitygap.stats._resampling._BLOCK", 1000)
     assert bca_interval(share_above, one, other, paired=True) == before
 
 
@@ -99,7 +105,7 @@ def test_bca_of_a_mean_covers_what_it_should():
     rng = np.random.default_rng(21)
     hits = 0
     for _ in range(300):
-        interval = mean_interval(rng.integers(0, 40, 30) / 72)
+        interval = bca_mean(rng.integers(0, 40, 30) / 72)
         hits += interval.low <= 19.5 / 72 <= interval.high
     assert hits / 300 >= 0.87
 
@@ -107,12 +113,12 @@ def test_bca_of_a_mean_covers_what_it_should():
 def test_few_or_equal_values_have_no_bootstrap_interval():
     rng = np.random.default_rng(1)
     nine = rng.normal(size=9)
-    assert bca_interval(difference_of_means, nine, nine, paired=False) is None
-    assert mean_interval(np.full(20, 0.25)) is None
+    assert bca_interval(difference_of_means, nine, nine, paired=False).ends is None
+    assert bca_mean(np.full(20, 0.25)).ends is None
     apart = bca_interval(share_above, rng.random(10) + 2, rng.random(10), paired=False)
-    assert apart is None, "all above: resamples cannot tell how surely"
+    assert apart.ends is None, "all above: resamples cannot tell how surely"
     flat = bca_interval(ratio_of_spreads, rng.normal(size=20), np.ones(20), paired=False)
-    assert flat is None
+    assert flat.ends is None
 
 
 def test_pairs_need_one_size():
@@ -154,6 +160,20 @@ def test_newcombe_covers_with_five_runs_each():
         assert hits / 1000 >= 0.9
 
 
+def test_intervals_of_shares_are_scipys():
+    for method, ours in (("wilson", share_interval), ("exact", exact_share_interval)):
+        for count, n in ((0, 5), (3, 12), (81, 263), (7, 7)):
+            theirs = stats.binomtest(count, n).proportion_ci(method=method)
+            estimate = ours(count, n)
+            assert (estimate.low, estimate.high) == pytest.approx((theirs.low, theirs.high)), (
+                method,
+                count,
+                n,
+            )
+            assert estimate.value == count / n
+    assert share_interval(0, 0).value is None
+
+
 def test_runs_needed_are_cohens():
     # Cohen (1988), table 2.4.1: d = 0.2, 0.5, 0.8 at 5 % two-sided and power 0.80
     assert [runs_needed(d, paired=False) for d in (0.5, 0.8)] == [64, 26]
@@ -187,4 +207,3 @@ def test_power_is_what_simulation_gives():
 def test_robust_spread_is_that_of_a_normal_distribution():
     values = stats.norm.ppf((np.arange(100_000) + 0.5) / 100_000) * 3
     assert robust_spread(values) == pytest.approx(3, rel=1e-3)
-    assert Interval(0, 1, "BCa").method == "BCa"

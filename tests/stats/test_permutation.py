@@ -9,8 +9,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from realitygap.report import holm, permutation_p, runs_for_a_claim, sign_flip_p, smallest_p
-from realitygap.report._permutation import lattice
+from realitygap.stats import holm, lattice, permutation_p, runs_for_a_claim, sign_flip_p, smallest_p
 
 pytestmark = pytest.mark.slow
 

@@ -6,17 +6,9 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from realitygap.gap import (
-    GapSide,
-    bounded_interval,
-    difference_of_groups,
-    mean_of,
-    measure_gap,
-    prove_equivalence,
-    replay_error,
-    rms_interval,
-)
+from realitygap.gap import GapSide, measure_gap, replay_error, rms_interval
 from realitygap.report._comparisons import Samples
+from realitygap.stats import difference_interval, mean_interval, prove_equivalence, t_interval
 from realitygap.study._transfer.result import estimate_mean
 
 N = 6_000
@@ -42,7 +34,7 @@ def test_interval_covers_the_mean_and_never_leaves_the_range():
         for n in (2, 5, 10, 30):
             values = low + width * rng.beta(a, b, (N, n))
             error = values.std(axis=1, ddof=1) / np.sqrt(n)
-            lower, upper = bounded_interval(values.mean(axis=1), error, stats.t.ppf(0.975, n - 1), within)
+            lower, upper = t_interval(values.mean(axis=1), error, n - 1, within)
             coverage = ((lower <= truth) & (truth <= upper)).mean()
             assert coverage > 0.925, f"{name}, n = {n}: covers {coverage:.3f}"
             assert within[0] <= lower.min(), name
@@ -50,10 +42,13 @@ def test_interval_covers_the_mean_and_never_leaves_the_range():
 
 
 def test_interval_without_a_range_is_the_usual_one_and_of_equal_values_is_their_mean():
-    low, high = bounded_interval([0.2, 3.0], [0.1, 0.5], 2.0, (-np.inf, np.inf))
-    assert np.allclose([low, high], [[0.0, 2.0], [0.4, 4.0]])
+    reach = stats.t.ppf(0.975, 7)
+    low, high = t_interval([0.2, 3.0], [0.1, 0.5], 7)
+    assert np.allclose(
+        [low, high], [[0.2 - 0.1 * reach, 3 - 0.5 * reach], [0.2 + 0.1 * reach, 3 + 0.5 * reach]]
+    )
     for mean in (0.0, 0.3, 1.0):
-        assert bounded_interval(mean, 0.0, 12.7, (0.0, 1.0)) == (mean, mean)
+        assert t_interval(mean, 0.0, 1, (0.0, 1.0)) == (mean, mean)
 
 
 def test_no_interval_of_a_score_leaves_its_range():
@@ -68,12 +63,12 @@ def test_no_interval_of_a_score_leaves_its_range():
             found = measure_gap(source, target, margin=0.5, resamples=200)
             scales = {"level": -1, "equivalence": -1, "rms": 0, "a12": 0, "srcc": -1, "mmrv": 0}
             ends = {name: (scale, getattr(found, name)) for name, scale in scales.items()}
-            ends["luck"] = -1, mean_of(source.means - target.means, (-1.0, 1.0))
-            ends["re-evolved"] = -1, difference_of_groups(source.means, target.means, (0.0, 1.0))
+            ends["luck"] = -1, mean_interval(source.means - target.means, (-1.0, 1.0))
+            ends["re-evolved"] = -1, difference_interval(target.means, source.means, (0.0, 1.0))
             ends["transfer"] = 0, estimate_mean(source.values)
             for name, (low, each) in ends.items():
                 if each.low is not None:
-                    assert low <= each.low <= each.estimate <= each.high <= 1, f"{name} of {c}: {each}"
+                    assert low <= each.low <= each.value <= each.high <= 1, f"{name} of {c}: {each}"
             for side in (source, target):
                 low, high = side.intervals()
                 assert low.min() >= 0
@@ -90,7 +85,7 @@ def test_equivalence_has_one_scale_for_its_interval_and_its_p():
         for _ in range(100):
             differences = np.clip(rng.normal(rng.uniform(-0.5, 0.5), 0.3, n), -0.99, 0.99)
             found = prove_equivalence(differences, 0.6, (0.0, 1.0))
-            assert found.equivalent == (found.low > -0.6 and found.high < 0.6)
+            assert found.equivalent == (found.difference.low > -0.6 and found.difference.high < 0.6)
     assert prove_equivalence(np.array([0.3, -0.9]), 1.0, (0.0, 1.0)).equivalent
 
 

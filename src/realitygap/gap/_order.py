@@ -1,19 +1,68 @@
-"""Mean maximum rank violation: what wrong order in simulation costs on the target."""
+"""The order of controllers: reliability of means, and what wrong order in simulation costs on the target."""
 
 from __future__ import annotations
 
 import math
 
 import numpy as np
+import scipy
 
-from realitygap import _special as special
+from realitygap.stats import CONFIDENCE, spearman
 
-from ._correlation import SPLITS, Rng, halves
-from ._estimate import CONFIDENCE
 from ._side import Values
+
+SPLITS = 100
+"""Random halves behind a split-half number."""
 
 _BLOCK = 4_000_000
 """Pairs of controllers that are held at a time."""
+
+Rng = np.random.Generator
+
+
+def halves(values: Values, rng: Rng) -> tuple[Values, Values]:
+    """Return the means of two random halves of the trials, floor(r / 2) each, (b, c).
+
+    Args:
+        values: (b, c, r), r at least 2.
+        rng: Draws the halves, the same ones for all samples.
+    """
+    order = rng.permutation(values.shape[2])
+    size = values.shape[2] // 2
+    one, other = order[:size], order[size : 2 * size]
+    return np.asarray(values[:, :, one].mean(axis=2)), np.asarray(values[:, :, other].mean(axis=2))
+
+
+def lengthened(correlation: Values, times: float) -> Values:
+    """Return the reliability of a test that is longer by a factor.
+
+    Source: Spearman (1910) and Brown (1910), British Journal of Psychology 3. Differs: 0 for a correlation below 0,
+    for which the formula means nothing.
+    """
+    positive = np.maximum(correlation, 0.0)
+    return np.asarray(times * positive / (1 + (times - 1) * positive))
+
+
+def reliability(values: Values, rng: Rng, splits: int = SPLITS) -> Values:
+    """Return the reliability of the means of r trials: their rank correlation with those of new trials, 0 to 1, (b,).
+
+    The rank correlation between halves, mean of `splits` random ones, lengthened to r trials.
+
+    Args:
+        values: (b, c, r), r at least 2.
+        rng: Draws the halves.
+        splits: Number of random splits.
+    """
+    between = [spearman(*halves(values, rng)) for _ in range(splits)]
+    size = values.shape[2] // 2
+    return lengthened(np.nan_to_num(np.mean(between, axis=0)), values.shape[2] / size)
+
+
+def trials_for_reliability(observed: float, trials: int, wanted: float) -> int | None:
+    """Return the number of trials of each controller for a reliability, by Spearman & Brown; None if none does."""
+    if observed <= 0:
+        return None
+    return int(np.ceil(trials * wanted * (1 - observed) / (observed * (1 - wanted)) - 1e-9))
 
 
 def mean_maximum_rank_violation(source: Values, target: Values) -> Values:
@@ -71,7 +120,7 @@ def rank_violation_interval(
     c = len(source)
     left = _left_out(violations)
     error = math.sqrt((c - 1) / c * float(((left - left.mean()) ** 2).sum()))
-    factor = math.exp(float(special.stdtrit(c - 1, (1 + confidence) / 2)) * error / value)
+    factor = math.exp(float(scipy.special.stdtrit(c - 1, (1 + confidence) / 2)) * error / value)
     return value / factor, min(value * factor, float(np.ptp(target)))
 
 

@@ -8,20 +8,17 @@ import itertools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
+import scipy
 
-from realitygap import _special as special
 from realitygap.errors import finite_numbers
 
-CONFIDENCE = 0.95
-"""The least that an interval of ours covers, unless it says otherwise."""
+from ._estimate import CONFIDENCE, Estimate
 
-SMALLEST_N = 6
+MEDIAN_SMALLEST_N = 6
 """Fewer values give no interval of 95 %: the range of five covers the median with 1 - 2 / 2^5 = 93.75 %."""
-
 
 _LARGEST_COUNTED_N = 300
 """Largest n for which whole numbers are added up, within 2 ms. Loading SciPy's function takes 0.1 s."""
@@ -41,21 +38,6 @@ class IntervalRanks:
     lower: int
     upper: int
     coverage: float
-
-
-@dataclass(frozen=True)
-class Interval:
-    """Bounds of an effect or of a median.
-
-    Attributes:
-        low: Lower bound, in the unit of what it bounds, included.
-        high: Upper bound.
-        method: `BCa`, a bootstrap; `ranks`, two observed values; `Newcombe` and `t`, by formula.
-    """
-
-    low: float
-    high: float
-    method: Literal["BCa", "Newcombe", "ranks", "t"]
 
 
 @dataclass(frozen=True)
@@ -104,31 +86,36 @@ def interval_ranks(n: int, confidence: float = CONFIDENCE) -> IntervalRanks | No
 def _cumulative(n: int) -> Callable[[int], float]:
     """Return the function P(X <= k) of k, from 0 to (n - 1) // 2, where X is Binomial(n, 1/2)."""
     if n > _LARGEST_COUNTED_N:
-        return lambda k: float(special.betainc(n - k, k + 1, 0.5))
+        return lambda k: float(scipy.special.betainc(n - k, k + 1, 0.5))
     counts = list(itertools.accumulate(math.comb(n, k) for k in range((n + 1) // 2)))
     return lambda k: counts[k] / 2**n
 
 
-def median_interval(values: npt.NDArray[np.float64], confidence: float = CONFIDENCE) -> Interval | None:
-    """Return the order-statistic interval of the median: no distribution is assumed and nothing is resampled.
+def median_interval(values: npt.ArrayLike, level: float = CONFIDENCE) -> Estimate:
+    """Return the median with its order-statistic interval: no distribution is assumed and nothing is resampled.
 
     Args:
         values: (n,) independent observations in any order and unit, all finite.
-        confidence: Minimum probability that the interval contains the median, between 0 and 1.
+        level: Minimum probability that the interval contains the median, between 0 and 1.
 
     Returns:
-        The interval, or None if n is too small (below 6 for 95 %).
+        The median, None of no values; without an interval if n is too small (below 6 for 95 %).
 
     Raises:
-        ValueError: `values` is not one row of finite numbers, or `confidence` is not between 0 and 1.
+        ValueError: `values` is not one row of finite numbers, or `level` is not between 0 and 1.
 
     Source: as `interval_ranks`.
     """
-    ordered = np.sort(_checked(values))
-    ranks = interval_ranks(len(ordered), confidence)
+    ordered = np.sort(_checked(np.asarray(values, float)))
+    n, ranks = len(ordered), interval_ranks(len(ordered), level)
+    if n == 0:
+        return Estimate.refusal(0, "There are no values.")
+    median = float(np.median(ordered))
     if ranks is None:
-        return None
-    return Interval(float(ordered[ranks.lower - 1]), float(ordered[ranks.upper - 1]), "ranks")
+        needed = next(size for size in itertools.count(n + 1) if interval_ranks(size, level) is not None)
+        return Estimate.of_few(median, n, needed)
+    ends = float(ordered[ranks.lower - 1]), float(ordered[ranks.upper - 1])
+    return Estimate(median, *ends, n, level=level, method="ranks")
 
 
 def quartiles(values: npt.NDArray[np.float64]) -> Quartiles:

@@ -1,0 +1,140 @@
+"""Numbers with their intervals, tests, and the number of values that an effect needs.
+
+Arrays in, values out; nothing here reads a file or names a robot. SciPy supplies the special functions, which it loads
+when the first is used.
+"""
+
+from ._correlation import attenuated, rank_correlation, spearman
+from ._equivalence import Equivalence, prove_equivalence
+from ._estimate import CONFIDENCE, Ends, Estimate, Method
+from ._means import (
+    SMALLEST_N,
+    UNBOUNDED,
+    Range,
+    difference_interval,
+    mean_interval,
+    range_of_differences,
+    t_interval,
+)
+from ._medians import MEDIAN_SMALLEST_N, IntervalRanks, Quartiles, interval_ranks, median_interval, quartiles
+from ._permutation import (
+    ALPHA,
+    SEED,
+    holm,
+    lattice,
+    permutation_p,
+    runs_for_a_claim,
+    sign_flip_p,
+    smallest_p,
+)
+from ._planning import (
+    POWER,
+    Needed,
+    check_plan,
+    controllers_for_margin,
+    detectable_difference,
+    detectable_effect,
+    equivalence_power,
+    plan_correlation,
+    plan_effect,
+    plan_margin,
+    runs_needed,
+    spread_of_differences,
+    trial_reliability,
+)
+from ._resampling import (
+    BCA_SMALLEST_N,
+    RESAMPLES,
+    bca_interval,
+    bca_intervals,
+    bca_mean,
+    difference_of_means,
+    percentile_interval,
+    ratio_of_robust_spreads,
+    ratio_of_spreads,
+    resampled_means,
+    robust_spread,
+    share_above,
+)
+from ._shares import (
+    USUAL_EFFECTS,
+    a12,
+    a12_of_effect,
+    effect_of_a12,
+    exact_share_interval,
+    newcombe_interval,
+    share_interval,
+)
+
+__all__ = [  # noqa: RUF022 - grouped by subject
+    # a number with its interval
+    "Estimate",
+    "Ends",
+    "Method",
+    "CONFIDENCE",
+    # means
+    "mean_interval",
+    "difference_interval",
+    "t_interval",
+    "Range",
+    "UNBOUNDED",
+    "range_of_differences",
+    "SMALLEST_N",
+    # medians
+    "median_interval",
+    "interval_ranks",
+    "IntervalRanks",
+    "quartiles",
+    "Quartiles",
+    "MEDIAN_SMALLEST_N",
+    # shares, and sizes of effects
+    "share_interval",
+    "exact_share_interval",
+    "a12",
+    "newcombe_interval",
+    "effect_of_a12",
+    "a12_of_effect",
+    "USUAL_EFFECTS",
+    # rank correlation
+    "rank_correlation",
+    "spearman",
+    "attenuated",
+    # resampling
+    "bca_interval",
+    "bca_intervals",
+    "bca_mean",
+    "difference_of_means",
+    "share_above",
+    "ratio_of_spreads",
+    "ratio_of_robust_spreads",
+    "robust_spread",
+    "percentile_interval",
+    "resampled_means",
+    "BCA_SMALLEST_N",
+    "RESAMPLES",
+    "SEED",
+    # tests
+    "permutation_p",
+    "sign_flip_p",
+    "smallest_p",
+    "runs_for_a_claim",
+    "holm",
+    "lattice",
+    "ALPHA",
+    "prove_equivalence",
+    "Equivalence",
+    # planning
+    "Needed",
+    "check_plan",
+    "plan_effect",
+    "plan_margin",
+    "plan_correlation",
+    "detectable_difference",
+    "detectable_effect",
+    "runs_needed",
+    "controllers_for_margin",
+    "equivalence_power",
+    "spread_of_differences",
+    "trial_reliability",
+    "POWER",
+]

@@ -5,9 +5,11 @@ Every test also fails on any message of the console and on any request but to th
 
 from __future__ import annotations
 
+import contextlib
 import os
 import shutil
 import signal
+import socket
 from collections.abc import Callable, Iterator, Sequence
 from multiprocessing.process import BaseProcess
 from pathlib import Path
@@ -43,6 +45,7 @@ ARGUMENTS = [
 DESKTOP, PHONE = (1440, 900), (390, 844)
 PATIENCE_MS = 120_000
 expect.set_options(timeout=PATIENCE_MS)
+STORED = "local_storage,indexeddb,cache_storage,service_workers"
 OUTAGE = ("net::ERR", "Failed to fetch", "WebSocket connection", "reloading because", "status of 403")
 """What a browser says of a page whose lab is gone, or was started again with another token."""
 
@@ -66,15 +69,18 @@ class RunningLab:
         root: The folder.
         is_forking: Whether its child processes are forked instead of new Pythons.
         limits: Limits of its process, such as `resource.RLIMIT_NOFILE`, and their values.
+        port: Where it listens; 0 for any free port.
     """
 
-    def __init__(self, root: Path, *, is_forking: bool = True, limits: dict[int, int] | None = None) -> None:
+    def __init__(
+        self, root: Path, *, is_forking: bool = True, limits: dict[int, int] | None = None, port: int = 0
+    ) -> None:
         self.root = root
         self._is_forking = is_forking
         self._limits = limits
         self.address = ""
         self.token = ""
-        self._port = 0
+        self._port = port
         self._process: BaseProcess | None = None
 
     def start(self) -> None:
@@ -151,9 +157,21 @@ NEW_PYTHONS = pytest.mark.parametrize("lab", ["new Pythons"], indirect=True)
 """Marks a test whose lab starts its child processes as it does for a user."""
 
 
+@pytest.fixture(scope="package")
+def lab_port() -> int:
+    """A port for all labs of this process, so that a browser need not compile their scripts again."""
+    worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
+    ports = range(20_000 + 1000 * (worker % 10), 30_000)  # below those that systems give to connections
+    for port in ports:
+        with socket.socket() as listener, contextlib.suppress(OSError):
+            listener.bind(("127.0.0.1", port))
+            return port
+    raise AssertionError(f"none of the ports {ports} is free")
+
+
 @pytest.fixture
-def lab(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[RunningLab]:
-    running = RunningLab(tmp_path / "studies", is_forking=not hasattr(request, "param"))
+def lab(tmp_path: Path, request: pytest.FixtureRequest, lab_port: int) -> Iterator[RunningLab]:
+    running = RunningLab(tmp_path / "studies", is_forking=not hasattr(request, "param"), port=lab_port)
     running.start()
     yield running
     running.stop()
@@ -176,15 +194,67 @@ def browser() -> Iterator[Any]:
         browser.close()
 
 
+class Visitors:
+    """Contexts of a browser, each like a browser of its own, which later tests use again once they are empty.
+
+    A page in a new context compiles the scripts of the lab again, for most of a second of a processor. The empty first
+    page of each context keeps the process that has compiled them.
+    """
+
+    def __init__(self, browser: Any) -> None:
+        self._browser = browser
+        self._free: dict[str, list[Any]] = {}
+        self._used: list[tuple[str, Any]] = []
+        self._closed: list[Any] = []
+
+    def context(self, **options: Any) -> Any:
+        """A context without cookies, storage, or pages but the empty one."""
+        kind = repr(sorted(options.items()))
+        free = self._free.setdefault(kind, [])
+        if free:
+            context = free.pop()
+        else:
+            context = self._browser.new_context(**options)
+            context.on("close", lambda closed: self._closed.append(closed))
+            context.new_page()
+        self._used.append((kind, context))
+        return context
+
+    def leave(self, address: str) -> None:
+        """Empty all contexts that are used, and offer them again; a lab's address is where their storage is."""
+        used, self._used = self._used, []
+        for kind, context in used:
+            if context in self._closed:
+                continue
+            empty, *pages = context.pages
+            for page in pages:
+                page.close()
+            session = context.new_cdp_session(empty)
+            session.send(
+                "Storage.clearDataForOrigin", {"origin": address.rstrip("/"), "storageTypes": STORED}
+            )
+            session.detach()
+            context.clear_cookies()
+            context.clear_permissions()
+            context.set_offline(False)
+            self._free[kind].append(context)
+
+
+@pytest.fixture(scope="package")
+def visitors(browser: Any) -> Visitors:
+    return Visitors(browser)
+
+
 @pytest.fixture
-def visit(browser: Any, lab: RunningLab) -> Iterator[Callable[..., Any]]:
+def visit(visitors: Visitors, lab: RunningLab) -> Iterator[Callable[..., Any]]:
     """Opens a page of the lab, in a browser of its own: visit("new")."""
-    contexts, complaints = [], []
+    complaints: list[str] = []
+    contexts = []
 
     def open_page(
         path: str = "", size: tuple[int, int] = DESKTOP, forgive: Sequence[str] = (), **options: Any
     ) -> Any:
-        context = browser.new_context(viewport={"width": size[0], "height": size[1]}, **options)
+        context = visitors.context(viewport={"width": size[0], "height": size[1]}, **options)
         context.add_cookies([lab.cookie])
         contexts.append(context)
         page = context.new_page()
@@ -196,19 +266,21 @@ def visit(browser: Any, lab: RunningLab) -> Iterator[Callable[..., Any]]:
 
         page.on("console", lambda message: complain(f"{message.type}: {message.text}"))
         page.on("pageerror", lambda error: complain(str(error)))
-        context.on("request", lambda request: check_request(request.url))
+        context.on("request", check_request)
         page.goto(lab.address + path)
         # Before its handshake with the server a page may swap two events that are 10 ms apart.
         page.wait_for_function("() => window.did_handshake !== false")
         return page
 
-    def check_request(url: str) -> None:
+    def check_request(request: Any) -> None:
+        url = request.url
         if not url.startswith((lab.address, lab.address.replace("http", "ws"), "data:", "blob:")):
             complaints.append(f"request to {url}")
 
     yield open_page
     for context in contexts:
-        context.close()
+        context.remove_listener("request", check_request)
+    visitors.leave(lab.address)
     assert complaints == []
 
 

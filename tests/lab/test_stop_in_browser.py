@@ -63,7 +63,7 @@ def test_stop_is_shown_while_a_robot_is_connected_and_nothing_covers_it(visit, t
         stop.click()
         page.get_by_role("button", name="Robot stopped").wait_for()
         page.get_by_role("button", name="Stop robot").wait_for(timeout=20_000)  # after 5 s
-        page.context.close()
+        page.close()
     robot.get_by_role("button", name="Disconnect").click()
     robot.locator(".lab-stop").wait_for(state="hidden")
 
@@ -85,7 +85,7 @@ class Motors:
 
     def _look(self, address: str) -> None:
         with connect_witness(address) as witness:
-            while not self._ended.wait(0.002):
+            while not self._ended.wait(0.005):  # exact to a fraction of the limits
                 if witness.motors() != (0.0, 0.0):
                     self.moved_s = time.monotonic()
 
@@ -204,7 +204,7 @@ def test_motors_stop_within_half_a_second_once_keys_are_let_go_or_are_another_wi
     def let_go() -> None:
         for key in ("ArrowLeft", "Meta", "Alt"):
             keyboard.up(key)
-        for other in page.context.pages[1:]:
+        for other in page.context.pages[page.context.pages.index(page) + 1 :]:
             other.close()
 
     def open_tab() -> None:

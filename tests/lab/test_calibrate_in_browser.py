@@ -78,7 +78,6 @@ def test_wizard_leads_from_the_robot_to_a_result_and_shows_a_rejection(lab, visi
     page.get_by_role("alert").filter(has_text="You entered 'not a name!'.").wait_for()
     step.filter(has_text="Robot").wait_for()
     page.get_by_label("Name", exact=True).fill("refused")
-    page.wait_for_timeout(600)  # a field waits a moment for more letters
     page.get_by_role("button", name="Next").click()
     step.filter(has_text="What").wait_for()
     page.locator('[data-kind="path"]').press("Space")

@@ -69,7 +69,6 @@ def test_studies_and_one_that_is_watched(lab, visit):
     player.wait_for()
     for number in (2, 3):
         replay.get_by_label("Run", exact=True).fill(str(number))
-        page.wait_for_timeout(600)  # a field waits a moment for more letters
         replay.get_by_role("button", name="Compare").click()
         player.locator(".rg-names > *").nth(number - 1).wait_for()
     player.get_by_role("slider", name="Step").fill("40")

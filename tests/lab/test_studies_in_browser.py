@@ -38,12 +38,10 @@ def test_a_study_made_with_the_form_is_carried_out_on_a_phone(lab, visit):
     page.get_by_role("button", name="Create a study").click()
     page.get_by_label("Name", exact=True).first.fill("from-form")
     page.get_by_label("Runs per condition").fill("5")
-    page.wait_for_timeout(600)  # a field waits a moment for more letters
     page.get_by_role("button", name="Remove condition").last.click()
     open_advanced(page, page.get_by_label("Filter settings"))
     page.get_by_label("Filter settings").fill("generations")
     page.get_by_label("Generations", exact=True).fill("2")
-    page.wait_for_timeout(600)  # a field waits a moment for more letters
     page.get_by_role("button", name="Start study").click()
     page.wait_for_url("**/study/from-form")
     page.locator(".lab-state", has_text="Complete").wait_for(timeout=120_000)
@@ -60,9 +58,7 @@ def test_name_of_a_condition_follows_its_noise_until_it_is_changed(lab, visit):
     noises.first.fill("7")
     page.wait_for_function("[...document.querySelectorAll('input')].some(box => box.value == 'coverage-700')")
     names.nth(1).fill("loud")
-    page.wait_for_timeout(600)  # a field waits a moment for more letters
     noises.first.fill("0.5")
-    page.wait_for_timeout(600)
     assert names.nth(1).input_value() == "loud"
 
 

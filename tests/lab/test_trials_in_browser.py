@@ -45,6 +45,7 @@ def test_a_whole_study_is_driven_and_counted_by_taps_on_a_phone(lab, visit):
     page = visit(PAGE, size=PHONE, has_touch=True)
     begin_sitting(page)
     page.get_by_role("button", name="Start trial").wait_for()
+    assert "coverage-robot" not in page.content(), "counting is blind"
     page.evaluate("scrollTo(0, 0)")
     for action in ("Start trial", "Stop robot"):
         assert covered(page.get_by_role("button", name=action)) == []
@@ -64,6 +65,14 @@ def test_a_whole_study_is_driven_and_counted_by_taps_on_a_phone(lab, visit):
         assert {row["who"] for row in ledger.scores()} == {"anna"}
         assert all(len(ledger.record(number).commands) == 12 for number in range(1, 5))
         assert ledger.conditions()["coverage-robot"]["label"] == "EMULATED"
+
+
+def name_oneself(page, who: str) -> None:
+    """Enter a name, and wait until the card of the trial to score is drawn again for it."""
+    page.locator('[data-counting="1"]').evaluate("card => { card.dataset.old = 'yes'; }")
+    page.get_by_label("Your name").fill(who)
+    page.wait_for_function("() => document.cookie.includes('realitygap_who')")
+    page.locator('[data-counting="1"]:not([data-old])').wait_for()
 
 
 def open_folds(page) -> list[str]:
@@ -104,10 +113,7 @@ def test_only_the_current_step_is_open_and_its_action_is_in_view(lab, visit, siz
 def test_cells_are_marked_and_saved_with_the_keyboard(lab, visit):
     drive_sheet(lab.root)
     page = visit(PAGE)
-    page.locator('[data-counting="1"]').evaluate("card => { card.dataset.old = 'yes'; }")
-    page.get_by_label("Your name").fill("anna")
-    page.wait_for_function("() => document.cookie.includes('realitygap_who')")
-    page.locator('[data-counting="1"]:not([data-old])').wait_for()  # drawn again for another name
+    name_oneself(page, "anna")
     grid = page.get_by_role("grid", name="Cells crossed in trial 1")
     expect(grid.get_by_role("row")).to_have_count(6)
     page.locator('[data-counting="1"] [data-cell="0"]').focus()
@@ -230,12 +236,9 @@ def test_robot_changes_hands_when_its_operator_agrees_and_everyone_can_stop_it(l
 
 
 def test_two_people_count_and_their_agreement_is_told(lab, visit):
-    make_study(lab.root)
+    drive_sheet(lab.root)
     page = visit(PAGE)
-    begin_sitting(page)
-    start_trial(page, 1)
-    start_trial(page, 2)
-    page.get_by_text("is full").wait_for()
+    name_oneself(page, "anna")
     count(page, 1, 0, 1)
     other = visit(PAGE)
     other.get_by_label("Your name").fill("ben")
@@ -268,12 +271,9 @@ def test_a_void_trial_needs_a_reason_and_is_driven_again(lab, visit):
 
 def test_the_arena_is_drawn_where_cells_are(lab, visit):
     """A tap on the lower left of the grid is cell 0, and the highest row is the last."""
-    make_study(lab.root)
+    drive_sheet(lab.root)
     page = visit(PAGE)
-    begin_sitting(page)
-    start_trial(page, 1)
-    start_trial(page, 2)
-    page.get_by_text("is full").wait_for()
+    name_oneself(page, "anna")
     page.wait_for_timeout(800)  # the page brings the grid into view
     page.get_by_role("button", name="Save score").scroll_into_view_if_needed()
     first, last = (page.locator(f'[data-counting] [data-cell="{cell}"]').bounding_box() for cell in (0, 71))
@@ -284,14 +284,6 @@ def test_the_arena_is_drawn_where_cells_are(lab, visit):
     page.mouse.move(first["x"] + 3.5 * first["width"], first["y"] + 5, steps=20)
     page.mouse.up()
     page.get_by_text("4 of 72 cells").wait_for()
-
-
-def test_codes_alone_are_shown_while_counting_is_blind(lab, visit):
-    make_study(lab.root)
-    page = visit(PAGE)
-    begin_sitting(page)
-    page.get_by_role("button", name="Start trial").wait_for()
-    assert "coverage-robot" not in page.content()
 
 
 def test_the_witness_of_an_emulator_counts_by_itself(lab, visit):
@@ -307,12 +299,9 @@ def test_the_witness_of_an_emulator_counts_by_itself(lab, visit):
 
 
 def test_a_trial_is_chosen_in_the_table_with_a_tap_or_a_key(lab, visit):
-    make_study(lab.root)
+    drive_sheet(lab.root)
     page = visit(PAGE)
-    begin_sitting(page)
-    start_trial(page, 1)
-    start_trial(page, 2)
-    page.get_by_text("is full").wait_for()
+    name_oneself(page, "anna")
     open_fold(page, "Notes")
     page.get_by_label("Note on the study").fill("half a note")
     open_fold(page, "All trials")

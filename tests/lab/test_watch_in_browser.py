@@ -68,7 +68,6 @@ def test_compare_adds_up_to_three_trials_to_the_one_that_plays(lab, visit):
     def choose(number: int) -> None:
         run.fill(str(number))
         run.press("Tab")
-        page.wait_for_timeout(600)  # a field waits a moment for more letters
         compare.click()
 
     for number in (1, 2, 3):
@@ -79,7 +78,6 @@ def test_compare_adds_up_to_three_trials_to_the_one_that_plays(lab, visit):
     expect(replay.locator(".rg-names > *")).to_have_count(4)
     run.fill("99")
     run.press("Tab")
-    page.wait_for_timeout(600)
     page.get_by_role("button", name="Show trial").click()
     page.locator(".lab-problem", has_text="99").wait_for()
 

@@ -1,4 +1,4 @@
-"""The wording of results: numbers with intervals, p values, and claims about networks that were selected.
+"""The wording of results: counts, numbers with intervals, p values, and verdicts.
 
 The terminal, the lab, and the reports use these functions, so that one result reads the same everywhere.
 """
@@ -60,15 +60,15 @@ def highest(values: Mapping[str, float]) -> list[str]:
     return [name for name, value in values.items() if round(value, 9) == round(most, 9)]
 
 
-def highest_median(names: Sequence[str], medians: Sequence[str], of: str = "best coverage") -> str:
-    """Return which conditions have the highest median, without a period.
+def counted(n: int, noun: str) -> str:
+    """Return a number with its noun, such as `1 run` or `2,000 runs`."""
+    return f"{n:,} {noun}{'' if n == 1 else 's'}"
 
-    Args:
-        names: All conditions that have it.
-        medians: Their medians in words, of the first two.
-        of: Score.
-    """
-    return f"{joined(names)} {'has' if len(names) == 1 else 'have'} the highest median {of}: {' and '.join(medians)}"
+
+def values_between(values: Sequence[float], digits: int = 3) -> str:
+    """Return the smallest and the largest value in words; one number if both read the same."""
+    ends = dict.fromkeys(f"{value:.{digits}f}" for value in (min(values), max(values)))
+    return " to ".join(ends)
 
 
 def signed(value: float, digits: int = 3) -> str:
@@ -90,7 +90,8 @@ def with_interval(estimate: Estimate, *, signs: bool = False) -> str:
     if estimate.value is None:
         return "–"
     numbers = [estimate.value, *(estimate.ends or ())]
-    value, *ends = (signed(number) if signs else f"{number:.3f}" for number in numbers)
+    texts = (signed(number) if signs else f"{number:.3f}".replace("-", "−") for number in numbers)
+    value, *ends = texts
     return f"{value} [{ends[0]}, {ends[1]}]" if ends else value
 
 
@@ -114,3 +115,118 @@ def p_equation(p: float, *, bound: bool = False) -> str:
     if p < 0.001:
         return "p < 0.001"
     return f"p {'≤' if bound else '='} {p_in_words(p)}"
+
+
+# verdicts
+
+
+def highest_median(
+    names: Sequence[str], medians: Sequence[str], of: str = "best coverage", *, n_conditions: int = 2
+) -> str:
+    """Return which conditions have the highest median, without a period.
+
+    Args:
+        names: All conditions that have it.
+        medians: Their medians in words, of the first two.
+        of: Score.
+        n_conditions: Number of conditions with a median. A single one is not called the highest.
+    """
+    if n_conditions == 1:
+        return f"the median {of} of {names[0]} is {medians[0]}"
+    return f"{joined(names)} {'has' if len(names) == 1 else 'have'} the highest median {of}: {' and '.join(medians)}"
+
+
+def undecided_median(medians: Sequence[float], about: str, needed: int, of: str = "best coverage") -> str:
+    """Return the medians of conditions with too few runs to name the highest, without a period.
+
+    Args:
+        medians: The medians of all conditions.
+        about: Their labels and n, in words.
+        needed: Smallest number of runs of each condition that can show a difference.
+        of: Score.
+    """
+    return (
+        f"the median {of} of {counted(len(medians), 'condition')} is {values_between(medians)} ({about}); at least "
+        f"{counted(needed, 'run')} of each are needed to name the highest"
+    )
+
+
+def few_runs_verdict(needed: int, detail: str = "") -> str:
+    """Return that there are too few runs for a claim, and how many are needed."""
+    return f"no claim possible{detail}; {needed} runs"
+
+
+def higher_verdict(one: str, other: str, difference: float) -> str:
+    """Return which of two conditions is higher, of a difference that is shown."""
+    higher, lower = (one, other) if difference > 0 else (other, one)
+    return f"{higher} above {lower}"
+
+
+def not_shown_verdict(detectable: float | None = None, needed: int | None = None, most: int = 100_000) -> str:
+    """Return that a difference is not shown, with what n can detect.
+
+    Args:
+        detectable: Smallest difference that n runs detect in 80 of 100 studies; None if it is unknown.
+        needed: Number of runs that detect the observed difference as often; None if there are too many to compute.
+        most: Largest number that is named.
+    """
+    if detectable is None:
+        return "not shown"
+    runs = f"{needed:,}" if needed is not None and needed <= most else f"over {most:,}"
+    return f"not shown; n finds {detectable:.3f} in 80 %, this difference takes {runs} runs"
+
+
+def equivalence_verdict(is_equivalent: bool, margin: float, difference: Estimate) -> str:
+    """Return whether two conditions are shown to be equivalent, with the interval of their difference."""
+    shown = "equivalent" if is_equivalent else "not shown equivalent"
+    return f"{shown} within ±{margin:g} (90 %: {span(difference, signs=True)})"
+
+
+def gap_size_verdict(rms: Estimate, level: Estimate) -> str:
+    """Return the size of a gap and its direction, without a period; no gap if the interval of the size begins at 0."""
+    if rms.value is None:
+        side = _direction(level)
+        return "the size of the gap is unknown" + ("" if side.endswith("both sides") else side)
+    if rms.ends is None:
+        return f"the transfer gap is {rms.value:.3f} RMS, from too few controllers for an interval"
+    if rms.ends[0] <= 0:
+        return f"no gap is shown (RMS at most {rms.high:.3f})"
+    return f"the transfer gap is {rms} RMS over {rms.n} controllers{_direction(level)}"
+
+
+def _direction(level: Estimate) -> str:
+    if level.value is None or level.ends is None:
+        return ""
+    if level.ends[1] < 0:
+        return f", and the target does worse by {-level.value:.3f}"
+    if level.ends[0] > 0:
+        return f", and the target does better by {level.value:.3f}"
+    return ", to both sides"
+
+
+def gap_order_verdict(correlation: Estimate, ceiling: Estimate, disattenuated: Estimate) -> str:
+    """Return the correlation over controllers and what noise allows, without a period; empty if it is refused."""
+    if correlation.value is None:
+        return ""
+    text = f"the correlation over controllers is {correlation.value:.2f}"
+    if ceiling.value is None or disattenuated.value is None:
+        return text
+    return f"{text} where noise allows {ceiling.value:.2f}"
+
+
+def gap_equivalence_verdict(equivalence: Estimate) -> str:
+    """Return whether two platforms are shown to be equivalent in level, without a period; empty if it is untested."""
+    margin, is_equivalent = equivalence.more.get("margin"), equivalence.more.get("equivalent")
+    if margin is None or is_equivalent is None:
+        return ""
+    shown = "are equivalent in level" if is_equivalent else "are not shown to be equivalent in level"
+    return f"they {shown} at a margin of {margin:g}"
+
+
+def reproduces(is_misspecified: bool) -> str:
+    """Return whether a simulator can reproduce the observations of its calibration, as a sentence."""
+    return f"The simulator {'cannot' if is_misspecified else 'can'} reproduce the observations of its calibration."
+
+
+GOAL_VERDICTS = {True: "met", False: "missed", None: "open"}
+"""Words for goals whose whole interval meets them, or misses them, or for which the data do not decide."""

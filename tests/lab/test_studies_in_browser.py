@@ -121,7 +121,7 @@ def test_studies_have_a_picture_and_one_primary_action_and_can_be_found(lab, vis
     picture = tiny.locator(".lab-thumbnail img")
     picture.wait_for()
     page.wait_for_function("image => image.naturalWidth > 0", arg=picture.element_handle())
-    tiny.get_by_text("Median best coverage by condition: ").wait_for()
+    tiny.get_by_text("Median best coverage").wait_for()
     for row, action in ((tiny, "Open"), (robot, "Open trials")):
         primary = row.locator(".q-btn--unelevated")
         assert [each.inner_text() for each in primary.all()] == [action]

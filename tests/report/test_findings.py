@@ -123,7 +123,7 @@ def test_changes_against_a_baseline_are_counted(out):
 def test_one_condition_has_its_median_and_nothing_to_compare(out, n):
     found = findings_of(out, {"coverage-10": spread(30, n)})
     (finding,) = found.findings
-    assert finding.claim.startswith("As recorded, coverage-10 has the highest median best coverage: 0.")
+    assert finding.claim.startswith("As recorded, the median best coverage of coverage-10 is 0.")
     assert ("[" in finding.claim) == (n == 7)
     assert finding.tables == ("results",)
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from realitygap._terminal import echo
-from realitygap._wording import p_equation
+from realitygap._wording import p_equation, reproduces
 from realitygap.errors import StudyError
 
 from ._camera import CAMERA_HELP, under_camera
@@ -257,8 +257,7 @@ def _print(result: GapResult, replay: ReplayError | None) -> None:
     _print_row("re-evolved gap", result.reevolved)
     _print_row("luck of selection", result.luck)
     if result.misspecified is not None:
-        says = "cannot" if result.misspecified else "can"
-        echo(f"The simulator {says} reproduce the observations of its calibration.")
+        echo(reproduces(result.misspecified))
     for note in result.notes:
         echo(note)
     echo(result.verdict)

@@ -6,6 +6,7 @@ import json
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
+from realitygap._wording import gap_equivalence_verdict, gap_order_verdict, gap_size_verdict
 from realitygap.drawing import ShownAsCard
 from realitygap.stats import Estimate
 
@@ -188,54 +189,12 @@ class GapResult(ShownAsCard):
 
 def _verdict_of(result: GapResult) -> str:
     """Return the result in one sentence, without what n controllers cannot support."""
-    parts = [_size(result), _order(result), _equivalence(result.equivalence)]
+    parts = [
+        gap_size_verdict(result.rms, result.level),
+        gap_order_verdict(result.srcc, result.noise_ceiling, result.srcc_disattenuated),
+        gap_equivalence_verdict(result.equivalence),
+    ]
     if result.misspecified:
         parts.append("the simulator cannot reproduce the observations with any numbers")
     where = f"Between {result.labels[0]} {result.source} and {result.labels[1]} {result.target}"
     return f"{where}, " + "; ".join(part for part in parts if part) + "."
-
-
-def _size(result: GapResult) -> str:
-    rms, level = result.rms, result.level
-    if rms.value is None:
-        return "the size of the gap is unknown" + _side_if_any(level)
-    if rms.high is None:
-        return f"the transfer gap is {rms.value:.3f} RMS, from too few controllers for an interval"
-    if not result.excludes_no_gap:
-        return f"no gap is shown (RMS at most {rms.high:.3f})"
-    side = _side(level)
-    return f"the transfer gap is {rms} RMS over {rms.n} controllers{side}"
-
-
-def _side_if_any(level: Estimate) -> str:
-    side = _side(level)
-    return "" if side.endswith("both sides") else side
-
-
-def _side(level: Estimate) -> str:
-    if level.value is None or level.low is None or level.high is None:
-        return ""
-    if level.high < 0:
-        return f", and the target does worse by {-level.value:.3f}"
-    if level.low > 0:
-        return f", and the target does better by {level.value:.3f}"
-    return ", to both sides"
-
-
-def _order(result: GapResult) -> str:
-    raw, ceiling = result.srcc, result.noise_ceiling
-    if raw.value is None:
-        return ""
-    if ceiling.value is None or result.srcc_disattenuated.value is None:
-        return f"the correlation over controllers is {raw.value:.2f}"
-    return f"the correlation over controllers is {raw.value:.2f} where noise allows {ceiling.value:.2f}"
-
-
-def _equivalence(found: Estimate) -> str:
-    margin = found.more.get("margin")
-    if margin is None or found.more.get("equivalent") is None:
-        return ""
-    shown = (
-        "are equivalent in level" if found.more["equivalent"] else "are not shown to be equivalent in level"
-    )
-    return f"they {shown} at a margin of {margin:g}"

@@ -6,6 +6,7 @@ import threading
 from pathlib import Path
 from typing import Any, Self
 
+from realitygap._wording import with_interval
 from realitygap.gap import SHOWN
 from realitygap.report import write_gap_report
 from realitygap.stats import Estimate
@@ -73,12 +74,7 @@ def pairs_of(gap: GapStudy) -> dict[str, Any]:
 
 def _words(estimate: Estimate) -> str:
     """Return a measure with its interval, or the reason for its absence."""
-    if estimate.value is None:
-        return estimate.refused or "not measured"
-    text = f"{estimate.value:.3f}"
-    if estimate.low is not None:
-        text += f" [{estimate.low:.3f}, {estimate.high:.3f}]"
-    return text.replace("-", "−")
+    return estimate.refused or "not measured" if estimate.value is None else with_interval(estimate)
 
 
 def rounds(trials: int) -> list[int]:

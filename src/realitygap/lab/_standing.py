@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
-from ._counted import counted
+from realitygap._wording import counted
+
 from ._pace import duration
 from ._studies import StudyState
 from ._study_job import StudyJob

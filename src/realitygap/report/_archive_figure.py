@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import polars as pl
 
+from realitygap._wording import counted
 from realitygap.drawing import Ink, line_pen
 from realitygap.evolution import DISTANCES, Member, NoveltySettings, archive_members
 from realitygap.report._drawing import (
@@ -76,7 +77,7 @@ def draw_archive(folder: Results, condition: str | None = None, replicate: int |
         f"{len(members)} behaviors, {len(different)} of them different{drawn}, from generations {min(entered)} to "
         f"{max(entered)}; a cell is the darker, the more of them visit it. {label_of(described)}, n = 1 run. "
         f"{say_origin(described, paths, problem)} Right (below), the mean novelty of the individuals of each "
-        f"generation, over all runs that measure it alike. n = {_n_runs(tally, novelty):,} runs, no interval."
+        f"generation, over all runs that measure it alike. n = {counted(_n_runs(tally, novelty), 'run')}, no interval."
     )
     alt = (
         f"The archive of run {replicate} of {chosen} holds {len(members)} behaviors, of generations {min(entered)} to "

@@ -18,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from realitygap._limits import MOST_TABLE_BYTES, read_file
+from realitygap._wording import few_runs_verdict, higher_verdict, not_shown_verdict
 from realitygap.errors import TableError, whole_number
 from realitygap.report._comparisons import difference_and_share
 from realitygap.stats import (
@@ -141,13 +142,10 @@ class AuditedPair:
     def verdict(self) -> str:
         """The conclusion that the pair supports, in words."""
         if not self.can_claim:
-            return f"no claim possible; {self.runs_for_a_claim} runs each at least"
+            return f"{few_runs_verdict(self.runs_for_a_claim)} each at least"
         if self.p_holm < ALPHA:
-            higher, lower = (
-                (self.one, self.other) if (self.difference.value or 0.0) > 0 else (self.other, self.one)
-            )
-            return f"{higher} above {lower}"
-        return "not shown"
+            return higher_verdict(self.one, self.other, self.difference.value or 0.0)
+        return not_shown_verdict()
 
 
 @dataclass(frozen=True)

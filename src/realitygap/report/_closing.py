@@ -8,6 +8,7 @@ from typing import Any
 
 from realitygap._numbers import fixed
 from realitygap._version import __version__
+from realitygap._wording import GOAL_VERDICTS
 from realitygap.records import write_whole
 from realitygap.report._closing_figures import draw_closing, words_of
 from realitygap.report._placed import FigureOnPage, hover_content, number_figures
@@ -77,7 +78,6 @@ def write_closing_page(summary: Mapping[str, Any], out: str | Path) -> Path:
 
 def goal_table(summary: Mapping[str, Any]) -> Table:
     """Return one row per goal, in the columns of `GOAL_HEAD`; a goal that the interval does not decide is open."""
-    verdicts = {True: "met", False: "missed", None: "open"}
     return [
         (
             goal["name"],
@@ -85,7 +85,7 @@ def goal_table(summary: Mapping[str, Any]) -> Table:
             _plain(goal, goal["figure"]),
             _span(goal, lambda value, goal=goal: _plain(goal, value)),
             _counted(goal),
-            verdicts[goal["met"]] if goal["n"] else "–",
+            GOAL_VERDICTS[goal["met"]] if goal["n"] else "–",
         )
         for goal in summary["goals"]
     ]

@@ -12,7 +12,15 @@ import numpy as np
 import numpy.typing as npt
 import polars as pl
 
-from realitygap._wording import p_in_words, signed, span
+from realitygap._wording import (
+    equivalence_verdict,
+    few_runs_verdict,
+    higher_verdict,
+    not_shown_verdict,
+    p_in_words,
+    signed,
+    span,
+)
 from realitygap.report._champions import FRESH_TRIALS, Champions
 from realitygap.report._tally import Results, Tally, label_of, read_tally, settings_of
 from realitygap.stats import (
@@ -36,8 +44,6 @@ from realitygap.stats import (
     sign_flip_p,
     smallest_p,
 )
-
-_MOST_RUNS_NAMED = 100_000
 
 MARGIN = 0.02
 """Difference of mean coverage up to which conditions count as equivalent: 1.4 of the paper's 72 cells, and about half
@@ -141,27 +147,18 @@ class Comparison:
         """Result of the test of equivalence in words, with the margin; empty if there are too few runs."""
         if self.is_equivalent is None:
             return ""
-        shown = "equivalent" if self.is_equivalent else "not shown equivalent"
-        return f"{shown} within ±{MARGIN:g} (90 %: {span(self.equivalence_interval, signs=True)})"
+        return equivalence_verdict(self.is_equivalent, MARGIN, self.equivalence_interval)
 
     @property
     def difference_verdict(self) -> str:
         """The conclusion on the difference, in words."""
         if not self.can_claim:
-            return (
-                f"no claim possible: with n = {min(self.n, self.n_other)} corrected p cannot be below "
-                f"{p_in_words(self.best_p)}; {self.runs_for_a_claim} runs at least"
-            )
+            n = min(self.n, self.n_other)
+            detail = f": with n = {n} corrected p cannot be below {p_in_words(self.best_p)}"
+            return f"{few_runs_verdict(self.runs_for_a_claim, detail)} at least"
         if self.is_shown:
-            higher, lower = (self.one, self.other) if self.size > 0 else (self.other, self.one)
-            return f"{higher} above {lower}"
-        if self.detectable is None:
-            return "not shown"
-        runs = self.runs_for_difference
-        needed = (
-            f"{runs:,}" if runs is not None and runs <= _MOST_RUNS_NAMED else f"over {_MOST_RUNS_NAMED:,}"
-        )
-        return f"not shown; n finds {self.detectable:.3f} in 80 %, this difference takes {needed} runs"
+            return higher_verdict(self.one, self.other, self.size)
+        return not_shown_verdict(self.detectable, self.runs_for_difference)
 
 
 def is_within(difference: Estimate) -> bool | None:

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from realitygap._wording import Basis, highest, highest_median, joined, p_equation, with_interval
+from realitygap._wording import Basis, counted, highest, highest_median, joined, p_equation, with_interval
 from realitygap.report._champions import Champions
 from realitygap.report._comparisons import Comparison, same_but_for
 from realitygap.report._tally import Tally, label_of, score_text, settings_of, task_of
@@ -140,13 +140,17 @@ def _best(study: _Study, champions: Sequence[Champions]) -> Finding:
     for name in leaders[:2]:
         values = study.tally.run_bests(name, study.tally.measure)
         medians.append(with_interval(median_interval(values)))
-    recorded = highest_median(leaders, medians)
+    with_runs = [each for each in study.tally.conditions if len(study.tally.replicates(each["name"]))]
+    recorded = highest_median(leaders, medians, n_conditions=len(with_runs))
     if not study.basis.is_fresh:
         return study.find(recorded, _rank(study, leaders[0]), None if study.compared else ("results",))
     by_name = {each.condition: each for each in champions}
     best = highest({name: float(each.expected.mean()) for name, each in by_name.items()})
     means = [with_interval(by_name[name].expected_mean) for name in best[:2]]
-    claim = f"the best networks of {joined(best)} have the highest mean coverage: {' and '.join(means)}"
+    if len(by_name) == 1:
+        claim = f"the mean coverage of the best networks of {best[0]} is {means[0]}"
+    else:
+        claim = f"the best networks of {joined(best)} have the highest mean coverage: {' and '.join(means)}"
     evidence = f"{_rank(study, best[0])} As recorded, {recorded}.".strip()
     return study.find(claim, evidence, (*(study.tables if study.compared else ("champions",)), "results"))
 
@@ -165,7 +169,7 @@ def _rank(study: _Study, leader: str) -> str:
         f"; no difference to the other {n_others if n_others > 1 else 'one'} is supported" if n_others else ""
     )
     return (
-        f"{leader} covers more than {len(lower)} of the {_plural(len(rivals), 'condition')} compared with it{others}. "
+        f"{leader} covers more than {len(lower)} of the {counted(len(rivals), 'condition')} compared with it{others}. "
         f"The nearest of them is {nearest.other}: {_difference([nearest])}."
     )
 
@@ -181,7 +185,7 @@ def _best_scores(tasks: Sequence[Mapping[str, Any]]) -> list[Finding]:
             ends = "" if row["low"] is None else f" [{score_text(row['low'])}, {score_text(row['high'])}]"
             medians.append(f"{score_text(row['median'])}{ends}")
         if leaders:
-            claim = highest_median(leaders, medians, f"score of {task}")
+            claim = highest_median(leaders, medians, f"score of {task}", n_conditions=len(rows))
             basis = Basis(f"the report tries no network again for its score of {task}")
             findings.append(Finding(basis, claim, "", ("scores",)))
     return findings
@@ -196,7 +200,7 @@ def _nothing(study: _Study) -> Finding:
         evidence = f"The largest is between {largest.one} and {largest.other}: {_difference([largest])}."
     else:
         needed = max(each.runs_for_a_claim for each in compared)
-        evidence = f"A claim needs at least {_plural(needed, 'run')} of each condition."
+        evidence = f"A claim needs at least {counted(needed, 'run')} of each condition."
     return study.find(claim, evidence)
 
 
@@ -316,11 +320,11 @@ def _of_changes(study: _Study) -> Finding | None:
         return None
     if not shown:
         return study.find(
-            f"none of the {_plural(len(changes), 'change')} against a baseline is supported", ""
+            f"none of the {counted(len(changes), 'change')} against a baseline is supported", ""
         )
     named = "; ".join(f"{each.one} {_difference([each])}" for each in shown[:2])
     return study.find(
-        f"{len(shown)} of {_plural(len(changes), 'change')} against a baseline "
+        f"{len(shown)} of {counted(len(changes), 'change')} against a baseline "
         f"{'is' if len(shown) == 1 else 'are'} supported",
         f"Largest: {named}.",
     )
@@ -335,7 +339,7 @@ def _limits(study: _Study, conditions: Sequence[Mapping[str, Any]], caveats: Seq
     parts = [" and ".join(origins), f"{runs} per condition"]
     if study.compared:
         n_open = sum(not each.is_shown and not each.is_equivalent for each in study.compared)
-        parts.append(f"{n_open} of {_plural(len(study.compared), 'comparison')} inconclusive")
+        parts.append(f"{n_open} of {counted(len(study.compared), 'comparison')} inconclusive")
     if len(study.compared) > 1:
         parts.append("p corrected for all of them")
     parts += dict.fromkeys(caveats)
@@ -370,11 +374,7 @@ def _p(p: float, *, bound: bool = False) -> str:
 
 def _runs(counts: Iterable[int]) -> str:
     known = sorted(set(counts))
-    return _plural(known[0], "run") if len(known) == 1 else f"{known[0]:,} to {_plural(known[-1], 'run')}"
-
-
-def _plural(n: int, noun: str) -> str:
-    return f"{n:,} {noun}" if n == 1 else f"{n:,} {noun}s"
+    return counted(known[0], "run") if len(known) == 1 else f"{known[0]:,} to {counted(known[-1], 'run')}"
 
 
 def _capital(text: str) -> str:

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from realitygap._version import __version__
-from realitygap._wording import p_equation
+from realitygap._wording import p_equation, reproduces
 from realitygap.errors import RecordError
 from realitygap.gap import SHOWN, GapResult
 from realitygap.records import is_special, refuse_results, write_whole
@@ -127,8 +127,7 @@ def _facts(gap: GapBetween) -> list[tuple[str, str]]:
         ),
     ]
     if result.misspecified is not None:
-        says = "cannot" if result.misspecified else "can"
-        facts.append(("Model", f"The simulator {says} reproduce the observations of its calibration."))
+        facts.append(("Model", reproduces(result.misspecified)))
     return facts + [("Note", note) for note in result.notes]
 
 

@@ -8,6 +8,7 @@ from typing import Any
 import polars as pl
 
 from realitygap._version import __version__
+from realitygap._wording import counted
 from realitygap.drawing import Picture
 from realitygap.errors import RealityGapError
 from realitygap.evolution import network_picture
@@ -161,7 +162,7 @@ def _caption(tally: Tally, condition: str, group: Structures) -> str:
         "number and not by its look; then the structures that are most common among the "
         f"{group.n_networks:,} networks of the last generations of all conditions with that selection "
         f"({group.selection}) and {len(group.inputs)} inputs, each drawn from the "
-        f"individual of highest coverage that has it. {_MARKS} {label}, n = {n_runs:,} runs, no interval."
+        f"individual of highest coverage that has it. {_MARKS} {label}, n = {counted(n_runs, 'run')}, no interval."
     )
 
 

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 import polars as pl
 
+from realitygap._wording import counted
 from realitygap.drawing import Ink
 from realitygap.report._drawing import (
     Drawing,
@@ -138,7 +139,7 @@ def draw_species(
         f"Left (on a phone, above), condition {condition}, run {replicate}, {why}: the share of each species in the "
         f"population of each generation, {numbered}. {label_of(described)}, n = 1 run. Right "
         f"(below), the mean number of species in each generation, over all runs with a selection. "
-        f"{labels}, n = {n_runs:,} runs, no interval."
+        f"{labels}, n = {counted(n_runs, 'run')}, no interval."
     )
     alt = (
         f"Species of run {replicate} of {condition}: {len(shares)} in all. Mean number of species in the last "
@@ -166,7 +167,7 @@ def draw_species(
             height,
         )
         right.set_gid("means")
-        _draw_means(right, means, f"{labels}, n = {n_runs:,} runs")
+        _draw_means(right, means, f"{labels}, n = {counted(n_runs, 'run')}")
         return figure
 
     return draw_wide(draw, name, caption, alt, marks=marks)

@@ -9,8 +9,8 @@ from typing import Any
 
 from nicegui import run, ui
 
+from realitygap._wording import counted
 from realitygap.errors import LedgerError
-from realitygap.lab._counted import counted
 from realitygap.lab._counts import CountCard, CountedTrial, Counts
 from realitygap.lab._drawn import Draft
 from realitygap.lab._lab import Lab

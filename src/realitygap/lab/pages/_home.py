@@ -8,6 +8,7 @@ from importlib import resources
 
 from nicegui import events, run, ui
 
+from realitygap._wording import values_between
 from realitygap.errors import RealityGapError
 from realitygap.lab._lab import Lab
 from realitygap.lab._standing import Standing
@@ -224,7 +225,8 @@ def _show_medians(medians: tuple[float, ...]) -> None:
         f'<rect x="{8 * k}" y="{24 - 24 * value / highest:.1f}" width="6" height="{24 * value / highest:.1f}"/>'
         for k, value in enumerate(medians)
     )
-    words = f"Median best coverage by condition: {min(medians):.3f} to {highest:.3f}"
+    by = " by condition" if len(medians) > 1 else ""
+    words = f"Median best coverage{by}: {values_between(medians)}"
     with ui.element("div"):
         ui.html(
             f'<svg viewBox="0 0 {8 * len(medians)} 24" width="{8 * len(medians)}" height="24" aria-hidden="true" '

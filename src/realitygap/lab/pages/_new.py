@@ -14,9 +14,9 @@ from typing import Any, Literal
 from nicegui import events, run, ui
 from starlette.requests import Request
 
+from realitygap._wording import counted
 from realitygap.errors import StudyError
 from realitygap.lab._checks import Check
-from realitygap.lab._counted import counted
 from realitygap.lab._files import LONGEST_TEXT
 from realitygap.lab._form import (
     TITLES,

@@ -10,9 +10,9 @@ from nicegui.element import Element
 from starlette.requests import ClientDisconnect, Request
 from starlette.responses import FileResponse, PlainTextResponse, Response
 
+from realitygap._wording import counted
 from realitygap.errors import RealityGapError
 from realitygap.lab._access import FOREIGN_HEADERS, LARGEST_BODY
-from realitygap.lab._counted import counted
 from realitygap.lab._counts import CountedTrial, Counts
 from realitygap.lab._drawn import Draft
 from realitygap.lab._lab import Lab

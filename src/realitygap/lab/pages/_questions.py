@@ -6,7 +6,7 @@ from typing import Any
 
 from nicegui import ui
 
-from realitygap.lab._counted import counted
+from realitygap._wording import counted
 from realitygap.lab._counts import Counts
 from realitygap.lab._study_job import StudyJob
 from realitygap.trials import start_words

@@ -10,11 +10,10 @@ from nicegui import app, events, run, ui
 from starlette.exceptions import HTTPException
 from starlette.responses import FileResponse, PlainTextResponse, Response
 
-from realitygap._wording import Basis, highest, highest_median
+from realitygap._wording import Basis, counted, highest, highest_median, undecided_median
 from realitygap.drawing import themed_file
 from realitygap.errors import RealityGapError, StudyError
 from realitygap.lab._access import FOREIGN_HEADERS
-from realitygap.lab._counted import counted
 from realitygap.lab._counts import Counts
 from realitygap.lab._figure_cache import read_thumbnail
 from realitygap.lab._files import plain_files
@@ -23,6 +22,7 @@ from realitygap.lab._standing import Standing
 from realitygap.lab._study_job import StudyJob
 from realitygap.lab._watcher import Watcher
 from realitygap.platforms import emulated_robots
+from realitygap.stats import runs_for_a_claim
 
 from ._curves import Curves
 from ._driving import Driving
@@ -385,12 +385,15 @@ class _Page:
         leaders = highest({name: row["line_median"] for name, row in rows.items()})
         if not leaders:
             return ""
-        of_leaders = [rows[name] for name in leaders]
         score = "best coverage" + (" so far" if self._standing.n_runs > self._standing.n_done else "")
-        claim = highest_median(leaders, [_estimate(row) for row in of_leaders[:2]], score)
-        labels = " and ".join(dict.fromkeys(row["label"] for row in of_leaders))
-        n = max(row["n"] for row in of_leaders)
-        return _BASIS.claim(f"{claim} ({labels}, {counted(n, 'run')}{' each' if len(leaders) > 1 else ''})")
+        needed = runs_for_a_claim(len(rows) - 1, paired=True)
+        if len(rows) > 1 and min(row["n"] for row in rows.values()) < needed:
+            medians = [row["line_median"] for row in rows.values()]
+            return _BASIS.claim(undecided_median(medians, _about(list(rows.values())), needed, score))
+        of_leaders = [rows[name] for name in leaders]
+        estimates = [_estimate(row) for row in of_leaders[:2]]
+        claim = highest_median(leaders, estimates, score, n_conditions=len(rows))
+        return _BASIS.claim(f"{claim} ({_about(of_leaders)})")
 
     def _show_finding(self, finding: str) -> None:
         if finding:
@@ -671,6 +674,12 @@ class _Image:
         address = f"/figures/{study}/{self._name}"
         self._narrow.props["srcset"] = f"{address}-narrow.svg?v={version}"
         self._wide.props["src"] = f"{address}-wide.svg?v={version}"
+
+
+def _about(rows: list[dict[str, Any]]) -> str:
+    """Return the labels of conditions, and the number of their runs."""
+    labels = " and ".join(dict.fromkeys(row["label"] for row in rows))
+    return f"{labels}, {counted(max(row['n'] for row in rows), 'run')}{' each' if len(rows) > 1 else ''}"
 
 
 def _estimate(row: dict[str, Any]) -> str:

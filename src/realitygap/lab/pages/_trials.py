@@ -9,8 +9,8 @@ from nicegui import run, ui
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
 
+from realitygap._wording import counted
 from realitygap.errors import RealityGapError
-from realitygap.lab._counted import counted
 from realitygap.lab._counts import Counts
 from realitygap.lab._lab import Lab, Visitor
 from realitygap.lab._photos import Photos

@@ -7,7 +7,7 @@ from typing import Any
 
 from nicegui import run, ui
 
-from realitygap.lab._counted import counted
+from realitygap._wording import counted
 from realitygap.lab._counts import Counts
 from realitygap.lab._lab import Lab
 from realitygap.lab._video_job import VideoJob, videos_in

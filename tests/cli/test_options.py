@@ -83,7 +83,7 @@ PRINTED_BY = {
     "study/_targets.py": ("calibrate", "gap", "transfer", "try"),
     "study/_task.py": ("bench",),
     "study/_tracked.py": ("track",),
-    "study/_wrapped_targets.py": ("calibrate", "gap", "transfer", "try"),
+    "study/_kept_target.py": ("calibrate", "gap", "transfer", "try"),
     "tasks/_python.py": ("drive", "gap", "lab", "plan", "run", "try"),
     "vision/_ros_map.py": ("arena",),
     "vision/_sheet_trials.py": ("score",),

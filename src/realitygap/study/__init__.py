@@ -25,6 +25,7 @@ from ._gap.between import GapBetween, gap_between
 from ._gap.plan import GapPlan, pilot_spreads, plan_gap, recorded_spreads
 from ._gap.study import MOST_CONTROLLERS, GapStudy, study_gap
 from ._gap.why import PARTS, part_of, why_gap
+from ._kept_target import StoppedByPerson
 from ._mazes import MAZE_SEEDS, measure_maze
 from ._physical import PhysicalResult, PhysicalStudy, physical_conditions
 from ._placing import parse_length, placing_words, with_ruled_end
@@ -49,7 +50,6 @@ from ._transfer.result import Strategist, Transferred, TransferResult, estimate_
 from ._transfer.strategies import STRATEGIES, TransferPlan, choose_condition, strategy_names, transfer
 from ._trial_bags import export_trials
 from ._try_on import try_on
-from ._wrapped_targets import StoppedByPerson
 
 __all__ = [
     "CLOSING",

@@ -1,18 +1,15 @@
-"""Trials on a target: what can be observed, those that are missing, and those that were lost."""
+"""Trials on a target: what can be observed of it, and the file that stores them."""
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
-from typing import TypeVar
+from pathlib import Path
 
-from realitygap.errors import RobotError, StudyError
+from realitygap.errors import StudyError
 from realitygap.platforms import DEFAULT_ROBOT, platform_class, platform_names, split_spec
-from realitygap.records import OBSERVATIONS, ObservationsFile, ObservationsHead, Observe, TrialRecord, sees
+from realitygap.records import OBSERVATIONS, ObservationsFile, ObservationsHead, Observe, sees
 from realitygap.tasks import Task
-from realitygap.trials import Target, TellTrial, TrialPlan, is_taken_back, is_whole, taken_back
+from realitygap.trials import Target
 from realitygap.world import Arena
-
-Key = TypeVar("Key", bound=Hashable)
 
 
 def observations_head(target: Target, observe: Observe, robot: str | None = None) -> ObservationsHead:
@@ -22,6 +19,29 @@ def observations_head(target: Target, observe: Observe, robot: str | None = None
         robot = platform_class(name).base_robot if name in platform_names() else DEFAULT_ROBOT
     arena = target.arena.to_dict()
     return ObservationsHead(target.name, target.label, robot, arena, target.step_s, observe, target.identity)
+
+
+def open_trials(
+    path: Path | str,
+    target: Target,
+    observe: Observe,
+    *,
+    robot: str | None = None,
+    within: Path | None = None,
+) -> ObservationsFile:
+    """Open the file of a target's trials, or make it.
+
+    Args:
+        path: Path of the file.
+        target: Target of the trials.
+        observe: Observation level of the trials.
+        robot: Name or file of the robot. Default: that of the target's platform.
+        within: The folder that the user named, if the name of the file in it is not the user's.
+
+    Raises:
+        RecordError: It is another file, of another target, damaged, or cannot be written.
+    """
+    return ObservationsFile(path, observations_head(target, observe, robot), within=within)
 
 
 def refuse_more_than_is_seen(target: Target, observe: Observe) -> None:
@@ -89,63 +109,3 @@ WOULD_SEE: dict[Observe, str] = {
     "encoders": "A Scribbler 2, a real Thymio, and a simulated robot have encoders.",
     "track": "Use a camera, or the witness of an emulated robot.",
 }
-
-
-def refuse_lost(n: int, name: str, kept: str = "") -> None:
-    """Raise an error if a trial was lost for good, unless lost trials are skipped.
-
-    Raises:
-        RobotError: A trial was lost. The message has the number of lost trials.
-    """
-    if n:
-        lost = f"{n} trials on {name} were" if n > 1 else f"A trial on {name} was"
-        raise RobotError(f"{lost} lost, but all are needed.{kept} Run the missing trials.")
-
-
-def carry_out_missing(
-    target: Target,
-    plans: Sequence[TrialPlan],
-    observe: Observe,
-    kept: dict[Key, TrialRecord],
-    keys: Sequence[Key],
-    *,
-    file: ObservationsFile | None = None,
-    tell: TellTrial | None = None,
-) -> list[TrialRecord]:
-    """Return the trials in the order of their plans: stored trials, and the others, which are driven now.
-
-    Args:
-        target: Runs the trials that are missing.
-        plans: All trials.
-        observe: Observation level of the trials.
-        kept: Whole trials by key; those that are run are added.
-        keys: Key of each plan's trial.
-        file: File that gets each trial as it ends, also an interrupted one. The target settles the trials in it that
-            never ended.
-        tell: Called with the place and the trial, for each whole one that is run.
-
-    Raises:
-        RobotError: A trial was lost.
-    """
-
-    def keep(k: int, trial: TrialRecord) -> None:
-        if file is not None:
-            file.append(trial)
-        if is_whole(trial):
-            kept[keys[k]] = trial
-            if tell is not None:
-                tell(k, trial)
-        elif is_taken_back(trial):
-            kept.pop(keys[k], None)
-
-    if file is not None and file.under_way:
-        for k, plan in enumerate(plans):
-            name = plan.purpose, plan.number, "" if plan.genome is None else plan.genome.to_json()
-            if (trial := file.under_way.get(name)) is not None:
-                keep(k, target.settle(plan, trial) or taken_back(trial, "void: the program ended in it"))
-    missing = [k for k, key in enumerate(keys) if key not in kept]
-    if missing:
-        target.carry_out([plans[k] for k in missing], observe, lambda i, trial: keep(missing[i], trial))
-    where = "" if file is None else f" The others are saved in {file.path}."
-    refuse_lost(sum(key not in kept for key in keys), target.name, where)
-    return [kept[key] for key in keys]

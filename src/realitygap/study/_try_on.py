@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from realitygap.errors import RecordError
 from realitygap.evolution import Genome
-from realitygap.records import ObservationsFile, Observe, TrialRecord
-from realitygap.trials import Target, TrialPlan, is_whole
+from realitygap.records import Observe, TrialRecord
+from realitygap.trials import Target, TrialPlan
 
-from ._targets import carry_out_missing, observations_head, refuse_more_than_is_seen
+from ._kept_target import KeptTarget
+from ._targets import open_trials, refuse_more_than_is_seen
 
 
 def try_on(
@@ -37,9 +37,7 @@ def try_on(
         RobotError: The robot failed; what is in the file is safe.
     """
     refuse_more_than_is_seen(target, observe)
-    file = None if out is None else ObservationsFile(out, observations_head(target, observe))
-    done = {} if file is None else {trial.number: trial for trial in file.trials if is_whole(trial)}
-    if any(trial.genome != genome.to_json() for trial in done.values()):
-        raise RecordError(f"{out} has trials of another controller. Name another file.")
     plans = [TrialPlan(genome=genome, steps=steps, number=k) for k in range(trials)]
-    return carry_out_missing(target, plans, observe, done, range(trials), file=file)
+    file = None if out is None else open_trials(out, target, observe)
+    with KeptTarget(target, file, is_exclusive=True) as kept:
+        return kept.carry_out(plans, observe)

@@ -16,7 +16,6 @@ from realitygap.errors import RecordError, StudyError, did_you_mean
 from realitygap.platforms import DEFAULT_ROBOT, SimPlatform, split_spec
 from realitygap.records import (
     Observations,
-    ObservationsFile,
     Observe,
     TrialRecord,
     read_observations,
@@ -26,14 +25,8 @@ from realitygap.records import (
 from realitygap.trials import Operator, Target, TrialPlan, those_that_count
 from realitygap.world import Arena, Calibration, Fitted, RobotModel, load_robot, read_calibration
 
-from .._targets import observations_head, refuse_more_than_is_seen
-from .._wrapped_targets import (
-    PATH,
-    CountingTarget,
-    OperatedTarget,
-    ResumableTarget,
-    RuledTarget,
-)
+from .._kept_target import PATH, KeptTarget
+from .._targets import open_trials, refuse_more_than_is_seen
 from .kinds import KINDS, Kind
 from .marker import is_under_camera, with_marker, without_marker
 from .parts import SOFTWARE, Parts
@@ -93,11 +86,8 @@ def calibrate(
             f"--budget is {budget}, but choosing the last trials needs at least {LEAST_TO_CHOOSE}, because the "
             "choice depends on the first ones. Give more, or leave out --choose."
         )
-    around: Target = OperatedTarget(target, operator) if operator is not None else RuledTarget(target)
-    if trials_file is None:
-        return _calibrated(kind, around, robot, observe, budget, seed, tell, choose=choose)
-    with ObservationsFile(trials_file, observations_head(target, observe, str(robot))) as file:
-        kept = ResumableTarget(around, file)
+    file = None if trials_file is None else open_trials(trials_file, target, observe, robot=str(robot))
+    with KeptTarget(target, file, operator=operator) as kept:
         return _calibrated(kind, kept, robot, observe, budget, seed, tell, choose=choose)
 
 
@@ -117,7 +107,8 @@ def _calibrated(
     paced = load_robot(robot).model_copy(update={"step_s": target.step_s})
     plans = _plans(KINDS[kind], target.arena, paced, budget)
     numbered = [replace(plan, number=plan.number + SEED_STRIDE * (seed % 1000)) for plan in plans]
-    trials = CountingTarget(target, len(plans), tell).carry_out(numbered, observe)
+    count = _counting(len(plans), tell)
+    trials = target.carry_out(numbered, observe, lambda _, trial: count(trial))
     parts = _fit(
         kind, trials, robot, target.arena, observe, seed, is_under_camera(target.name, target.label, observe)
     )
@@ -130,10 +121,15 @@ def _chosen(
     target: Target, robot: str | Path, observe: Observe, n: int, seed: int, tell: Tell | None
 ) -> Calibration:
     """Return a calibration of everything whose last trials are chosen after a first fit."""
-    counting = CountingTarget(target, n, tell)
     try:
         made = calibrate_all(
-            counting, robot=load_robot(robot), observe=observe, budget=n, seed=seed, choose=True
+            target,
+            robot=load_robot(robot),
+            observe=observe,
+            budget=n,
+            seed=seed,
+            choose=True,
+            keep=_counting(n, tell),
         )
     except ValueError as error:
         raise StudyError(str(error)) from error
@@ -153,6 +149,18 @@ def _chosen(
         "all", parts, robot, target.name, target.label, observe, (), target.arena.name, seed
     )
     return made_of.model_copy(update={"trials": made.trials, "step_s": made.step_s})
+
+
+def _counting(n: int, tell: Tell | None) -> Callable[[TrialRecord], None]:
+    """Return a function that gets each whole trial, and reports how many of n there are."""
+    numbers: set[int] = set()
+
+    def count(trial: TrialRecord) -> None:
+        numbers.add(trial.number)
+        if tell is not None:
+            tell(len(numbers), n)
+
+    return count
 
 
 def _refuse(kind: str, target: Target, robot: str | Path, observe: Observe, budget: int | None) -> None:

@@ -19,12 +19,11 @@ from realitygap.runs import Condition, named, population_of
 from realitygap.trials import NoiseKey, Target
 from realitygap.world import Calibration, load_calibration
 
-from .._transfer.attempt import plans_of
+from .._transfer.attempt import allow_trials, plans_of
 from .._transfer.calibrated import SELECTING, Numbers, fitted_condition
 from .._transfer.noise import needs_sim
 from .._transfer.simulated import crossed_cells, evolve_champions, try_repeatedly
 from .._transfer.strategies import choose_condition, transfer
-from .._transfer.target import KeptTarget
 from .plan import ClosingPlan, TwinName
 
 JUDGING, CALIBRATING = 10_000_000, 5_000_000
@@ -170,7 +169,7 @@ class ClosingTwin:
         place = self.folder / "calibrations" / f"{self.name}-{observe}-{budget}"
         path = place.with_suffix(".toml")
         if not path.exists():
-            with KeptTarget(
+            with allow_trials(
                 target, place.with_suffix(".jsonl"), budget, CALIBRATING, observe=observe
             ) as kept:
                 found = self.calibrate(

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -25,11 +23,12 @@ from realitygap.platforms import SimTarget, split_spec
 from realitygap.records import OBSERVATIONS, ObservationsFile, Observe, TrialRecord
 from realitygap.stats import Estimate, difference_interval, mean_interval, range_of_differences
 from realitygap.tasks import CoverageTask, Task, score_observed
-from realitygap.trials import Target, TrialPlan, is_whole
+from realitygap.trials import Target, TrialPlan
 from realitygap.world import Arena, Pose
 
 from .._controllers import Controller, have_same_score, task_of
-from .._targets import carry_out_missing, check_task, observations_head, refuse_too_little
+from .._kept_target import KeptTarget
+from .._targets import check_task, open_trials, refuse_too_little
 
 Tell = Callable[[str, int, int], None]
 """Called with what is being done, the trials done, and the trials in all."""
@@ -149,11 +148,8 @@ def study_gap(
     for platform in (source, target):
         refuse_inputs(controllers, platform)
     refuse_inputs(reevolved, target)
-    with contextlib.ExitStack() as stack:
-        file = None
-        if results is not None:
-            file = stack.enter_context(ObservationsFile(results, observations_head(target, observe)))
-        on_target = _carry_out(target, [*plans, *more], observe, tell, file)
+    file = None if results is None else open_trials(results, target, observe)
+    on_target = _carry_out(target, [*plans, *more], observe, tell, file)
     source, said = _paced(source, target, on_target) if at_its_pace else (source, ())
     own = [replace(plan, number=plan.number - TARGET_FROM) for plan in plans]
     in_source = _carry_out(source, own, seen, tell)
@@ -234,17 +230,16 @@ def _carry_out(
     tell: Tell | None,
     file: ObservationsFile | None = None,
 ) -> list[TrialRecord]:
-    """Return trials in the order of their plans: those in the file, and the others, stored as they end."""
-    found = () if file is None else file.trials
-    kept = {(trial.number, trial.genome): trial for trial in found if is_whole(trial)}
-    keys = [(plan.number, plan.genome.to_json() if plan.genome else "") for plan in plans]
-    done = itertools.count(sum(key in kept for key in keys) + 1)
+    """Return trials in the order of their plans: those in the file, and the others, saved as they end."""
+    done: set[int] = set()
 
     def told(k: int, _: TrialRecord) -> None:
+        done.add(k)
         if tell is not None:
-            tell(platform.name, next(done), len(plans))
+            tell(platform.name, len(done), len(plans))
 
-    return carry_out_missing(platform, plans, observe, kept, keys, file=file, tell=told)
+    with KeptTarget(platform, file) as kept:
+        return kept.carry_out(plans, observe, told)
 
 
 def _by_controller(trials: Sequence[TrialRecord], n: int) -> list[TrialRecord]:

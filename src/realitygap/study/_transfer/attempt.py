@@ -4,16 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Protocol
 
 from realitygap.evolution import Genome
+from realitygap.records import Observe
 from realitygap.runs import Condition
 from realitygap.tasks import score_observed
-from realitygap.trials import TrialPlan
+from realitygap.trials import Target, TrialPlan
 from realitygap.world import Calibration, RobotModel
 
+from .._kept_target import KeptTarget
+from .._targets import open_trials
 from .simulated import Champion, evolve_champions
-from .target import KeptTarget
 
 
 class Simulation:
@@ -68,6 +71,7 @@ class Attempt:
     Attributes:
         condition: Condition that is evolved in simulation.
         target: Target, which allows `budget` trials.
+        observe: Observation level of trials on the target.
         budget: Trials on the target.
         replicate: Replicate of the transfer, from 0 on.
         simulation: Simulation that evolves.
@@ -76,6 +80,7 @@ class Attempt:
 
     condition: Condition
     target: KeptTarget
+    observe: Observe
     budget: int
     replicate: int
     simulation: Simulation
@@ -93,13 +98,30 @@ class Attempt:
     def try_on_target(self, genomes: Sequence[Genome]) -> tuple[list[float], list[tuple[int, ...]]]:
         """Try genomes on the target, once each; the score of each, and the cells that it visited, if they are known."""
         plans = plans_of(self.condition, genomes, self.target.spent)
-        trials = self.target.carry_out(plans, self.target.looks_at)
+        trials = self.target.carry_out(plans, self.observe)
         scores = score_observed(self.condition.task_of_trials, trials, self.target.arena)
         return scores.tolist(), [trial.cells for trial in trials]
 
     def score_on_target(self, champions: Sequence[Champion]) -> list[float]:
         """Return the score of each champion in one trial on the target."""
         return self.try_on_target([champion.genome for champion in champions])[0]
+
+
+def allow_trials(target: Target, path: Path, n: int, first_number: int, *, observe: Observe) -> KeptTarget:
+    """Return a target that allows n trials, and saves them.
+
+    Args:
+        target: Target that runs the trials.
+        path: File of the trials, in an existing folder.
+        n: Number of trials that it allows.
+        first_number: Number added to that of each plan, so that parts of a study draw other random numbers.
+        observe: Highest observation level.
+
+    Raises:
+        RecordError: The file is of another target, damaged, or cannot be written.
+    """
+    file = open_trials(path, target, observe, within=path.parent)
+    return KeptTarget(target, file, budget=n, first_number=first_number, is_exclusive=True)
 
 
 def plans_of(

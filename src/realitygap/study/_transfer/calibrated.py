@@ -17,11 +17,10 @@ from realitygap.world import Calibration, RobotModel, load_calibration, load_rob
 from .._calibrate.hold_out import FITTED, NOMINAL, POSTERIOR
 from .._calibrate.one import refuse_other_sensors
 from .._calibrate.whole import calibrate_all
-from .attempt import Attempt
+from .attempt import Attempt, allow_trials
 from .noise import needs_sim
 from .selected import best_on_target
 from .simulated import Champion
-from .target import KeptTarget
 
 SELECTING = 2
 """One trial in so many is kept for choosing among champions where calibrating is on the budget: a fit that is a little
@@ -141,7 +140,7 @@ class Calibrating:
             return load_calibration(path)
         self.tell(f"calibrating by {n} trials, {self.observe} observed")
         trials = self.folder / f"{name}.jsonl"
-        with KeptTarget(self.target, trials, n, self.first_number, observe=self.observe) as kept:
+        with allow_trials(self.target, trials, n, self.first_number, observe=self.observe) as kept:
             try:
                 calibration = calibrate_all(
                     kept,

@@ -26,21 +26,20 @@ from realitygap.records import (
 )
 from realitygap.runs import Condition
 from realitygap.tasks import score_observed
-from realitygap.trials import Target, is_whole
+from realitygap.trials import Target, those_that_count
 from realitygap.world import load_calibration, load_robot
 
 from .._code import allowed_task
 from .._file import load_study
 from .._study import Study
 from .._targets import check_task, refuse_more_than_is_seen, refuse_too_little
-from .attempt import Attempt, Simulation, plans_of
+from .attempt import Attempt, Simulation, allow_trials, plans_of
 from .calibrated import Calibrating, calibrated, posterior, recommended
 from .direct import direct
 from .noise import needs_sim, noise, randomized
 from .result import Transferred, TransferResult, summarize_transfer
 from .selected import halving, plain, select
 from .simulated import Champion, refuse_unevolved
-from .target import KeptTarget
 from .transferability import transferability
 
 STRATEGIES: Mapping[str, Callable[[Attempt], Champion]] = {
@@ -302,10 +301,12 @@ class _Work:
         self.tell(f"{strategy}, {budget} trials, replicate {replicate + 1} of {self.plan.replicates}")
         first = replicate * NUMBERS
         path = self.folder / "trials" / f"{name}.jsonl"
-        with KeptTarget(self.target, path, budget, first, observe=self._looks_at(strategy)) as kept:
+        observe = self._looks_at(strategy)
+        with allow_trials(self.target, path, budget, first, observe=observe) as kept:
             attempt = Attempt(
                 condition=self.condition,
                 target=kept,
+                observe=observe,
                 budget=budget,
                 replicate=replicate,
                 simulation=self.simulation,
@@ -321,7 +322,7 @@ class _Work:
     def known(self) -> list[float]:
         """Return the mean scores of all champions that were tried in this folder, by this call or an earlier one."""
         files = sorted((self.folder / "fresh").glob("*.jsonl"))
-        tried = [[each for each in read_observations(file).trials if is_whole(each)] for file in files]
+        tried = [those_that_count(read_observations(file).trials) for file in files]
         return [
             float(np.mean(score_observed(self.condition.task_of_trials, trials, self.target.arena)))
             for trials in tried
@@ -349,7 +350,7 @@ class _Work:
         """Return the scores of a champion in fresh trials."""
         n, task = self.plan.fresh_trials, self.condition.task_of_trials
         path = self.folder / "fresh" / f"{name}.jsonl"
-        with KeptTarget(self.target, path, n, first, observe=task.observe) as fresh:
+        with allow_trials(self.target, path, n, first, observe=task.observe) as fresh:
             trials = fresh.carry_out(plans_of(self.condition, [genome] * n, 0, "fresh"), task.observe)
         return tuple(score_observed(task, trials, self.target.arena).tolist())
 

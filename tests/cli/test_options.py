@@ -65,6 +65,7 @@ PRINTED_BY = {
     ),
     "platforms/_spec.py": ("drive", "gap", "run"),
     "records/_ledger.py": ("drive",),
+    "records/_trial_log.py": ("trials",),
     "study/_calibrate/from_table.py": ("calibrate",),
     "study/_calibrate/hold_out.py": ("calibrate",),
     "study/_calibrate/kinds.py": ("calibrate",),

@@ -18,9 +18,8 @@ from pathlib import Path
 from typing import Any
 
 from realitygap.emulator import Emulator, Server, serve_pty
-from realitygap.records import ObservationsFile, TrialRecord, read_observations
+from realitygap.records import NO_LINE, ObservationsFile, TrialRecord, read_observations
 from realitygap.study import (
-    NO_LINE,
     calibrate,
     open_target,
     parse_study,

@@ -15,7 +15,7 @@ import pytest
 
 from realitygap.evolution import Genome, NeatSettings, Population
 from realitygap.records import read_observations
-from realitygap.study import NO_LINE, calibrate, open_target, try_on, with_ruled_end
+from realitygap.study import calibrate, open_target, try_on, with_ruled_end
 from realitygap.trials import Operator, SheetObserver, TrialPlan
 from realitygap.world import paper_arena
 from tests.forks import fork_context
@@ -49,7 +49,6 @@ class Sheet(SheetObserver):
     def __init__(self, person: Person) -> None:
         super().__init__(
             lambda arena: person.answer("cells", CELLS),
-            NO_LINE,
             settle=lambda problem, can_count: person.answer(f"settle {can_count}", person.verdict),
         )
         self._person = person

@@ -73,7 +73,7 @@ SECTIONS: dict[str, tuple[Command, ...]] = {
         Command("robot", "Connect to a robot and send it commands.", "_robot", "robot"),
         Command("emulate", "Emulate a robot on a pseudo-terminal or TCP port.", "_emulate", "emulate"),
         Command("platforms", "List the platforms that can run trials.", "_platforms", "platforms"),
-        Command("trials", "List, score, and annotate physical trials.", "_trials", "trials"),
+        Command("trials", "List, score, and annotate trials.", "_trials", "trials"),
     ),
     "Score physical trials": (
         Command(

@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 from realitygap._terminal import prompt
-from realitygap.study import NO_LINE
+from realitygap.records import NO_LINE
 from realitygap.trials import SheetObserver
 from realitygap.world import INCH
 

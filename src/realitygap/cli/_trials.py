@@ -1,9 +1,9 @@
-"""`realitygap trials`: the trials of a robot, their scores, and notes."""
+"""`realitygap trials`: the trials of a study on a robot, or of a file, their scores, and notes."""
 
 from __future__ import annotations
 
 import getpass
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -16,11 +16,12 @@ from realitygap.errors import LedgerError, StudyError, did_you_mean
 from ._json import print_json
 
 if TYPE_CHECKING:
-    from realitygap.records import Ledger, ScoreRole, Trial
+    from realitygap.records import Ledger, LoggedTrial, ScoreRole, Trial, TrialLog
+    from realitygap.world import Arena
 
 _WHAT = ("list", "score", "undo", "void", "note", "agreement")
 _READING = ("list", "agreement")
-"""What changes no ledger."""
+"""Actions that change nothing."""
 
 
 _ONLY_SCORE = "Only for score"
@@ -30,7 +31,10 @@ def trials(
     what: Annotated[
         str, typer.Argument(metavar="WHAT", help="Action: list, score, undo, void, note or agreement.")
     ],
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of results with a ledger.")],
+    source: Annotated[
+        Path,
+        typer.Argument(metavar="TRIALS", help="Folder of results with a ledger, or file of trials (.jsonl)."),
+    ],
     trial: Annotated[
         str | None,
         typer.Argument(
@@ -79,12 +83,19 @@ def trials(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
-    """List, score, and annotate physical trials.
+    """List, score, and annotate trials.
+
+    TRIALS is the folder of a study with trials on a robot, or a file in which gap, calibrate, transfer, or try saved
+    theirs.
 
     The number of a cell is columns * row + column. Cell 0 is the lower left of the reachable cells. Without --cells and
     --file, you pick the cells in the terminal. undo removes a score until its generation is closed. After that, only
     --correct changes it: reports use the correction, and the evolution does not. If two people counted cells, agreement
     prints Cohen's kappa with its interval.
+
+    A file has one count of each trial, so undo, agreement, --second, and --correct are only for folders. In a file,
+    score replaces the cells. When the command that saved the trials resumes, it uses the new cells, and drives void
+    trials again.
 
     Example: realitygap trials list results/paper-robot
 
@@ -94,12 +105,12 @@ def trials(
 
     Example: realitygap trials void results/paper-robot 12 --text "the pen fell out"
 
+    Example: realitygap trials void gap.jsonl 4194305 --text "it was pushed"
+
     Example: realitygap trials agreement results/paper-robot
 
     In Python: realitygap.records.Ledger.open("results/paper-robot/ledger.sqlite").trials()
     """
-    from realitygap.records import LEDGER_NAME, Ledger
-
     if what not in _WHAT:
         raise StudyError(f"Cannot {what!r} trials. {did_you_mean(what, _WHAT)}")
     if cells is not None and file is not None:
@@ -113,25 +124,50 @@ def trials(
     if as_json and what not in _READING:
         raise StudyError(f"--json is only for {' and '.join(_READING)}, not for {what}. Leave it out.")
     name = who or getpass.getuser()
-    with Ledger.open(folder / LEDGER_NAME, writable=what not in _READING) as ledger:
+    with _open(source, writable=what not in _READING) as opened:
         if what == "list":
-            _list(ledger, as_json=as_json)
+            _list(opened, as_json=as_json)
         elif what == "agreement":
-            _agreement(folder, as_json=as_json)
+            _agreement(_of_study(opened, what).path.parent, as_json=as_json)
         elif what == "score":
             role: ScoreRole = "second" if second else "correction" if correct else "score"
-            _score(ledger, folder, trial, cells, file, name, role)
+            _score(opened, trial, cells, file, name, role)
         elif what == "note":
-            ledger.note(_needed(text, "--text"), name, None if trial is None else _number(ledger, trial))
+            opened.note(_needed(text, "--text"), name, None if trial is None else _number(opened, trial))
             echo("Noted.")
+        elif what == "undo":
+            number = _number(opened, _needed(trial, "a trial"))
+            _of_study(opened, what).undo(number)
+            echo(f"The score of trial {number} is withdrawn. Enter a new one.")
         else:
-            number = _number(ledger, _needed(trial, "a trial"))
-            if what == "undo":
-                ledger.undo(number)
-                echo(f"The score of trial {number} is withdrawn. Enter a new one.")
-            else:
-                ledger.void(number, _needed(text, "--text"))
-                echo(f"Trial {number} is void; it will be driven again.")
+            number = _number(opened, _needed(trial, "a trial"))
+            opened.void(number, _needed(text, "--text"))
+            echo(f"Trial {number} is void; it will be driven again.")
+
+
+def _open(source: Path, *, writable: bool) -> Ledger | TrialLog:
+    """Open the ledger in a folder, or a file of trials."""
+    from realitygap.records import LEDGER_NAME, Ledger, TrialLog
+
+    files = sorted(source.glob("*/*.jsonl")) if source.is_dir() else []
+    if files and not (source / LEDGER_NAME).exists():
+        raise StudyError(f"{source} has several files of trials. Name one, such as {files[0]}.")
+    if source.is_dir() or not source.exists():
+        return Ledger.open(source / LEDGER_NAME, writable=writable)
+    return TrialLog.open(source, writable=writable)
+
+
+def _of_study(opened: Ledger | TrialLog, what: str) -> Ledger:
+    """Return the ledger of a study.
+
+    Raises:
+        StudyError: It is a file.
+    """
+    from realitygap.records import TrialLog
+
+    if isinstance(opened, TrialLog):
+        raise StudyError(f"{what} is only for the trials of a study, and {opened.path} is a file of trials.")
+    return opened
 
 
 _LONGEST_NUMBER = 19
@@ -144,21 +180,22 @@ def _needed(value: str | None, what: str) -> str:
     return value
 
 
-def _number(ledger: Ledger, text: str) -> int:
+def _number(opened: Ledger | TrialLog, text: str) -> int:
     """Return a trial's number, from itself or its code."""
+    from realitygap.records import TrialLog
+
     if text.isdecimal() and len(text) < _LONGEST_NUMBER:
-        return ledger.trial(int(text)).trial
-    codes = {each.code: each.trial for each in ledger.trials()}
+        return opened.trial(int(text)).trial
+    codes = {} if isinstance(opened, TrialLog) else {each.code: each.trial for each in opened.trials()}
     if text.upper() not in codes:
         raise LedgerError(
-            f"{ledger.path} has no trial {text!r}. `realitygap trials list` shows numbers and codes."
+            f"{opened.path} has no trial {text!r}. `realitygap trials list` shows numbers and codes."
         )
     return codes[text.upper()]
 
 
 def _score(
-    ledger: Ledger,
-    folder: Path,
+    opened: Ledger | TrialLog,
     trial: str | None,
     cells: str | None,
     file: Path | None,
@@ -168,14 +205,14 @@ def _score(
     from realitygap.records import Score
 
     if file is not None:
-        entries: Iterable[dict[int, list[int]]] = [_read_file(ledger, file)]
+        entries: Iterable[dict[int, list[int]]] = [_read_file(opened, file)]
     elif cells is not None:
-        entries = [{_number(ledger, _needed(trial, "a trial")): _cells(cells, "--cells")}]
+        entries = [{_number(opened, _needed(trial, "a trial")): _cells(cells, "--cells")}]
     else:
-        entries = _pick(ledger, folder, trial, role)
+        entries = _pick(opened, trial, role)
     n_entered = 0
     for given in entries:  # each as a whole or not at all
-        ledger.score_all({number: Score(found, who) for number, found in given.items()}, role)
+        opened.score_all({number: Score(found, who) for number, found in given.items()}, role)
         n_entered += len(given)
         for number, found in given.items():
             echo(f"Trial {number}: {len(set(found))} cells.")
@@ -190,7 +227,7 @@ def _cells(text: str, where: str) -> list[int]:
         raise StudyError(f"{where}: expected numbers of cells such as 0,1,13, got {text!r}.") from None
 
 
-def _read_file(ledger: Ledger, path: Path) -> dict[int, list[int]]:
+def _read_file(opened: Ledger | TrialLog, path: Path) -> dict[int, list[int]]:
     """Return the cells of each trial in a file, all of it read before anything is entered."""
     try:
         lines = read_file(path, MOST_TABLE_BYTES).decode("utf-8").splitlines()
@@ -205,14 +242,14 @@ def _read_file(ledger: Ledger, path: Path) -> dict[int, list[int]]:
             raise StudyError(
                 f"{path}, line {number}: expected 'TRIAL: 0 1 13', got {line!r}. Nothing was entered."
             )
-        which = _number(ledger, trial.strip())
+        which = _number(opened, trial.strip())
         if which in found:
             raise StudyError(f"{path}, line {number}: trial {which} is listed twice. Nothing was entered.")
         found[which] = _cells(text, f"{path}, line {number}")
     return found
 
 
-def _pick(ledger: Ledger, folder: Path, trial: str | None, role: ScoreRole) -> Iterator[dict[int, list[int]]]:
+def _pick(opened: Ledger | TrialLog, trial: str | None, role: ScoreRole) -> Iterator[dict[int, list[int]]]:
     """Yield cells picked in the terminal, of one trial or, one after the other, of all that wait."""
     import sys
 
@@ -220,21 +257,37 @@ def _pick(ledger: Ledger, folder: Path, trial: str | None, role: ScoreRole) -> I
 
     if not sys.stdin.isatty():
         raise StudyError("There is no terminal in which to pick cells. Give --cells or --file.")
-    if trial is not None or role == "correction":
-        waiting = [ledger.trial(_number(ledger, _needed(trial, "a trial")))]
-    else:
-        seconded = {row["trial"] for row in ledger.scores() if row["role"] == role and row["undone"] is None}
-        states: tuple[Any, ...] = ("driven",) if role == "score" else ("driven", "scored")
-        waiting = [each for each in ledger.trials(states=states) if each.trial not in seconded]
-    shows = _Titles(folder)
-    for each in waiting:
-        echo(
-            f"\nTrial {each.trial}, {each.code if shows.blind else each.name}, sheet {each.sheet}, {shows.pen(each)}"
-        )
-        cells = pick_cells(shows.arena(each), each.cells or () if role == "correction" else ())
-        if cells is None:
+    for number, title, arena, cells in _waiting(opened, trial, role):
+        echo(f"\nTrial {number}, {title}")
+        picked = pick_cells(arena, cells)
+        if picked is None:
             return
-        yield {each.trial: cells}
+        yield {number: picked}
+
+
+def _waiting(
+    opened: Ledger | TrialLog, trial: str | None, role: ScoreRole
+) -> Iterator[tuple[int, str, Arena, tuple[int, ...]]]:
+    """Yield number, title, arena, and cells of before of the trial that is named, or of all that wait."""
+    from realitygap.records import TrialLog
+
+    number = None
+    if trial is not None or role == "correction":
+        number = _number(opened, _needed(trial, "a trial"))
+    if isinstance(opened, TrialLog):
+        for logged in opened.trials(states=("driven",)) if number is None else [opened.trial(number)]:
+            yield logged.trial, logged.name, opened.arena, ()
+        return
+    if number is not None:
+        waiting = [opened.trial(number)]
+    else:
+        seconded = {row["trial"] for row in opened.scores() if row["role"] == role and row["undone"] is None}
+        states: tuple[Any, ...] = ("driven",) if role == "score" else ("driven", "scored")
+        waiting = [each for each in opened.trials(states=states) if each.trial not in seconded]
+    titles = _Titles(opened.path.parent)
+    for each in waiting:
+        title = f"{each.code if titles.blind else each.name}, sheet {each.sheet}, {titles.pen(each)}"
+        yield each.trial, title, titles.arena(each), each.cells or () if role == "correction" else ()
 
 
 class _Titles:
@@ -259,48 +312,64 @@ class _Titles:
         return Condition.from_settings(trial.condition, settings).arena.arena()
 
 
-def _list(ledger: Ledger, *, as_json: bool) -> None:
-    found = ledger.trials()
+def _list(opened: Ledger | TrialLog, *, as_json: bool) -> None:
+    trials: Sequence[Trial | LoggedTrial] = opened.trials()
+    hidden = _hidden(opened)
     if as_json:
-        blinded = {"condition", "replicate", "generation", "individual"} if _is_blind(ledger) else set()
         rows = [
             {
-                name: None if name in blinded and not each.is_closed else value
-                for name, value in vars(each).items()
+                name: None if trial.trial in hidden and name in _BLINDED else value
+                for name, value in vars(trial).items()
             }
-            | {"notes": [note["text"] for note in ledger.notes(each.trial)]}
-            for each in found
+            | {"notes": [note["text"] for note in opened.notes(trial.trial)]}
+            for trial in trials
         ]
         print_json(rows)
         return
     from rich.table import Table
 
+    from realitygap.records import Trial
+
     from ._tables import wide_console
 
     table = Table(box=None, padding=(0, 2, 0, 0))
-    for head in ("trial", "code", "sheet", "state", "cells", "description"):
+    more = ("code", "sheet") if any(isinstance(trial, Trial) for trial in trials) else ()
+    for head in ("trial", *more, "state", "cells", "description"):
         table.add_column(head, no_wrap=head not in ("code", "description"), overflow="fold")
-    hidden = _is_blind(ledger)
-    for each in found:
-        what = "" if hidden and not each.is_closed else each.name
-        said = [
-            each.reason or each.problem or "",
-            *(f"note: {note['text']}" for note in ledger.notes(each.trial)),
+    for trial in trials:
+        on_sheet: tuple[str, ...] = ()
+        problem = ""
+        if isinstance(trial, Trial):
+            on_sheet, problem = (trial.code, str(trial.sheet)), trial.problem or ""
+        parts = [
+            "" if trial.trial in hidden else trial.name,
+            trial.reason or problem,
+            *(f"note: {note['text']}" for note in opened.notes(trial.trial)),
         ]
-        more = "; ".join(part for part in (what, *said) if part)
         table.add_row(
-            *(str(each.trial), each.code, str(each.sheet), each.state),
-            *("" if each.cells is None else str(len(each.cells)), more),
+            *(str(trial.trial), *on_sheet, trial.state),
+            *(
+                "" if trial.cells is None else str(len(trial.cells)),
+                "; ".join(part for part in parts if part),
+            ),
         )
     wide_console().print(table)
-    states = [each.state for each in found]
+    states = [trial.state for trial in trials]
     counts = ", ".join(f"{states.count(state)} {state}" for state in dict.fromkeys(states))
-    echo(f"{len(found)} trials: {counts}." if found else "No trial is planned yet.")
+    echo(f"{len(trials)} trials: {counts}." if trials else "No trial is planned yet.")
 
 
-def _is_blind(ledger: Ledger) -> bool:
-    path = ledger.path.parent / "study.json"
-    return path.exists() and _Titles(ledger.path.parent).blind
+_BLINDED = ("condition", "replicate", "generation", "individual")
+
+
+def _hidden(opened: Ledger | TrialLog) -> set[int]:
+    """Return the trials of a blind study whose conditions are not shown yet."""
+    from realitygap.records import TrialLog
+
+    if isinstance(opened, TrialLog) or not (opened.path.parent / "study.json").exists():
+        return set()
+    is_blind = _Titles(opened.path.parent).blind
+    return {trial.trial for trial in opened.trials() if is_blind and not trial.is_closed}
 
 
 def _agreement(folder: Path, *, as_json: bool) -> None:

@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 
 from realitygap.platforms import platform_of
-from realitygap.records import TrialRecord, read_observations
+from realitygap.records import NO_LINE, TrialRecord, read_observations
 from realitygap.report import save_sensor_figure
 from realitygap.study import (
-    NO_LINE,
     StoppedByPerson,
     calibrate,
     open_target,

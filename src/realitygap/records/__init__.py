@@ -57,7 +57,8 @@ from realitygap.records._observations_file import (
 )
 from realitygap.records._output import is_special, refuse_results, write_whole
 from realitygap.records._published_results import PublishedResults
-from realitygap.records._trial_record import CALIBRATES, OBSERVATIONS, Observe, TrialRecord, sees
+from realitygap.records._trial_log import LoggedTrial, TrialLog
+from realitygap.records._trial_record import CALIBRATES, NO_LINE, OBSERVATIONS, Observe, TrialRecord, sees
 from realitygap.records._version import RESULTS_VERSION, RecordWarning
 
 wake_on_ctrl_c()
@@ -104,6 +105,7 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     "TrialRecord",
     "Observe",
     "CALIBRATES",
+    "NO_LINE",
     "OBSERVATIONS",
     "PATH_PARTS",
     "ROBOT",
@@ -111,6 +113,8 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     "Observations",
     "ObservationsFile",
     "ObservationsHead",
+    "TrialLog",
+    "LoggedTrial",
     "is_observations",
     "not_compared",
     "read_observations",

@@ -21,6 +21,7 @@ from realitygap.records._ledger_kinds import (
     Trial,
     TrialState,
     Turn,
+    checked_cells,
 )
 from realitygap.records._ledger_reader import LedgerReader
 from realitygap.records._trial_record import TrialRecord
@@ -376,18 +377,7 @@ class Ledger(LedgerReader):
         if row is None:
             self.trial(number)
             return []
-        unique = list(dict.fromkeys(int(cell) for cell in cells))
-        outside = [cell for cell in unique if not 0 <= cell < row["n_cells"]]
-        if outside:
-            raise LedgerError(
-                f"Cell {outside[0]} is outside the grid: expected numbers from 0 to {row['n_cells'] - 1}. Nothing was "
-                "entered."
-            )
-        if not unique:
-            raise LedgerError(
-                "No cell was entered: the line crosses at least the cell of the start. Nothing was saved."
-            )
-        return unique
+        return checked_cells(cells, row["n_cells"])
 
     def _void(self, number: int, reason: str) -> None:
         if not reason.strip():

@@ -146,6 +146,25 @@ class Score:
     photo: PhotoCount | None = None
 
 
+def checked_cells(cells: Sequence[int], n_cells: int) -> list[int]:
+    """Return the cells that a line crosses, each once.
+
+    Raises:
+        LedgerError: There is none, or one is outside the grid.
+    """
+    unique = list(dict.fromkeys(int(cell) for cell in cells))
+    outside = [cell for cell in unique if not 0 <= cell < n_cells]
+    if outside:
+        raise LedgerError(
+            f"Cell {outside[0]} is outside the grid: expected numbers from 0 to {n_cells - 1}. Nothing was entered."
+        )
+    if not unique:
+        raise LedgerError(
+            "No cell was entered: the line crosses at least the cell of the start. Nothing was saved."
+        )
+    return unique
+
+
 def settings_of_condition(description: Mapping[str, Any], name: str) -> Any:
     """Return the settings of a condition of a ledger, from the description of its study.
 

@@ -60,7 +60,7 @@ class FolderLock:
         with writing(self._path):
             descriptor = open_inside(self._folder, self._path, os.O_RDWR | os.O_CREAT)
         try:
-            _lock(descriptor)
+            lock_descriptor(descriptor)
         except (BlockingIOError, PermissionError) as error:
             holder = _read_holder(descriptor)
             os.close(descriptor)
@@ -105,12 +105,14 @@ if sys.platform == "win32":
     _FAR_BYTE = 1 << 30
     """Windows keeps others from reading a locked byte; this one lies beyond the text."""
 
-    def _lock(descriptor: int) -> None:
+    def lock_descriptor(descriptor: int) -> None:
+        """Lock an open file, or raise an OSError; the lock ends with the process."""
         os.lseek(descriptor, _FAR_BYTE, os.SEEK_SET)
         msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)
 
 else:
     import fcntl
 
-    def _lock(descriptor: int) -> None:
+    def lock_descriptor(descriptor: int) -> None:
+        """Lock an open file, or raise an OSError; the lock ends with the process."""
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)

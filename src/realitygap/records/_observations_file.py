@@ -7,13 +7,14 @@ what they saw, one when the robot has driven: after a crash the file says which 
 
 from __future__ import annotations
 
+import datetime
 import json
 import math
 import os
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +26,7 @@ from realitygap.errors import RecordError
 
 from ._files import reading
 from ._inside import open_inside
+from ._lock import lock_descriptor
 from ._output import refuse_results, write_whole
 from ._trial_record import OBSERVATIONS, UNDER_WAY, Observe, TrialRecord
 
@@ -70,12 +72,23 @@ class Observations:
         problem: Description of what was left out, with the reason; empty if nothing was.
         under_way: The last line of each trial that never ended, because the program did: what the robot drove, if its
             `end` is "driven".
+        notes: Notes, oldest first.
     """
 
     head: ObservationsHead
     trials: tuple[TrialRecord, ...]
     problem: str = ""
     under_way: tuple[TrialRecord, ...] = ()
+    notes: tuple[Note, ...] = ()
+
+
+class Note(TypedDict):
+    """A remark of a person on a trial, or on the whole file if `trial` is None; `time` is UTC."""
+
+    trial: int | None
+    text: str
+    who: str
+    time: str
 
 
 def not_compared(there: Mapping[str, Any], wanted: Mapping[str, Any]) -> str:
@@ -194,6 +207,7 @@ class ObservationsFile(ClosedOnExit):
         try:
             descriptor = open_inside(self._within, self.path, os.O_RDWR | os.O_CREAT)
             self._file = os.fdopen(descriptor, "r+b", buffering=0)
+            self._lock()
             self._file.truncate(held)
             self._file.seek(max(held - 1, 0))
             if not held:
@@ -224,7 +238,7 @@ class ObservationsFile(ClosedOnExit):
             )
         self.trials, self.problem = found.trials, found.problem
         for trial in found.under_way:
-            _note(self.under_way, trial)
+            _keep_under_way(self.under_way, trial)
         return held
 
     def append(self, trial: TrialRecord) -> None:
@@ -237,7 +251,36 @@ class ObservationsFile(ClosedOnExit):
             self._write(_line(trial_to_dict(trial)))
         except OSError as error:
             raise self._cannot(error) from error
-        _note(self.under_way, trial)
+        _keep_under_way(self.under_way, trial)
+
+    def _lock(self) -> None:
+        """Keep other programs from writing to the file until it is closed.
+
+        Raises:
+            RecordError: Another program writes to it.
+        """
+        try:
+            lock_descriptor(self._file.fileno())
+        except (BlockingIOError, PermissionError) as error:
+            self._file.close()
+            raise RecordError(
+                f"{self.path} is in use: another program saves trials in it. Wait until it ends, or name another "
+                "file."
+            ) from error
+        except OSError:  # this file system cannot lock files
+            pass
+
+    def note(self, text: str, who: str, trial: int | None = None) -> None:
+        """Keep a remark on a trial or on the whole file.
+
+        Raises:
+            RecordError: It cannot be written.
+        """
+        time = datetime.datetime.now(datetime.UTC).isoformat(timespec="milliseconds")
+        try:
+            self._write(_line({"note": text, "trial": trial, "who": who, "time": time}))
+        except OSError as error:
+            raise self._cannot(error) from error
 
     def _write(self, line: bytes) -> None:
         n = self._file.write(line)
@@ -294,6 +337,7 @@ def _parse(path: Path, data: bytes) -> tuple[Observations, int]:
     head = _head(path, first)
     trials: list[TrialRecord] = []
     under_way: dict[tuple[str, int, str], TrialRecord] = {}
+    notes: list[Note] = []
     held = len(first) + len(newline)
     problem = ""
     lines = rest.split(b"\n")
@@ -302,7 +346,10 @@ def _parse(path: Path, data: bytes) -> tuple[Observations, int]:
         if is_last and not line:
             break
         try:
-            trial = trial_from_dict(_object(line))
+            values = _object(line)
+            trial = None if "note" in values else trial_from_dict(values)
+            if trial is None:
+                notes.append(_note_from_dict(values))
         except ValueError as error:
             if not is_last:
                 raise RecordError(f"{path} is damaged: line {number} is {error}.") from None
@@ -311,18 +358,27 @@ def _parse(path: Path, data: bytes) -> tuple[Observations, int]:
             )
         else:
             held += len(line) + (not is_last)
-            _note(under_way, trial)
-            if trial.end not in UNDER_WAY:
-                trials.append(trial)
-    return Observations(head, tuple(trials), problem, tuple(under_way.values())), held
+            if trial is not None:
+                _keep_under_way(under_way, trial)
+                if trial.end not in UNDER_WAY:
+                    trials.append(trial)
+    return Observations(head, tuple(trials), problem, tuple(under_way.values()), tuple(notes)), held
 
 
-def _note(under_way: dict[tuple[str, int, str], TrialRecord], trial: TrialRecord) -> None:
+def _keep_under_way(under_way: dict[tuple[str, int, str], TrialRecord], trial: TrialRecord) -> None:
     """Keep the trials that have not ended, by purpose, number, and controller."""
     key = trial.purpose, trial.number, trial.genome
     under_way.pop(key, None)
     if trial.end in UNDER_WAY:
         under_way[key] = trial
+
+
+def _note_from_dict(values: Mapping[str, Any]) -> Note:
+    texts = [values.get(name) for name in ("note", "who", "time")]
+    trial = values.get("trial")
+    if not all(isinstance(text, str) for text in texts) or not isinstance(trial, int | None):
+        raise ValueError("a note that cannot be read")
+    return Note(trial=trial, text=str(texts[0]), who=str(texts[1]), time=str(texts[2]))
 
 
 def _object(line: bytes) -> dict[str, Any]:

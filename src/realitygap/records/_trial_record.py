@@ -22,6 +22,10 @@ UNDER_WAY = ("running", "driven")
 """Ends of records of unfinished trials: the robot drives, or a person has yet to report what they saw."""
 
 
+NO_LINE = ("path", "sensors")
+"""Purposes of trials of which no cells are counted: the first ends where a ruler says, the second stands."""
+
+
 def sees(observe: Observe, least: Observe) -> bool:
     """Return whether an observation has as much as another, the least that is wanted."""
     return OBSERVATIONS.index(observe) >= OBSERVATIONS.index(least)

@@ -8,7 +8,6 @@ from ._bench import measure_speed
 from ._calibrate.from_log import calibrate_from_log
 from ._calibrate.from_table import calibrate_from_table
 from ._calibrate.hold_out import hold_out_of
-from ._calibrate.kinds import NO_LINE
 from ._calibrate.one import calibrate, calibrate_from, save_calibration
 from ._calibrate.whole import calibrate_all
 from ._camera_observer import CameraObserver, Looking
@@ -56,7 +55,6 @@ __all__ = [
     "DEFAULT_NEAT",
     "MAZE_SEEDS",
     "MOST_CONTROLLERS",
-    "NO_LINE",
     "PARTS",
     "PLANS",
     "SECTIONS",

@@ -95,9 +95,6 @@ MOST_TURN = 0.9 * math.pi
 FAR_M = 20.0
 """Nothing stands nearer where a path is simulated [m]."""
 
-NO_LINE = ("path", "sensors")
-"""Purposes of trials of which no cells are counted: the first ends where a ruler says, the second stands."""
-
 _PATH_METHOD = (
     "Full-speed paths, straight and turning (Rosenzweig & Remy, section 2.2): ways and turns against those of the "
     "simulated robot; Student's intervals from repeats and from the step to which was read."

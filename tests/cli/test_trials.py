@@ -1,0 +1,72 @@
+"""`realitygap trials` with the file of trials that another command saved."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from realitygap.cli import app
+from realitygap.evolution import NeatSettings, Population
+from realitygap.records import read_observations
+
+
+def run(*arguments: object) -> str:
+    """Return the words of a command, whether it succeeds or refuses."""
+    result = CliRunner().invoke(app, list(map(str, arguments)))
+    assert result.exception is None or result.exit_code == 1, result.output
+    return str(result.exception) if result.exception else result.output
+
+
+@pytest.fixture
+def tried(tmp_path: Path) -> tuple[str, ...]:
+    """A command that saved three trials of a controller; the file is its last word."""
+    genome = Population(3, 2, NeatSettings.named("rosenzweig-remy", population=2), seed=5).ask()[0]
+    genome.save(tmp_path / "champion.json")
+    file = tmp_path / "tried.jsonl"
+    command = ("try", tmp_path / "champion.json", "--on", "sim", "--steps", 5, "--trials", 3, "-o", file)
+    assert "3 trials" in run(*command)
+    return tuple(map(str, command))
+
+
+def test_file_is_listed_scored_and_annotated(tried):
+    file = tried[-1]
+    assert "3 trials: 3 scored." in run("trials", "list", file)
+    assert "Trial 1: 2 cells." in run("trials", "score", file, 1, "--cells", "13,14", "--who", "anna")
+    run("trials", "note", file, 1, "--text", "a new pen")
+    rows = json.loads(run("trials", "list", file, "--json"))
+    assert [row["trial"] for row in rows] == [0, 1, 2]
+    assert (rows[1]["cells"], rows[1]["notes"]) == ([13, 14], ["2 cells were entered", "a new pen"])
+    assert re.search(r"0\.028", run(*tried)), "the command uses the entered cells"
+    sheet = Path(file).with_suffix(".txt")
+    sheet.write_text("0: 13\n2: 13 14 15\n")
+    assert "Trial 2: 3 cells." in run("trials", "score", file, "--file", sheet)
+
+
+def test_void_trial_of_a_file_is_driven_again_alone(tried):
+    file = tried[-1]
+    before = len(read_observations(file).trials)
+    assert "void" in run("trials", "void", file, 2, "--text", "it was pushed")
+    assert "2 scored, 1 void" in run("trials", "list", file)
+    assert "3 trials" in run(*tried)
+    after = read_observations(file).trials
+    assert [trial.number for trial in after[before:]] == [2, 2], "the record that it is void, and the new one"
+    assert "3 trials: 3 scored." in run("trials", "list", file)
+
+
+@pytest.mark.parametrize("words", [("undo", 1), ("agreement",), ("score", 1, "--cells", "1", "--second")])
+def test_actions_of_studies_are_refused_for_a_file(tried, words):
+    what, *rest = words
+    before = Path(tried[-1]).read_bytes()
+    assert "for the trials of a study" in run("trials", what, tried[-1], *rest)
+    assert Path(tried[-1]).read_bytes() == before
+
+
+def test_folder_with_several_files_of_trials_names_one(tried, tmp_path):
+    (tmp_path / "r" / "trials").mkdir(parents=True)
+    (tmp_path / "r" / "trials" / "select-8-0.jsonl").write_bytes(Path(tried[-1]).read_bytes())
+    assert "select-8-0.jsonl" in run("trials", "list", tmp_path / "r")
+    assert "There is no ledger" in run("trials", "list", tmp_path / "none")

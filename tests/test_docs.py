@@ -291,7 +291,7 @@ def test_parameters_that_the_page_of_inference_calls_missed_are_those_held_too_s
         for observe, rows in make_calibration.by_observation(make_calibration.measured()).items()
     }
     seldom = [
-        part.count
+        make_calibration.count(part)
         for parts in held.values()
         for part in parts.values()
         if make_calibration.chance(part) <= 0.05

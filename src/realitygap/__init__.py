@@ -78,6 +78,7 @@ _PACKAGES = {
     "gym",
     "lab",
     "logs",
+    "orders",
     "platforms",
     "playback",
     "records",

@@ -79,13 +79,18 @@ class Settings(BaseModel):
             found = mistakes(error, type(self), values)
         else:
             return
-        name = type(self).__name__
-        raise ValueError(
-            "\n".join(f"{name}.{place}: {text}" if place else f"{name}: {text}" for place, text in found)
-        )
+        raise self.refusal(found)
 
     # Otherwise pydantic would call it for nested tables, too, and report its errors as errors of a value.
     __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]
+
+    @classmethod
+    def refusal(cls, found: list[tuple[str, str]]) -> ValueError:
+        """Return the error for mistakes, with the place and the message of each."""
+        name = cls.__name__
+        return ValueError(
+            "\n".join(f"{name}.{place}: {text}" if place else f"{name}: {text}" for place, text in found)
+        )
 
     @classmethod
     def table_of(cls, name: str) -> type[BaseModel] | None:

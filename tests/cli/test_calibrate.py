@@ -259,10 +259,6 @@ def test_numbers_are_read_as_on_a_ruler(text, value):
         (("sensors", "--robot", "sim", "-o", "no/x.toml"), "There is no folder no"),
         (("sensor", "--robot", "sim", "-o", "x.toml"), "Cannot calibrate 'sensor'. Did you mean 'sensors'?"),
         (("sensors", "--robot", "sym", "-o", "x.toml"), "'sym' is no platform"),
-        (
-            ("sensors", "--robot", "sim", "--observe", "all", "-o", "x.toml"),
-            "expected cells, encoders or track",
-        ),
         (("path", "--robot", "sim", "--budget", "1", "-o", "x.toml"), "needs at least 2 trials"),
         (("path", "--robot", "sim", "--figure", "x.svg", "-o", "x.toml"), "--figure draws the readings"),
         (("sensors", "--robot", "sim", "--base", "e-puck", "-o", "x.toml"), "has 3 range sensors"),

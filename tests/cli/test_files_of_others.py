@@ -15,6 +15,7 @@ import pytest
 from typer.testing import CliRunner
 
 import realitygap
+from realitygap._toml import toml_table
 from realitygap.cli import app
 from realitygap.errors import RealityGapError, StudyError
 from realitygap.evolution import Genome, NeatSettings, Population
@@ -39,7 +40,6 @@ from realitygap.study import (
 )
 from realitygap.tasks import _python
 from realitygap.world import Calibration, load_arena, load_robot, read_calibration
-from realitygap.world._toml import toml_table
 from tests.python_tasks import marking_source, study_text
 from tests.records.test_observations_file import HEAD
 from tests.records.test_observations_file import trial as observed_trial

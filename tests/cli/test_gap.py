@@ -106,7 +106,7 @@ def test_terminal_and_report_state_the_same_estimates_intervals_and_p(printed, c
     [
         (("gap", "sim", "jyrro"), ("no platform", "jyro")),
         (("gap", "sim", "jyro", "--why"), ("realitygap calibrate all --robot jyro",)),
-        (("gap", "sim", "jyro", "--margin", "-1"), ("--margin is -1", "above 0")),
+        (("gap", "sim", "jyro", "--margin", "-1"), ("--margin is -1", "more than 0")),
         (("gap", "sim", "jyro", "--report", "gap.pdf"), (".html",)),
         (("gap", "sim", "jyro", "--report", "none/gap.html"), ("There is no folder none",)),
         (("gap", "sim", "jyro", "--randomize", "posterior"), ("draws robots from a calibration",)),

@@ -52,6 +52,11 @@ PRINTED_BY = {
     "logs/_range_table.py": ("calibrate",),
     "logs/_round_robot.py": ("calibrate",),
     "logs/_table_map.py": ("calibrate",),
+    "orders/_calibrate.py": ("calibrate",),
+    "orders/_gap.py": ("gap",),
+    "orders/_order.py": ("calibrate", "gap", "transfer"),
+    "orders/_record.py": ("calibrate", "gap", "transfer"),
+    "orders/_transfer.py": ("transfer",),
     "platforms/_python.py": (
         "calibrate",
         "drive",
@@ -70,6 +75,7 @@ PRINTED_BY = {
     "study/_calibrate/hold_out.py": ("calibrate",),
     "study/_calibrate/kinds.py": ("calibrate",),
     "study/_calibrate/one.py": ("calibrate",),
+    "study/_calibrate/ordered.py": ("calibrate",),
     "study/_calibrate/whole.py": ("calibrate",),
     "study/_camera_spec.py": ("calibrate", "drive", "gap", "track"),
     "study/_closing/plan.py": ("closing-the-gap",),
@@ -131,6 +137,9 @@ def test_options_that_messages_name_are_options_of_the_command_that_prints_them(
         } | {"--help"}
         module = f"cli/{inspect.unwrap(command.callback).__module__.rpartition('.')[2]}.py"
         printed_by.setdefault(module, set()).add(words)
+    known[("again",)] |= (
+        known[("calibrate",)] | known[("gap",)] | known[("transfer",)]
+    )  # it passes options on
     for module, names in PRINTED_BY.items():
         printed_by.setdefault(module, set()).update((name,) for name in names)
     wrong, seen = [], 0

@@ -5,6 +5,7 @@ from typer.testing import CliRunner
 
 from realitygap.cli import app
 from realitygap.errors import RealityGapError, RecordError, StudyError
+from realitygap.orders import read_order
 
 pytestmark = pytest.mark.slow
 
@@ -46,6 +47,7 @@ def test_json_is_the_result_in_the_folder(folder):
         "score": "coverage",
         "folder": str(folder),
         "champions_folder": str(folder / "champions"),
+        "order": read_order(folder).record(),
     }
     (row,) = found["strategies"]
     assert set(row["quality"]) == set(row["regret"]) == {"estimate", "low", "high", "n"}

@@ -24,11 +24,11 @@ REJECTED = """
 import sys
 if "realitygap.lab._work" in sys.orig_argv:
     from realitygap.lab import _calibrate_work
-    calibrate = _calibrate_work.calibrate
+    make_calibration = _calibrate_work.make_calibration
     def rejected(*given, **options):
-        made = calibrate(*given, **options)
+        made = make_calibration(*given, **options)
         return made.model_copy(update={"misspecified": True, "misspecification_p": 0.01})
-    _calibrate_work.calibrate = rejected
+    _calibrate_work.make_calibration = rejected
 """
 
 

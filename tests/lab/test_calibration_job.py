@@ -9,6 +9,7 @@ import pytest
 
 from realitygap.emulator import Emulator, serve_tcp
 from realitygap.lab._calibration_job import CalibrationJob
+from realitygap.orders import CalibrateOrder
 from realitygap.records import read_observations
 
 from .test_hand import wait_for
@@ -29,14 +30,8 @@ def answer(job: CalibrationJob, **values: Any) -> None:
 
 def test_somebody_is_led_through_measures_and_stops_for_now(tmp_path: Path, forked_children: None):
     with serve_tcp(Emulator("s2"), speed=20) as server:
-        order = {
-            "kind": "path",
-            "platform": f"scribbler:{server.name}",
-            "out": str(tmp_path / "mine.toml"),
-            "observe": "cells",
-            "base": "scribbler-s2-fluke2",
-            "budget": 4,
-        }
+        robot = f"scribbler:{server.name}"
+        order = CalibrateOrder(what="path", robot=robot, out=tmp_path / "mine.toml", budget=4)
         job = CalibrationJob(order, tmp_path, lambda: None)
         assert "24 in free ahead" in asked(job, "place")["text"]
         assert job.has_robot

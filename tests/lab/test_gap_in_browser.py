@@ -38,6 +38,7 @@ def test_gap_is_measured_with_its_progress_and_mistakes_are_shown_at_their_field
         page.locator(".lab-field .lab-problem", has_text=problem).wait_for()
         page.wait_for_function("() => document.activeElement.classList.contains('lab-summary')")
     assert list(lab.root.iterdir()) == []
+    page.get_by_label("Controllers", exact=True).fill("10")
     page.get_by_label("Trials per controller").fill("3")
     page.get_by_text(
         "Needs 30 trials on the target. With these, mean differences in coverage above"

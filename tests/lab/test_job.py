@@ -15,6 +15,7 @@ from realitygap.lab._gap_job import GapJob
 from realitygap.lab._job import Job
 from realitygap.lab._measuring_job import SILENT_S
 from realitygap.lab.pages._gap import _Work
+from realitygap.orders import CalibrateOrder, GapOrder
 
 
 class SilentChild:
@@ -96,8 +97,8 @@ def test_robot_of_a_gap_is_silent_only_in_a_trial_without_an_answer(tmp_path, mo
     monkeypatch.setattr(_job, "Child", SilentChild)
     now = [100.0]
     monkeypatch.setattr(_measuring_job.time, "monotonic", lambda: now[0])
-    values = {"target": "scribbler:/dev/x", "n_controllers": 2, "trials": 2}
-    job = GapJob("gap", {"measure": values}, tmp_path, lambda: None)
+    order = GapOrder(sim="sim", target="scribbler:/dev/x", n_controllers=2, trials=2)
+    job = GapJob(order, tmp_path / "gap.html", tmp_path, lambda: None)
     assert job.silent_s == 0
     job._hear({"kind": "pulse", "is_driving": True})
     now[0] += SILENT_S
@@ -120,9 +121,9 @@ def test_job_that_failed_offers_to_resume_where_that_helps(
 ):
     """A missing file fails again; a robot that did not answer may answer the next time."""
     monkeypatch.setattr(_job, "Child", SilentChild)
-    gap = {"target": "sim:missing.toml", "n_controllers": 2, "trials": 2}
-    calibration = {"kind": "path", "platform": "sim:missing.toml", "out": str(tmp_path / "mine.toml")}
-    job = GapJob("gap", {"measure": gap}, tmp_path, lambda: None)
+    gap = GapOrder(sim="sim", target="sim:missing.toml", n_controllers=2, trials=2)
+    calibration = CalibrateOrder(what="path", robot="sim:missing.toml", out=tmp_path / "mine.toml")
+    job = GapJob(gap, tmp_path / "gap.html", tmp_path, lambda: None)
     other = CalibrationJob(calibration, tmp_path, lambda: None)
     if trials:
         job._hear({"kind": "trials", "name": "sim", "done": trials})

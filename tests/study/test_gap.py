@@ -324,17 +324,18 @@ def test_a_trial_that_is_lost_for_good_is_no_trial_that_visited_nothing(some, tm
 def test_trials_of_a_robot_have_to_be_kept(monkeypatch, tmp_path):
     real = sim()
     real.label = "REAL"
-    there = study_gap_between._open
+    there = study_gap_between.open_target
     monkeypatch.setattr(
         study_gap_between,
-        "_open",
+        "open_target",
         lambda spec, *more, **named: real if spec == "robot" else there(spec, *more, **named),
     )
     with pytest.raises(StudyError, match=r"12 trials on robot would not be saved.*-o FILE"):
-        gap_between("sim", "robot", n_controllers=6, trials=2)
-    found = gap_between("sim", "robot", n_controllers=6, trials=2, results=tmp_path / "trials.jsonl")
+        gap_between("sim", "robot", n_controllers=6, trials=2, noise=0)
+    file = tmp_path / "trials.jsonl"
+    found = gap_between("sim", "robot", n_controllers=6, trials=2, noise=0, results=file)
     assert found.study.target.label == "REAL"
-    recorded = gap_between("sim", f"recorded:{tmp_path / 'trials.jsonl'}", n_controllers=6, trials=2)
+    recorded = gap_between("sim", f"recorded:{file}", n_controllers=6, trials=2)
     assert recorded.study.target.label == "REAL"  # they are in a file already
 
 

@@ -156,7 +156,8 @@ def make_app(commands: Sequence[Command]) -> typer.Typer:
                 each.cls = _GroupedCommand
             app.add_typer(item, name=command.name)
         else:
-            app.command(command.name, cls=_GroupedCommand)(item)
+            settings = {"ignore_unknown_options": True} if command.passes_options_on else None
+            app.command(command.name, cls=_GroupedCommand, context_settings=settings)(item)
     return app
 
 

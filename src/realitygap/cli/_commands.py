@@ -31,12 +31,14 @@ class Command:
         summary: Line for the list; for a command, the first line of its docstring.
         module: The module of `realitygap.cli` that defines it.
         attribute: The function or the Typer group in that module.
+        passes_options_on: True if it takes the options of another command.
     """
 
     name: str
     summary: str
     module: str
     attribute: str
+    passes_options_on: bool = False
 
 
 SECTIONS: dict[str, tuple[Command, ...]] = {
@@ -67,6 +69,7 @@ SECTIONS: dict[str, tuple[Command, ...]] = {
         Command("transfer", "Compare strategies that transfer controllers.", "_transfer", "transfer"),
         Command("closing-the-gap", "Measure and shrink the gap to many robots.", "_closing", "closing"),
         Command("try", "Drive one exported controller on any platform.", "_try", "try_genome"),
+        Command("again", "Repeat a measurement from its result.", "_again", "again", True),
         Command("twin", "Sample and inspect MuJoCo twins (pseudo-reality).", "_twin", "twin"),
     ),
     "Use a robot": (

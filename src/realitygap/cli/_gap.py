@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -12,163 +11,39 @@ import typer
 from realitygap._terminal import echo
 from realitygap._wording import p_equation, reproduces
 from realitygap.errors import StudyError
+from realitygap.orders import GapOrder
 
 from ._camera import CAMERA_HELP, under_camera
 from ._code import AllowPlatforms
 from ._json import print_json
+from ._order import command_of
+from ._target import attending_observer
 
 if TYPE_CHECKING:
     from realitygap.gap import GapResult, ReplayError, Why
     from realitygap.stats import Estimate
     from realitygap.study import GapPlan
-    from realitygap.trials import PortObserver
 
 
-_ONLY_TWINS = "Only for twins"
-_ONLY_ROBOTS = "Only for robots"
-TASK_HELP = (
-    "Task that scores trials: coverage, avoid, light, wall, goal or python:FILE.py:function. [default: the task of the "
-    "controllers; coverage for random ones]"
-)
+ONLY_ROBOTS = "Only for robots"
 
 
-class Randomize(StrEnum):
-    """Source of the robots of trials: no sampling, or samples of a calibration."""
-
-    no = "no"
-    posterior = "posterior"
-
-
-class Seen(StrEnum):
-    """Observation level of the target."""
-
-    readings = "readings"
-    cells = "cells"
-    encoders = "encoders"
-    track = "track"
-
-
+@command_of(GapOrder)
 def gap(
-    sim: Annotated[str, typer.Argument(metavar="SIM", help="Simulator: sim, sim:FILE or jyro.")],
-    target: Annotated[
-        str,
-        typer.Argument(
-            metavar="TARGET",
-            help="Target: twin:FILE, scribbler:PORT, thymio:PORT, enki, recorded:FILE, sim, sim:FILE or jyro.",
-        ),
-    ],
-    controllers: Annotated[
-        str,
-        typer.Option(
-            metavar="WHICH",
-            help="random for unrelated networks; or a study or a folder of results, for its champions.",
-        ),
-    ] = "random",
-    n_controllers: Annotated[int, typer.Option(min=2, max=1024, help="Number of controllers.")] = 30,
-    task: Annotated[str | None, typer.Option(metavar="KIND", help=TASK_HELP)] = None,
-    trials: Annotated[int, typer.Option(min=1, max=4096, help="Trials per controller and platform.")] = 10,
-    margin: Annotated[
-        float | None,
-        typer.Option(
-            metavar="M", help="Largest difference in score that counts as equivalent, such as 0.05."
-        ),
+    order: GapOrder,
+    camera: Annotated[
+        str | None, typer.Option(metavar="CAMERA", help=CAMERA_HELP, rich_help_panel=ONLY_ROBOTS)
     ] = None,
-    observe: Annotated[
-        Seen | None,
-        typer.Option(
-            help="Data recorded on the target. track also measures replays. [default: what the task needs]"
-        ),
-    ] = None,
-    arena: Annotated[
-        str | None,
-        typer.Option(metavar="NAME", help="Arena by name or file. [default: that of the controllers]"),
-    ] = None,
-    noise: Annotated[
-        float | None,
-        typer.Option(
-            min=0,
-            max=10,
-            help="Noise level a of the paper, on simulators. [default: 0.1 on jyro, 0 on others]",
-        ),
-    ] = None,
-    randomize: Annotated[
-        Randomize,
-        typer.Option(
-            help="posterior: sample the robot of each trial from the calibration SIM. no: use its estimate."
-        ),
-    ] = Randomize.no,
-    reevolved: Annotated[
-        str | None,
-        typer.Option(
-            metavar="WHICH",
-            help="Study or folder of champions evolved on the target. Adds the re-evolved gap, which is the paper's.",
-        ),
-    ] = None,
-    why: Annotated[
-        bool,
-        typer.Option(
-            "--why",
-            help="Report how much of the gap each part of the model explains. SIM must be a calibration.",
-        ),
-    ] = False,
     report: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Page to write, with figures and tables (.html).")
     ] = None,
     allow_code: AllowPlatforms = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            "-o",
-            "--out",
-            metavar="FILE",
-            help="File to save the target's trials in (.jsonl). Run the command again to resume.",
-        ),
-    ] = None,
-    processes: Annotated[
-        int | None,
-        typer.Option(
-            min=1,
-            help="Number of twin trials to run in parallel. [default: all processors]",
-            rich_help_panel=_ONLY_TWINS,
-        ),
-    ] = None,
-    witness: Annotated[
-        str | None,
-        typer.Option(
-            metavar="HOST:PORT",
-            help="Witness of an emulated robot in another program.",
-            rich_help_panel=_ONLY_ROBOTS,
-        ),
-    ] = None,
-    camera: Annotated[
-        str | None, typer.Option(metavar="CAMERA", help=CAMERA_HELP, rich_help_panel=_ONLY_ROBOTS)
-    ] = None,
-    seed: Annotated[int, typer.Option(min=0, max=2**31, help="Seed of all random numbers.")] = 1,
 ) -> None:
-    """Measure the gap between a simulator and a target.
-
-    Runs the same controllers on both platforms. Reports level, RMS gap without the noise of trials, ranking, behavior,
-    and equivalence at a margin, with 95 % intervals. If there are too few trials for a measure, the report says how
-    many you need.
-
-    Example: realitygap gap sim jyro --n-controllers 10 --trials 5
-
-    Example: realitygap gap sim twin:worn-1.toml --controllers paper --margin 0.05 --report gap.html
-
-    Example: realitygap gap sim twin:worn-1.toml --controllers avoid
-
-    Example: realitygap gap sim:fit.toml recorded:tracked.jsonl --observe track
-
-    Example: realitygap gap sim:fit.toml twin:worn-1.toml --randomize posterior
-
-    In Python: realitygap.study.gap_between("sim", "jyro", n_controllers=10, trials=5)
-    """
+    """Measure the gap, print the result, and write the page."""
     from realitygap.study import gap_between
     from realitygap.world import load_arena
 
-    if margin is not None and not 0 < margin < float("inf"):
-        raise StudyError(f"--margin is {margin}, expected a difference of scores above 0, such as 0.05.")
     if report is not None:
         from realitygap.report import refuse_gap_page
 
@@ -178,35 +53,15 @@ def gap(
     try:
         with (
             TrialsBar(quiet=as_json) as bar,
-            under_camera(camera, load_arena(arena or "paper"), _observer(target, witness)) as observer,
+            under_camera(
+                camera, load_arena(order.arena or "paper"), attending_observer(order.target, order.witness)
+            ) as observer,
         ):
-            found = gap_between(
-                sim,
-                target,
-                controllers=controllers,
-                n_controllers=n_controllers,
-                task=task,
-                trials=trials,
-                margin=margin,
-                observe=None if observe is None else observe.value,
-                arena=arena,
-                noise=noise,
-                randomize=randomize.value,
-                reevolved=reevolved,
-                why=why,
-                processes=processes,
-                witness=witness,
-                observer=observer,
-                seed=seed,
-                results=out,
-                allow_code=allow_code,
-                tell=bar.show,
-                say=bar.say,
-            )
+            found = gap_between(order, observer=observer, allow_code=allow_code, tell=bar.show, say=bar.say)
     except KeyboardInterrupt:
         kept = (
-            f"Finished trials are in {out}. Run the same command to resume."
-            if out
+            f"Finished trials are in {order.results}. Run the same command to resume."
+            if order.results
             else "Nothing was saved. To save trials, add -o FILE."
         )
         echo(f"Interrupted. {kept}", err=True)
@@ -218,7 +73,7 @@ def gap(
         write_gap_report(found, report)
         echo(f"Written: {report}", err=True)
     if as_json:
-        values: dict[str, Any] = result.to_dict() | {"report": report}
+        values: dict[str, Any] = result.to_dict() | {"order": order.record(), "report": report}
         for name, part in (("replay", found.study.replay), ("why", found.why)):
             values |= {} if part is None else {name: part.to_dict()}
         print_json(values)
@@ -228,17 +83,6 @@ def gap(
         _print_why(found.why)
     if report is None and sys.stdout.isatty():
         echo("With --report gap.html, the command also writes these numbers and figures as a page.")
-
-
-def _observer(target: str, witness: str | None) -> PortObserver | None:
-    """Return a person at the terminal, if there is one and the robot has no witness."""
-    from ._calibrate import _is_led
-
-    if not _is_led(target, witness) or not sys.stdin.isatty():
-        return None
-    from ._sheet import sheet_observer
-
-    return sheet_observer(asks_for_start=True)
 
 
 def _print(result: GapResult, replay: ReplayError | None) -> None:

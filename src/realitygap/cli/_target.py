@@ -1,28 +1,24 @@
-"""Opening a target: a witness, or the operator at the terminal, places a robot and counts its cells."""
+"""The person at the terminal, who places a robot and counts its cells."""
 
 from __future__ import annotations
 
 import sys
 from typing import TYPE_CHECKING
 
-from ._sheet import sheet_observer
-
 if TYPE_CHECKING:
-    from realitygap.trials import Target
-    from realitygap.world import Arena
+    from realitygap.trials import PortObserver
 
 
-def opened_target(
-    spec: str, arena: Arena, *, witness: str | None = None, processes: int | None = None, seed: int = 0
-) -> Target:
-    """Return a target by name. Without a witness, the operator at the terminal places a robot and counts its cells.
+def attending_observer(spec: str, witness: str | None) -> PortObserver | None:
+    """Return the person at the terminal, if there is one and the robot has no witness.
 
     Raises:
-        StudyError: There is no such platform, or nobody attends to the robot.
-        RobotError: It cannot be reached.
+        StudyError: There is no such platform.
     """
-    from realitygap.platforms import open_target, platform_of
+    from realitygap.platforms import platform_of
 
-    is_led = witness is None and sys.stdin.isatty() and platform_of(spec).needs_person
-    observer = sheet_observer(asks_for_start=True) if is_led else None
-    return open_target(spec, arena, witness=witness, observer=observer, processes=processes, key=seed)
+    if witness is not None or not sys.stdin.isatty() or not platform_of(spec).needs_person:
+        return None
+    from ._sheet import sheet_observer
+
+    return sheet_observer(asks_for_start=True)

@@ -73,11 +73,12 @@ def try_genome(
     """
     from realitygap.errors import did_you_mean
     from realitygap.evolution import OUTPUTS, ControllerInterface, Genome
+    from realitygap.platforms import open_target
     from realitygap.records import OBSERVATIONS
     from realitygap.study import try_on
     from realitygap.world import load_arena
 
-    from ._target import opened_target
+    from ._target import attending_observer
 
     if observe not in OBSERVATIONS:
         raise StudyError(f"Unknown observation {observe!r}. {did_you_mean(observe, OBSERVATIONS)}")
@@ -91,7 +92,8 @@ def try_genome(
         seen = controller.interface.inputs if inputs is None else _names(inputs)
         answered = OUTPUTS if outputs is None else _names(outputs)
         controller = controller.with_interface(ControllerInterface(seen, answered))
-    with opened_target(on, load_arena(arena), witness=witness, seed=seed) as target:
+    observer = attending_observer(on, witness)
+    with open_target(on, load_arena(arena), witness=witness, observer=observer, key=seed) as target:
         tried = try_on(target, controller, trials=trials, steps=steps, observe=observe, out=out)
         n_cells = target.arena.grid.n_cells
         coverage = [len(trial.cells) / n_cells for trial in tried]

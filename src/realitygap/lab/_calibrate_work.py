@@ -7,19 +7,18 @@ from typing import Any
 
 import numpy as np
 
-from realitygap.platforms import platform_of
+from realitygap.orders import CalibrateOrder
+from realitygap.platforms import class_of, platform_of
 from realitygap.records import NO_LINE, TrialRecord, read_observations
 from realitygap.report import save_sensor_figure
 from realitygap.study import (
     StoppedByPerson,
-    calibrate,
-    open_target,
+    make_calibration,
     parse_length,
     placing_words,
-    save_calibration,
     with_ruled_end,
 )
-from realitygap.trials import Led, OnLost, Operator, SheetObserver, TrialPlan, Verdict, those_that_count
+from realitygap.trials import Led, Operator, SheetObserver, TrialPlan, Verdict, those_that_count
 from realitygap.world import INCH, Arena, Calibration, RobotModel, load_arena, load_robot
 
 from ._channel import Channel, Message
@@ -32,48 +31,29 @@ _QUESTIONS = {
 }
 
 
-def work(channel: Channel, order: Message) -> None:
+def work(channel: Channel, message: Message) -> None:
     """Drive the missing trials of a calibration, fit, and write the calibration.
 
     Args:
         channel: To the server.
-        order: `kind`, `platform`, `out`, `observe`, `base`, `seed`, and if any `budget` and `witness`.
+        message: `order`, the message of a `CalibrateOrder`.
     """
-    out = Path(order["out"])
-    kept = out.with_suffix(".trials.jsonl")
-    arena, robot = load_arena("paper"), load_robot(order["base"])
-    platform, witness = str(order["platform"]), order.get("witness") or None
-    is_led = witness is None and platform_of(platform).needs_person
-    growing = _Growing(channel, kept, arena, robot)
-    observer = _sheet_observer(channel) if is_led else None
-    operator = _PageOperator(channel, arena, robot, growing) if is_led else None
-    seed = int(order.get("seed") or 0)
-    on_lost: OnLost = "stop" if is_led else "retry"  # again only from where somebody has put it
+    order = CalibrateOrder(**message["order"])
+    out, platform = order.out or Path(), order.robot or ""
+    arena, robot = load_arena(order.arena), load_robot(order.base or class_of(platform).base_robot)
+    is_led = order.witness is None and platform_of(platform).needs_person
+    growing = _Growing(channel, out.with_suffix(".trials.jsonl"), arena, robot)
     try:
-        with open_target(
-            platform,
-            arena,
-            key=seed,
-            witness=witness,
-            observer=observer,
-            on_lost=on_lost,
+        made = make_calibration(
+            order,
+            observer=_sheet_observer(channel) if is_led else None,
+            operator=_PageOperator(channel, arena, robot, growing) if is_led else None,
             pulse=Pulse(channel).tell,
-        ) as target:
-            made = calibrate(
-                order["kind"],
-                target,
-                robot=order["base"],
-                observe=order["observe"],
-                budget=order.get("budget"),
-                seed=seed,
-                trials_file=kept,
-                operator=operator,
-                tell=growing.tell,
-            )
+            tell=growing.tell,
+        )
     except StoppedByPerson:
         channel.say("paused")
         return
-    save_calibration(out, made)
     _tell_made(channel, made, out)
 
 

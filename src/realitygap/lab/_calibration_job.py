@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from realitygap.orders import CalibrateOrder
 from realitygap.platforms import names_a_port
 
 from ._measuring_job import MeasuringJob
@@ -17,7 +18,7 @@ class CalibrationJob(MeasuringJob):
 
     Attributes:
         name: Of its files.
-        values: The order, without the file.
+        order: The order.
         kind: What is calibrated.
         platform: The platform that is measured.
         n_done, n_trials: Number of trials: recorded, and total.
@@ -27,16 +28,16 @@ class CalibrationJob(MeasuringJob):
 
     STOPPED = "Stopped. Recorded trials are saved. Resume to continue."
 
-    def __init__(self, order: dict[str, Any], root: Path, changed: Callable[[], None]) -> None:
-        self.name = Path(order["out"]).stem
-        self.values = {key: value for key, value in order.items() if key != "out"}
-        self.kind = str(order["kind"])
-        self.platform = str(order["platform"])
+    def __init__(self, order: CalibrateOrder, root: Path, changed: Callable[[], None]) -> None:
+        self.name = "" if order.out is None else order.out.stem
+        self.order = order
+        self.kind = order.what
+        self.platform = order.robot or ""
         self.n_done = self.n_trials = 0
         self._pace = Pace()
         self.readings: list[dict[str, Any]] = []
         self.made: dict[str, Any] | None = None
-        super().__init__({"work": "calibrate", **order}, root, changed)
+        super().__init__({"work": "calibrate", "order": order.message()}, root, changed)
 
     @property
     def has_met(self) -> bool:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from realitygap.orders import GapOrder
 from realitygap.platforms import names_a_port
 
 from ._measuring_job import MeasuringJob
@@ -17,7 +18,7 @@ class GapJob(MeasuringJob):
 
     Attributes:
         name: Name of its files.
-        values: Arguments of `gap_between`.
+        order: The order.
         platform: The target.
         n_trials: Number of trials on each platform.
         trials: Number of trials that are done, by platform.
@@ -29,11 +30,11 @@ class GapJob(MeasuringJob):
         n_reports: Number of reports so far.
     """
 
-    def __init__(self, name: str, order: dict[str, Any], root: Path, changed: Callable[[], None]) -> None:
-        self.name = name
-        self.values: dict[str, Any] = order["measure"]
-        self.platform = str(self.values["target"])
-        self.n_trials = int(self.values["n_controllers"]) * int(self.values["trials"])
+    def __init__(self, order: GapOrder, page: Path, root: Path, changed: Callable[[], None]) -> None:
+        self.name = page.stem
+        self.order = order
+        self.platform = order.target
+        self.n_trials = order.n_trials
         self.trials: dict[str, int] = {}
         self._pace = Pace()
         self.is_complete = False
@@ -42,7 +43,7 @@ class GapJob(MeasuringJob):
         self.intervals: list[tuple[int, float, float, float]] = []
         self.pairs: dict[str, Any] = {}
         self.n_reports = 0
-        super().__init__({"work": "gap", **order}, root, changed)
+        super().__init__({"work": "gap", "order": order.message(), "page": str(page)}, root, changed)
 
     @property
     def has_met(self) -> bool:

@@ -8,6 +8,7 @@ from typing import Any, Self
 
 from realitygap._wording import with_interval
 from realitygap.gap import SHOWN
+from realitygap.orders import GapOrder
 from realitygap.report import write_gap_report
 from realitygap.stats import Estimate
 from realitygap.study import GapStudy, gap_between
@@ -26,19 +27,19 @@ def work(channel: Channel, order: Message) -> None:
 
     Args:
         channel: To the server.
-        order: `measure`, the arguments of `gap_between`; `page`, the file of the report; and `kept`, that of the
-            target's trials.
+        order: `order`, the message of a `GapOrder`; and `page`, the file of the report.
     """
-    _measure(channel, dict(order["measure"]), Path(order["page"]), Path(order["kept"]))
+    _measure(channel, GapOrder(**order["order"]), Path(order["page"]))
     channel.say("done")
 
 
-def _measure(channel: Channel, values: dict[str, Any], page: Path, kept: Path) -> None:
+def _measure(channel: Channel, order: GapOrder, page: Path) -> None:
     """Measure repeatedly with more trials of each controller. Trials of the target are kept, and never driven again."""
     pulse = Pulse(channel)
     with _Telling(channel) as told:
-        for trials in rounds(int(values.pop("trials"))):
-            gap = gap_between(**values, trials=trials, results=kept, pulse=pulse.tell, tell=told.show)
+        for trials in rounds(order.trials):
+            part = order.model_copy(update={"trials": trials})
+            gap = gap_between(part, pulse=pulse.tell, tell=told.show)
             write_gap_report(gap, page)
             channel.say("measured", trials=trials, **_measured(gap.study))
 

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from realitygap.errors import StudyError
+from realitygap.orders import CalibrateOrder, GapOrder
 from realitygap.platforms import names_a_port, platform_of
 from realitygap.records import refuse_links
 from realitygap.runs import NAME_PATTERN
@@ -20,7 +21,7 @@ from ._calibration_job import CalibrationJob
 from ._checks import Checks
 from ._counts import Counts
 from ._drawer import Drawer
-from ._files import plain_files, refuse_camera, refuse_outside, refuse_platform, refuse_port
+from ._files import plain_files, refuse_camera, refuse_outside, refuse_port
 from ._gap_job import GapJob
 from ._hand import Hand
 from ._identify_job import IdentifyJob
@@ -338,7 +339,7 @@ class Lab:
 
         Args:
             name: Name of its files in the folder `gaps`.
-            values: Arguments of `gap_between`.
+            values: Fields of the order.
             visitor: Operator of the robot, if the target is one.
 
         Raises:
@@ -356,8 +357,7 @@ class Lab:
                 self.refuse_second_robot()
                 self.operator, self.request = visitor, None
             page.parent.mkdir(exist_ok=True)
-            order = {"measure": values, "page": str(page), "kept": str(kept)}
-            self.gap = GapJob(name, order, self.root, self.changed)
+            self.gap = GapJob(GapOrder(**values, results=kept), page, self.root, self.changed)
             self._note_user(self.gap)
         self.changed()
 
@@ -367,18 +367,14 @@ class Lab:
         if "name" in values:
             with mistakes.in_field("name"):
                 _check_name(values["name"])
-        for key in ("sim", "target"):
-            if key in values:
-                with mistakes.in_field(key):
-                    refuse_platform(self.root, values[key])
-                    is_led = key == "target" and not values.get("witness")
-                    if is_led and platform_of(values["target"]).needs_person:
-                        raise StudyError(
-                            "In the lab, a gap needs a target without an operator. For an emulator in another program, "
-                            "enter its witness. For a robot, use the command: realitygap gap"
-                        )
-        with mistakes.in_field("controllers"):
-            refuse_outside(self.root, str(values.get("controllers") or ""))
+        mistakes.in_order(GapOrder, values, self.root)
+        if "target" in values and "target" not in mistakes.problems and not values.get("witness"):
+            with mistakes.in_field("target"):
+                if platform_of(values["target"]).needs_person:
+                    raise StudyError(
+                        "In the lab, a gap needs a target without an operator. For an emulator in another program, "
+                        "enter its witness. For a robot, use the command: realitygap gap"
+                    )
         return mistakes
 
     def gap_page(self, name: str) -> Path | None:
@@ -397,7 +393,7 @@ class Lab:
 
         Args:
             name: Name of its file in the lab's folder, without .toml.
-            values: Order of `_calibrate_work`.
+            values: Fields of the order.
             visitor: Operator of the robot, if the platform is one.
 
         Raises:
@@ -407,15 +403,14 @@ class Lab:
         self.calibration_mistakes({**values, "name": name}).refuse()
         out = self.root / f"{name}.toml"
         refuse_links(self.root, out, out.with_suffix(".trials.jsonl"), out.with_suffix(".svg"))
-        is_robot = names_a_port(values["platform"])
+        is_robot = names_a_port(values["robot"])
         with self._lock:
             if self.calibration is not None and not self.calibration.is_over:
                 raise StudyError("A calibration is running. Wait until it is complete, or stop it.")
             if is_robot:
                 self.refuse_second_robot()
                 self.operator, self.request = visitor, None
-            order = {**values, "out": str(out)}
-            self.calibration = CalibrationJob(order, self.root, self.changed)
+            self.calibration = CalibrationJob(CalibrateOrder(**values, out=out), self.root, self.changed)
             self._note_user(self.calibration)
         self.changed()
 
@@ -428,11 +423,7 @@ class Lab:
                 out = self.root / f"{values['name']}.toml"
                 if out.exists() and not out.with_suffix(".trials.jsonl").exists():
                     raise StudyError(f"There is another file {out.name}. Choose another name.")
-        with mistakes.in_field("base"):
-            refuse_outside(self.root, str(values.get("base") or ""))
-        if "platform" in values:
-            with mistakes.in_field("platform"):
-                refuse_platform(self.root, values["platform"])
+        mistakes.in_order(CalibrateOrder, values, self.root)
         return mistakes
 
     # the robot

@@ -4,8 +4,13 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
 
 from realitygap.errors import StudyError
+from realitygap.orders import Order, OrderError
+
+from ._files import refuse_outside, refuse_platform
 
 
 class FormError(StudyError):
@@ -37,6 +42,27 @@ class Mistakes:
             yield
         except StudyError as error:
             self.problems[field] = str(error)
+
+    def in_order(self, model: type[Order], values: Mapping[str, Any], root: Path) -> None:
+        """Add what is wrong in the fields of an order; a field that is missing is not checked.
+
+        Args:
+            model: The order.
+            values: Values of fields by name. Those of other names are left out.
+            root: Folder that has all files that the order may name.
+        """
+        given = {field: values[field.name] for field in model.fields() if field.name in values}
+        for field, value in given.items():
+            with self.in_field(field.name):
+                if field.face.refers == "platform":
+                    refuse_platform(root, value)
+                elif field.face.refers == "file":
+                    refuse_outside(root, str(value or ""))
+        try:
+            model(**{field.name: value for field, value in given.items()})
+        except OrderError as error:
+            known = {field.name for field in given} - set(self.problems)
+            self.problems |= {name: text for name, text in error.problems.items() if name in known}
 
     def refuse(self) -> None:
         """Raise an error if there is a mistake.

@@ -9,9 +9,9 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from realitygap._limits import MOST_TOML_BYTES, is_file, parse_toml, read_file
 from realitygap._named_file import NamedFileError, named_file
+from realitygap._toml import toml_table
 from realitygap.errors import LogError
 from realitygap.settings import Settings
-from realitygap.world import toml_table
 
 
 def _column(value: Any) -> Any:

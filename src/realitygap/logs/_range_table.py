@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realitygap._limits import MOST_TABLE_BYTES, read_file
+from realitygap._toml import toml_table
 from realitygap.errors import LogError
-from realitygap.world import toml_table
 
 from ._guess import SENSOR
 from ._source import MOST_SHOWN, Floats, check_columns

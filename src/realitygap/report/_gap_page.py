@@ -103,6 +103,7 @@ def _content(gap: GapBetween) -> dict[str, Any]:
             (each.name, *(f"{side.means[k]:.3f}" for side in (study.source, study.target)))
             for k, each in enumerate(study.controllers)
         ],
+        "order": "" if gap.order is None else gap.order.to_toml(),
         "names": [f"{side.label} {side.name}" for side in (study.source, study.target)],
     }
     return content | hover_content(content)

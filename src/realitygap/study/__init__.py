@@ -7,8 +7,8 @@ from . import _cards  # noqa: F401  # what notebooks show
 from ._bench import measure_speed
 from ._calibrate.from_log import calibrate_from_log
 from ._calibrate.from_table import calibrate_from_table
-from ._calibrate.hold_out import hold_out_of
 from ._calibrate.one import calibrate, calibrate_from, save_calibration
+from ._calibrate.ordered import make_calibration
 from ._calibrate.whole import calibrate_all
 from ._camera_observer import CameraObserver, Looking
 from ._camera_spec import marks_of, read_camera, tag_of
@@ -45,8 +45,9 @@ from ._tracked import (
     trial_of_file,
     trial_of_ledger,
 )
+from ._transfer.ordered import run_transfer
 from ._transfer.result import Strategist, Transferred, TransferResult, estimate_mean
-from ._transfer.strategies import STRATEGIES, TransferPlan, choose_condition, strategy_names, transfer
+from ._transfer.strategies import STRATEGIES, TransferPlan, choose_condition, transfer
 from ._trial_bags import export_trials
 from ._try_on import try_on
 
@@ -101,9 +102,9 @@ __all__ = [
     "estimate_seconds",
     "export_trials",
     "gap_between",
-    "hold_out_of",
     "load_study",
     "machine_facts",
+    "make_calibration",
     "marks_of",
     "measure_maze",
     "measure_realism",
@@ -126,10 +127,10 @@ __all__ = [
     "read_camera",
     "recorded_spreads",
     "run_study",
+    "run_transfer",
     "sample_controllers",
     "save_calibration",
     "score_tracked",
-    "strategy_names",
     "study_gap",
     "study_template",
     "summarize_closing",

@@ -40,7 +40,6 @@ from ._robot import JYRO_SCRIBBLER, Body, RangeSensors
 from ._robot_model import SENSORS, RangeSensor, RobotModel
 from ._robot_picture import model_picture
 from ._settings import ArenaSettings
-from ._toml import toml_table
 from ._walls import bounds_of, enclosing_walls, is_inside, room_of, walls_within
 
 __all__ = [
@@ -101,7 +100,6 @@ __all__ = [
     "room_of",
     "rounded",
     "things_in",
-    "toml_table",
     "walls_within",
     "why_no_part",
 ]

@@ -8,6 +8,7 @@ from typing import Any, Self
 
 from pydantic import Field, model_validator
 
+from realitygap._toml import toml_table, toml_value
 from realitygap.settings import Settings, shown
 
 from ._distribution import Distribution
@@ -15,7 +16,6 @@ from ._floor import MOST_PIXELS, Floor, FloorImage
 from ._numbers import INCH, Described, NotNegative, Number, Positive, in_si
 from ._obstacle import TAPE_WIDTH, Obstacle
 from ._part import Corner, box_as_corners, why_no_part
-from ._toml import toml_table, toml_value
 
 MOST_CELLS = 256
 MOST_WALLS = 2048

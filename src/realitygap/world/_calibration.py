@@ -8,10 +8,9 @@ from typing import Any, Literal, Self
 
 from pydantic import Field, model_validator
 
+from realitygap._toml import toml_table
 from realitygap.drawing import Bar, Card, ShownAsCard, Table, card_of
 from realitygap.settings import Settings
-
-from ._toml import toml_table
 
 MOST_DRAWS = 10_000
 NEAR_END = 0.05  # of the prior's width: what is nearer to an end of it lies at that end
@@ -154,6 +153,7 @@ class Calibration(Settings, ShownAsCard):
     reasons: tuple[str, ...] = Field((), description="Reasons for the verdict, each a sentence.")
     notes: tuple[str, ...] = Field((), description="Notes on the fit, each a sentence.")
     evidence: dict[str, Any] = Field({}, description="Data of the figures.")
+    order: dict[str, Any] = Field({}, description="Settings of the command that made the calibration.")
 
     @model_validator(mode="after")
     def _draws_go_together(self) -> Self:
@@ -204,7 +204,7 @@ class Calibration(Settings, ShownAsCard):
     def to_toml(self) -> str:
         """Return the file that keeps it; `load_calibration` reads it."""
         values = self.model_dump()
-        tables = [(name, values.pop(name)) for name in ("numbers", "draws", "evidence")]
+        tables = [(name, values.pop(name)) for name in ("order", "numbers", "draws", "evidence")]
         parts = [_HEAD + toml_table(values)]
         parts += [f"[{name}]\n{toml_table(table)}" for name, table in tables if table]
         return "\n\n".join(parts) + "\n"

@@ -13,7 +13,8 @@ from realitygap.drawing import Ink, themed_color
 from realitygap.lab._calibration_job import CalibrationJob
 from realitygap.lab._gap_plan import PLACING_S
 from realitygap.lab._lab import Lab, Visitor
-from realitygap.platforms import class_of, emulated_robots
+from realitygap.orders import CalibrateOrder
+from realitygap.platforms import emulated_robots
 from realitygap.world import Fitted, load_arena
 
 from ._fields import Form
@@ -33,7 +34,8 @@ _KINDS = {
     "all": ("All", "Motion, sensors, and contact together.", 20, 15),
 }
 """Name, meaning, trials on a Scribbler, and their time [min] of each kind of calibration."""
-_OF_ROBOT = ("platform", "name")
+_FIELDS = {field.name: field for field in CalibrateOrder.fields() if field.face.label}
+_OF_ROBOT = ("robot", "name")
 """Fields of the first step."""
 _STEPS = ("Robot", "What", "Run", "Result")
 _BAR = """
@@ -164,11 +166,10 @@ class _Page:
         form.summary()
         with ui.element("div").classes("lab-form") as self._robot_box:
             section("Robot")
-            form.text(
-                "platform",
-                "Robot",
+            form.text_of(
+                _FIELDS["robot"],
                 "sim",
-                options=["sim", *emulated_robots()],
+                ["sim", *emulated_robots()],
                 is_needed=True,
                 explanation="scribbler:PORT, thymio:PORT, twin:FILE, sim, or sim:FILE. Emulated robots: "
                 f"{', '.join(emulated_robots())}.",
@@ -188,25 +189,9 @@ class _Page:
                 "Simulated robots take less."
             )
             with ui.expansion("Advanced").classes("lab-expansion"):
-                form.choice("observe", "Observation level", ["cells", "encoders", "track"], "cells")
-                form.text(
-                    "base",
-                    "Robot model",
-                    explanation="Robot, or its file, to start the fit from. Default: that of the platform.",
-                )
-                form.number(
-                    "budget",
-                    "Number of trials",
-                    None,
-                    1,
-                    10_000,
-                    explanation="Total number of trials. Default: depends on what you calibrate.",
-                )
-                form.text(
-                    "witness",
-                    "Witness",
-                    explanation="HOST:PORT of the witness of an emulator in another program.",
-                )
+                for key, field in _FIELDS.items():
+                    if key != "robot":
+                        form.field_of(field)
 
         async def start() -> None:
             if not await form.submit(begin, self._lab.calibration_mistakes) and any(
@@ -216,9 +201,7 @@ class _Page:
 
         def begin(values: dict[str, Any]) -> None:
             name = values.pop("name")
-            values["kind"] = self._chosen
-            base = values["base"] or class_of(values["platform"]).base_robot
-            self._lab.calibrate(name, {**values, "base": base}, self._visitor)
+            self._lab.calibrate(name, {**values, "what": self._chosen}, self._visitor)
 
         with self._kind_box, ui.row().classes("lab-row"):
             ui.button("Calibrate", on_click=start).props("unelevated no-caps")
@@ -316,7 +299,8 @@ class _Page:
             ui.button("Resume", on_click=lambda: attempt(lambda: self._resume(job))).props("outline no-caps")
 
     def _resume(self, job: CalibrationJob) -> None:
-        self._lab.calibrate(job.name, job.values, self._visitor)
+        values = job.order.model_dump(exclude={"out"})
+        self._lab.calibrate(job.name, values, self._visitor)
 
     def _show_plot(self) -> None:
         """Show the mean reading of each sensor by distance from the wall, or by trial."""

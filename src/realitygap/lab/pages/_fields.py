@@ -12,6 +12,7 @@ from nicegui import run, ui
 from nicegui.elements.mixins.value_element import ValueElement
 
 from realitygap.lab._problem import FormError, Mistakes
+from realitygap.orders import Limits, OrderField
 from realitygap.settings import shown
 
 from ._notices import WRONG
@@ -97,11 +98,10 @@ class Form:
         key: str,
         label: str,
         value: float | None,
-        low: float,
-        high: float,
+        limits: Limits,
         *,
         explanation: str = "",
-        is_whole: bool = True,
+        placeholder: str = "",
     ) -> ui.number:
         """Add a number; a field without an initial value may be empty.
 
@@ -109,9 +109,9 @@ class Form:
             key: Key of the field.
             label: Label, above the field.
             value: Initial number; None if the field is empty.
-            low, high: Smallest and largest number.
+            limits: Allowed numbers.
             explanation: Explanation, below the field.
-            is_whole: Whether only whole numbers are allowed.
+            placeholder: Text that is shown while the field is empty, such as the default.
         """
 
         def check() -> float | int | None:
@@ -119,19 +119,16 @@ class Form:
             if entered is None or entered == "":
                 if value is None:
                     return None
-                raise ValueError(f"This field is empty. Enter {kind}.")
+                raise ValueError(f"This field is empty. Enter {limits.words}.")
             is_number = isinstance(entered, int | float) and not isinstance(entered, bool)
-            if not is_number or not math.isfinite(entered) or not low <= entered <= high:
+            if not is_number or not math.isfinite(entered) or not limits.allow(entered):
                 got = f"{entered:.10g}" if is_number else shown(entered)
-                raise ValueError(f"Enter {kind}. You entered {got}.")
-            if is_whole and entered != int(entered):
-                raise ValueError(f"Enter {kind}. You entered {entered:.10g}.")
-            return int(entered) if is_whole else float(entered)
+                raise ValueError(f"Enter {limits.words}. You entered {got}.")
+            return int(entered) if limits.is_whole else float(entered)
 
-        kind = f"{'a whole number' if is_whole else 'a number'} from {low:.10g} to {high:.10g}"
         with self._around(label):
-            element = ui.number(value=value)
-            element.props(f'step="{1 if is_whole else "any"}"')
+            element = ui.number(value=value, placeholder=placeholder)
+            element.props(f'step="{1 if limits.is_whole else "any"}"')
             self._add(key, label, element, explanation, check)
         return element
 
@@ -157,6 +154,62 @@ class Form:
             element = ui.select(listed, value=value)
             self._add(key, label, element, explanation, lambda: element.value)
         return element
+
+    # fields of an order
+
+    def field_of(self, field: OrderField) -> None:
+        """Add a field of an order, as its type needs."""
+        if field.kind is bool:
+            self.choice(field.name, field.face.label, {False: "No", True: "Yes"}, field.default, field.help)
+        elif field.choices:
+            options: dict[Any, str] = {choice: choice for choice in field.choices}
+            if field.is_optional:
+                options = {None: f"Default: {field.face.default_is}", **options}
+            self.choice(field.name, field.face.label, options, field.default, field.help)
+        elif field.kind in (int, float):
+            self.number_of(field)
+        else:
+            self.text_of(field)
+
+    def text_of(
+        self,
+        field: OrderField,
+        value: str = "",
+        options: Sequence[str] = (),
+        *,
+        explanation: str = "",
+        is_needed: bool = False,
+    ) -> ui.input:
+        """Add a text of an order.
+
+        Args:
+            field: The field.
+            value: Initial text. Default: that of the field.
+            options: Texts that are proposed.
+            explanation: Explanation, below the field. Default: help of the field.
+            is_needed: Whether the field must not be empty, although the order allows that.
+        """
+        return self.text(
+            field.name,
+            field.face.label,
+            value or field.default or "",
+            explanation=explanation or field.help,
+            options=options,
+            placeholder=field.face.default_is,
+            is_needed=is_needed or not field.is_optional,
+            parse=lambda text: text or None,
+        )
+
+    def number_of(self, field: OrderField) -> ui.number:
+        """Add a number of an order."""
+        return self.number(
+            field.name,
+            field.face.label,
+            field.default,
+            field.limits,
+            explanation=field.help,
+            placeholder=field.face.default_is,
+        )
 
     # mistakes
 

@@ -15,6 +15,7 @@ from realitygap.lab._access import FOREIGN_HEADERS
 from realitygap.lab._gap_job import GapJob
 from realitygap.lab._gap_plan import plan_words
 from realitygap.lab._lab import Lab, Visitor
+from realitygap.orders import GapOrder
 from realitygap.platforms import emulated_robots
 
 from ._fields import Form
@@ -24,6 +25,9 @@ from ._notices import attempt
 from ._part import LOOK_S, Part, watching
 from ._scatter import Scatter
 from ._silence import Silence
+
+_FIELDS = {field.name: field for field in GapOrder.fields() if field.face.label}
+_NUMBERS = ("n_controllers", "trials")
 
 
 def add_gap(lab: Lab) -> None:
@@ -105,56 +109,31 @@ class _Page:
     def _show_form(self) -> None:
         self._form = form = Form()
         form.summary()
-        sim = ["sim", "jyro"]
-        form.text(
-            "sim", "Simulator", self._sim, options=sim, is_needed=True, explanation="sim, sim:FILE, or jyro."
-        )
-        self._target = form.text(
-            "target",
-            "Target",
+        form.text_of(_FIELDS["sim"], self._sim, ["sim", "jyro"])
+        self._target = form.text_of(
+            _FIELDS["target"],
             "jyro",
-            is_needed=True,
             explanation=f"jyro, twin:FILE, or an emulated robot: {', '.join(emulated_robots())}. An emulator in "
             "another program, such as scribbler:socket://HOST:PORT, also needs its witness.",
         )
         with ui.element("div").classes("lab-fields"):
-            self._numbers = {
-                "n_controllers": form.number("n_controllers", "Controllers", 10, 2, 1024),
-                "trials": form.number("trials", "Trials per controller", 10, 1, 4096),
-            }
+            self._numbers = {key: form.number_of(_FIELDS[key]) for key in _NUMBERS}
         with ui.expansion("Advanced").classes("lab-expansion"):
             form.text(
                 "name", "Name", "gap", is_needed=True, explanation="Name of the report and the saved trials."
             )
-            form.text(
-                "controllers",
-                "Controllers from",
-                "random",
-                explanation="random, or a study whose best controllers to use.",
-            )
-            self._margin = form.number(
-                "margin",
-                "Margin of equivalence",
-                None,
-                0.0001,
-                1.0,
-                is_whole=False,
-                explanation="Largest difference in coverage that counts as equivalent.",
-            )
-            form.choice("observe", "Observation level", ["cells", "encoders", "track"], "cells")
-            form.text(
-                "witness",
-                "Witness",
-                explanation="HOST:PORT of the witness of an emulator in another program.",
-            )
+            self._margin = form.number_of(_FIELDS["margin"])
+            for key, field in _FIELDS.items():
+                if key not in ("sim", "target", "margin", *_NUMBERS):
+                    form.field_of(field)
         self._plan = ui.label("").classes("lab-plan").props('role="status"')
         hint(
             "Detectable: 80 of 100 measurements find the difference, if controllers vary as in simulation. The command "
             "realitygap plan also plans correlations."
         )
-        fields: list[ValueElement[Any]] = [*self._numbers.values(), self._target, self._margin]
-        for field in fields:
-            field.on_value_change(self._show_plan)
+        elements: list[ValueElement[Any]] = [*self._numbers.values(), self._target, self._margin]
+        for element in elements:
+            element.on_value_change(self._show_plan)
         self._show_plan()
         self._button = ui.button("Measure the gap", on_click=self._submit).props("unelevated no-caps")
 
@@ -173,19 +152,16 @@ class _Page:
         self._button.enable()
 
     def _measure(self, entered: dict[str, Any]) -> None:
-        values = {key: value for key, value in entered.items() if key != "name" and value not in (None, "")}
-        self._lab.measure_gap(entered["name"], {"controllers": "random", **values}, self._visitor)
+        values = {key: value for key, value in entered.items() if key != "name"}
+        self._lab.measure_gap(entered["name"], values, self._visitor)
 
     def _order(self) -> str:
         """Settings of the gap that is being measured, in one line; empty if none is."""
         job = self._lab.gap
         if job is None or job.is_over:
             return ""
-        values = job.values
-        return (
-            f"{values['sim']} → {values['target']} · {values['n_controllers']:,} controllers · {values['trials']:,} "
-            "trials each"
-        )
+        order = job.order
+        return f"{order.sim} → {order.target} · {order.n_controllers:,} controllers · {order.trials:,} trials each"
 
     def _show_order(self, order: str) -> None:
         """Show the form as one line while a gap is measured."""
@@ -238,7 +214,8 @@ class _Page:
             )
 
     def _resume(self, job: GapJob) -> None:
-        self._lab.measure_gap(job.name, job.values, self._visitor)
+        values = job.order.model_dump(exclude={"results"})
+        self._lab.measure_gap(job.name, values, self._visitor)
 
     def _result(self) -> tuple[GapJob, int] | None:
         job = self._lab.gap

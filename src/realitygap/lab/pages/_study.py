@@ -21,6 +21,7 @@ from realitygap.lab._lab import Lab
 from realitygap.lab._standing import Standing
 from realitygap.lab._study_job import StudyJob
 from realitygap.lab._watcher import Watcher
+from realitygap.orders import Limits
 from realitygap.platforms import emulated_robots
 from realitygap.stats import runs_for_a_claim
 
@@ -303,8 +304,7 @@ class _Page:
                 "replicates",
                 "Runs per condition",
                 2 * now,
-                now + 1,
-                MOST_REPLICATES,
+                Limits(now + 1, MOST_REPLICATES),
                 explanation=f"Each condition has {counted(now, 'run')}. They are kept.",
             )
 
@@ -546,7 +546,7 @@ class _Page:
                 ("generation", "Generation"),
                 ("individual", "Individual"),
             ):
-                form.number(key, label, None, 0, 2**31)
+                form.number(key, label, None, Limits(0, 2**31))
         hint("If you don't choose a run, the run with the median best coverage is shown.")
 
         def chosen(values: dict[str, Any]) -> dict[str, Any]:

@@ -389,7 +389,7 @@ def _fit_of(calibration: str | Path) -> str:
     """
     made = load_calibration(calibration)
     said = made.model_dump(
-        mode="json", exclude={"date", "measured", "arena", "seed", "software", "notes", "robot"}
+        mode="json", exclude={"date", "measured", "arena", "seed", "software", "notes", "order", "robot"}
     )
     said["robot"] = load_robot(made.robot).to_dict()
     load_robot(calibration)  # refuses one that no robot can be

@@ -6,8 +6,6 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-
 DIGITS = 9
 """Maximum number of digits of a number: more than any measurement has, and few enough to parse."""
 
@@ -21,7 +19,7 @@ def toml_value(value: Any) -> str:
     Raises:
         TypeError: TOML has no such value, such as None.
     """
-    if isinstance(value, np.generic | np.ndarray):
+    if hasattr(value, "tolist"):  # of NumPy, whose import takes long
         value = value.tolist()
     if isinstance(value, bool):
         return str(value).lower()

@@ -1,0 +1,61 @@
+"""Commands made from orders."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from typing import Annotated, Any, TypeVar
+
+import typer
+
+from realitygap.orders import Order, OrderError, OrderField
+
+OrderT = TypeVar("OrderT", bound=Order)
+
+
+def command_of(model: type[OrderT]) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Make a command of a function whose first parameter is an order, and whose others are options of the command only.
+
+    The fields of the order are the arguments and the first options of the command. The docstring is that of the order.
+    """
+
+    def decorate(function: Callable[..., None]) -> Callable[..., None]:
+        _, *own = inspect.signature(function, eval_str=True).parameters.values()
+        fields = model.fields()
+
+        def command(**values: Any) -> None:
+            given = {field.name: values.pop(field.name) for field in fields}
+            try:
+                order = model(**given)
+            except OrderError as error:
+                raise OrderError(error.problems, {field.name: field.word for field in fields}) from None
+            function(order, **values)
+
+        parameters = [_parameter(field) for field in fields]
+        parameters += [parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY) for parameter in own]
+        command.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+        command.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
+        command.__doc__ = model.help_text()
+        command.__name__, command.__module__ = function.__name__, function.__module__
+        return command
+
+    return decorate
+
+
+def _parameter(field: OrderField) -> inspect.Parameter:
+    """Return the parameter from which Typer makes an argument or option."""
+    face = field.face
+    help_text = f"{field.help} [default: {face.default_is}]" if face.default_is else field.help
+    if face.is_argument:
+        shown: Any = typer.Argument(metavar=face.metavar, help=help_text)
+    else:
+        shown = typer.Option(
+            *field.options,
+            metavar=face.metavar or None,
+            help=help_text,
+            min=field.limits.low if field.limits.low_is_allowed else None,
+            max=field.limits.high,
+            rich_help_panel=face.panel or None,
+        )
+    parameter = field.parameter
+    return parameter.replace(annotation=Annotated[parameter.annotation, shown])

@@ -1,0 +1,26 @@
+"""Orders: each operation described once, as a model with all its settings.
+
+A command, a function, a form of the lab, the message to a worker, and the record in a result derive from the model.
+"""
+
+from ._calibrate import CalibrateOrder
+from ._field import Limits, OrderField
+from ._function import takes_order
+from ._gap import GapOrder
+from ._order import Order, OrderError
+from ._record import ORDER_FILE, ORDERS, read_order
+from ._transfer import TransferOrder
+
+__all__ = [
+    "ORDERS",
+    "ORDER_FILE",
+    "CalibrateOrder",
+    "GapOrder",
+    "Limits",
+    "Order",
+    "OrderError",
+    "OrderField",
+    "TransferOrder",
+    "read_order",
+    "takes_order",
+]

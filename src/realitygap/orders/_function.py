@@ -1,0 +1,80 @@
+"""The function of an order, which takes the order or its fields."""
+
+from __future__ import annotations
+
+import functools
+import inspect
+import os
+import re
+import textwrap
+from collections.abc import Callable
+from typing import Any, Concatenate, ParamSpec, TypeVar
+
+from ._field import OrderField
+from ._order import Order
+
+OrderT = TypeVar("OrderT", bound=Order)
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+def takes_order(
+    model: type[OrderT],
+) -> Callable[[Callable[Concatenate[OrderT, P], R]], Callable[..., R]]:
+    """Let a function whose first parameter is an order also take the fields of that order.
+
+    Its signature and docstring get those of the fields. If another parameter of the function has the name of a field,
+    it gets the values that are no text: an arena by name belongs to the order, an `Arena` does not.
+    """
+    fields = {field.name: field for field in model.fields()}
+    places = [field.name for field in fields.values() if field.face.is_argument]
+
+    def decorate(function: Callable[Concatenate[OrderT, P], R]) -> Callable[..., R]:
+        _, *others = inspect.signature(function).parameters.values()
+        own = {parameter.name for parameter in others}
+
+        @functools.wraps(function)
+        def call(*args: Any, **values: Any) -> R:
+            if args and isinstance(args[0], model):
+                return function(*args, **values)
+            values |= zip(places, args, strict=False)
+            rest = {
+                name: values.pop(name)
+                for name in own & set(values)
+                if name not in fields or not isinstance(values[name], str | os.PathLike | None)
+            }
+            return function(model(**values), **rest)  # type: ignore[call-arg]
+
+        parameters = [_parameter(field) for field in fields.values()]
+        parameters += [parameter for parameter in others if parameter.name not in fields]
+        call.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+        call.__doc__ = _docstring(model, inspect.cleandoc(function.__doc__ or ""))
+        return call
+
+    return decorate
+
+
+def _parameter(field: OrderField) -> inspect.Parameter:
+    """Return the parameter of a field. Those of arguments of the command are positional."""
+    place = inspect.Parameter.POSITIONAL_OR_KEYWORD
+    return field.parameter.replace(kind=place) if field.face.is_argument else field.parameter
+
+
+def _docstring(model: type[Order], own: str) -> str:
+    """Return the function's docstring with the paragraphs and the fields of the order."""
+    paragraphs = model.help_text().split("\n\n")
+    about = [text for text in paragraphs[1:] if not text.startswith(("Example:", "In Python:"))]
+    arguments = [
+        textwrap.fill(
+            f"{field.name}: {_help(field)}", 116, initial_indent="    ", subsequent_indent="        "
+        )
+        for field in model.fields()
+    ]
+    before, _, after = own.partition("Args:\n")
+    return "\n\n".join([before.strip(), *about, "Args:\n" + "\n".join([*arguments, after])])
+
+
+def _help(field: OrderField) -> str:
+    """Return the help of a field with the names of fields in place of those of options."""
+    default = f" Default: {field.face.default_is}." if field.face.default_is else ""
+    return re.sub(r"--([a-z-]+)", lambda match: f"`{match[1].replace('-', '_')}`", field.help) + default

@@ -1,0 +1,157 @@
+"""The order of a gap."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import ClassVar, Literal
+
+from ._field import argument, option
+from ._order import Order
+
+ONLY_TWINS = "Only for twins"
+ONLY_ROBOTS = "Only for robots"
+MOST_SEED = 2**31
+
+
+class GapOrder(Order):
+    """Measure the gap between a simulator and a target.
+
+    Runs the same controllers on both platforms. Reports level, RMS gap without the noise of trials, ranking, behavior,
+    and equivalence at a margin, with 95 % intervals. If there are too few trials for a measure, the report says how
+    many you need.
+
+    Example: realitygap gap sim jyro --n-controllers 10 --trials 5
+
+    Example: realitygap gap sim twin:worn-1.toml --controllers paper --margin 0.05 --report gap.html
+
+    Example: realitygap gap sim twin:worn-1.toml --controllers avoid
+
+    Example: realitygap gap sim:fit.toml recorded:tracked.jsonl --observe track
+
+    Example: realitygap gap sim:fit.toml twin:worn-1.toml --randomize posterior
+
+    In Python: realitygap.study.gap_between("sim", "jyro", n_controllers=10, trials=5)
+    """
+
+    command: ClassVar[str] = "gap"
+
+    sim: str = argument("SIM", help="Simulator: sim, sim:FILE or jyro.", label="Simulator", refers="platform")
+    target: str = argument(
+        "TARGET",
+        help="Target: twin:FILE, scribbler:PORT, thymio:PORT, enki, recorded:FILE, sim, sim:FILE or jyro.",
+        label="Target",
+        refers="platform",
+    )
+    controllers: str = option(
+        "random",
+        help="random for unrelated networks; or a study or a folder of results, for its champions.",
+        metavar="WHICH",
+        label="Controllers from",
+        refers="file",
+    )
+    n_controllers: int = option(
+        30, help="Number of controllers.", at_least=2, at_most=1024, label="Controllers"
+    )
+    task: str | None = option(
+        None,
+        help="Task that scores trials: coverage, avoid, light, wall, goal or python:FILE.py:function.",
+        default_is="the task of the controllers; coverage for random ones",
+        metavar="KIND",
+        label="Task",
+        refers="file",
+    )
+    trials: int = option(
+        10,
+        help="Trials per controller and platform.",
+        at_least=1,
+        at_most=4096,
+        label="Trials per controller",
+    )
+    margin: float | None = option(
+        None,
+        help="Largest difference in score that counts as equivalent, such as 0.05.",
+        above=0,
+        metavar="M",
+        label="Margin of equivalence",
+    )
+    observe: Literal["readings", "cells", "encoders", "track"] | None = option(
+        None,
+        help="Data recorded on the target. track also measures replays.",
+        default_is="what the task needs",
+        label="Observation level",
+    )
+    arena: str | None = option(
+        None,
+        help="Arena by name or file.",
+        default_is="that of the controllers",
+        metavar="NAME",
+        label="Arena",
+        refers="file",
+    )
+    noise: float | None = option(
+        None,
+        help="Noise level a of the paper, on simulators.",
+        default_is="0.1 on jyro, 0 on others",
+        at_least=0,
+        at_most=10,
+        label="Noise",
+    )
+    randomize: Literal["no", "posterior"] = option(
+        "no",
+        help="posterior: sample the robot of each trial from the calibration SIM. no: use its estimate.",
+        label="Randomize",
+    )
+    reevolved: str | None = option(
+        None,
+        help="Study or folder of champions evolved on the target. Adds the re-evolved gap, which is the paper's.",
+        metavar="WHICH",
+        label="Re-evolved controllers from",
+        refers="file",
+    )
+    why: bool = option(
+        False,
+        help="Report how much of the gap each part of the model explains. SIM must be a calibration.",
+        label="Explain the gap",
+    )
+    results: Path | None = option(
+        None,
+        help="File to save the target's trials in (.jsonl). Run the command again to resume.",
+        metavar="FILE",
+        names=("-o", "--out"),
+        is_output=True,
+    )
+    processes: int | None = option(
+        None,
+        help="Number of twin trials to run in parallel.",
+        default_is="all processors",
+        at_least=1,
+        panel=ONLY_TWINS,
+    )
+    witness: str | None = option(
+        None,
+        help="Witness of an emulated robot in another program.",
+        metavar="HOST:PORT",
+        panel=ONLY_ROBOTS,
+        label="Witness",
+    )
+    seed: int = option(1, help="Seed of all random numbers.", at_least=0, at_most=MOST_SEED, label="Seed")
+
+    def conflicts(self) -> Iterator[tuple[str, str]]:
+        """Yield the field and the message for each setting that others exclude."""
+        if self.why and self.noise:
+            yield (
+                "why",
+                f"--why switches parts of the model in without the paper's noise, and --noise is {self.noise:g}. Leave "
+                "one out.",
+            )
+        elif self.why and self.trials < 2:
+            yield (
+                "why",
+                "--why needs at least 2 trials of each controller, to separate the gap from noise.",
+            )
+
+    @property
+    def n_trials(self) -> int:
+        """Number of trials on each platform."""
+        return self.n_controllers * self.trials

@@ -15,6 +15,8 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+from .browsers import Visitors, open_browser
+
 # A busy machine is no fault of what is tested.
 settings.register_profile("patient", deadline=None)
 settings.load_profile("patient")
@@ -105,6 +107,13 @@ def _no_twin_is_left_open() -> Iterator[None]:
         sys.modules["realitygap.platforms"].close_twins()
         gc.collect()
         assert not twin_processes()
+
+
+@pytest.fixture(scope="module")
+def visitors() -> Iterator[Visitors]:
+    """A browser, and pages in it; only while its module runs, as others run event loops in this thread."""
+    with open_browser() as browser:
+        yield Visitors(browser)
 
 
 @pytest.fixture

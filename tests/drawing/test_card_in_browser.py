@@ -3,7 +3,6 @@
 import pytest
 
 from realitygap.drawing import Card, Table
-from tests.playback.test_player_in_browser import browser, pytestmark  # noqa: F401
 
 JUPYTERLAB = """
 .jp-RenderedHTMLCommon table { font-size: 8px; }
@@ -26,9 +25,9 @@ THEMES = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("system", "body", "is_dark"), THEMES.values(), ids=THEMES)
-def test_a_card_follows_the_theme_and_can_be_read_in_a_notebook(browser, system, body, is_dark):  # noqa: F811
+def test_a_card_follows_the_theme_and_can_be_read_in_a_notebook(visitors, system, body, is_dark):
     card = Card("title", ["SIM"], "lead", "warning", [Table(["a", "b"], [["1", "2"], ["3", "4"]])], ["code"])
-    page = browser.new_page(color_scheme=system)
+    page = visitors.browser.new_page(color_scheme=system)
     page.set_content(
         f"<style>{JUPYTERLAB}</style><body {body}><div class='jp-RenderedHTMLCommon'>{card.to_html()}</div></body>"
     )

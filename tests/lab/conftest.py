@@ -7,10 +7,9 @@ from __future__ import annotations
 
 import contextlib
 import os
-import shutil
 import signal
 import socket
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any
@@ -19,6 +18,7 @@ from urllib.request import Request, urlopen
 import pytest
 
 from realitygap.lab import _child
+from tests.browsers import Visitors, open_browser
 
 from .forked_children import FOR_CHILDREN, Forking
 from .served import LOG, begin
@@ -27,25 +27,9 @@ playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright
 expect = playwright.expect
 """Waits for what it expects: a page on a busy machine shows it later."""
 
-CHROMIUM = next(
-    filter(
-        None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable"))
-    ),
-    None,
-)
-ARGUMENTS = [
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-]
 DESKTOP, PHONE = (1440, 900), (390, 844)
 PATIENCE_MS = 120_000
 expect.set_options(timeout=PATIENCE_MS)
-STORED = "local_storage,indexeddb,cache_storage,service_workers"
 OUTAGE = ("net::ERR", "Failed to fetch", "WebSocket connection", "reloading because", "status of 403")
 """What a browser says of a page whose lab is gone, or was started again with another token."""
 
@@ -185,103 +169,26 @@ def forked_children(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture(scope="package")
-def browser() -> Iterator[Any]:
-    if CHROMIUM is None:
-        pytest.skip("needs Chromium or Chrome on the PATH")
-    with playwright.sync_playwright() as driver:
-        browser = driver.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
-        yield browser
-        browser.close()
-
-
-class Visitors:
-    """Contexts of a browser, each like a browser of its own, which later tests use again once they are empty.
-
-    A page in a new context compiles the scripts of the lab again, for most of a second of a processor. The empty first
-    page of each context keeps the process that has compiled them.
-    """
-
-    def __init__(self, browser: Any) -> None:
-        self._browser = browser
-        self._free: dict[str, list[Any]] = {}
-        self._used: list[tuple[str, Any]] = []
-        self._closed: list[Any] = []
-
-    def context(self, **options: Any) -> Any:
-        """A context without cookies, storage, or pages but the empty one."""
-        kind = repr(sorted(options.items()))
-        free = self._free.setdefault(kind, [])
-        if free:
-            context = free.pop()
-        else:
-            context = self._browser.new_context(**options)
-            context.on("close", lambda closed: self._closed.append(closed))
-            context.new_page()
-        self._used.append((kind, context))
-        return context
-
-    def leave(self, address: str) -> None:
-        """Empty all contexts that are used, and offer them again; a lab's address is where their storage is."""
-        used, self._used = self._used, []
-        for kind, context in used:
-            if context in self._closed:
-                continue
-            empty, *pages = context.pages
-            for page in pages:
-                page.close()
-            session = context.new_cdp_session(empty)
-            session.send(
-                "Storage.clearDataForOrigin", {"origin": address.rstrip("/"), "storageTypes": STORED}
-            )
-            session.detach()
-            context.clear_cookies()
-            context.clear_permissions()
-            context.set_offline(False)
-            self._free[kind].append(context)
-
-
-@pytest.fixture(scope="package")
-def visitors(browser: Any) -> Visitors:
-    return Visitors(browser)
+def visitors() -> Iterator[Visitors]:
+    """A browser for all tests of the lab, and pages in it."""
+    with open_browser() as browser:
+        yield Visitors(browser)
 
 
 @pytest.fixture
 def visit(visitors: Visitors, lab: RunningLab) -> Iterator[Callable[..., Any]]:
     """Opens a page of the lab, in a browser of its own: visit("new")."""
-    complaints: list[str] = []
-    contexts = []
 
-    def open_page(
-        path: str = "", size: tuple[int, int] = DESKTOP, forgive: Sequence[str] = (), **options: Any
-    ) -> Any:
-        context = visitors.context(viewport={"width": size[0], "height": size[1]}, **options)
-        context.add_cookies([lab.cookie])
-        contexts.append(context)
-        page = context.new_page()
-        page.set_default_timeout(PATIENCE_MS)
-
-        def complain(text: str) -> None:
-            if not any(each in text for each in forgive):
-                complaints.append(text)
-
-        page.on("console", lambda message: complain(f"{message.type}: {message.text}"))
-        page.on("pageerror", lambda error: complain(str(error)))
-        context.on("request", check_request)
+    def open_page(path: str = "", size: tuple[int, int] = DESKTOP, **options: Any) -> Any:
+        allowed = (lab.address, lab.address.replace("http", "ws"), "data:", "blob:")
+        page = visitors.open_page(size, allowed, PATIENCE_MS, cookies=[lab.cookie], **options)
         page.goto(lab.address + path)
         # Before its handshake with the server a page may swap two events that are 10 ms apart.
         page.wait_for_function("() => window.did_handshake !== false")
         return page
 
-    def check_request(request: Any) -> None:
-        url = request.url
-        if not url.startswith((lab.address, lab.address.replace("http", "ws"), "data:", "blob:")):
-            complaints.append(f"request to {url}")
-
     yield open_page
-    for context in contexts:
-        context.remove_listener("request", check_request)
-    visitors.leave(lab.address)
-    assert complaints == []
+    visitors.leave(lab.address.rstrip("/"))
 
 
 def open_advanced(page, field) -> None:

@@ -10,6 +10,8 @@ from typing import Any
 
 import pytest
 
+from tests.browsers import Visitors
+
 from .conftest import OUTAGE, PATIENCE_MS
 
 LOADED = "new"
@@ -17,9 +19,9 @@ LOADED = "new"
 
 
 @pytest.fixture
-def newcomer(browser: Any) -> Iterator[Any]:
+def newcomer(visitors: Visitors) -> Iterator[Any]:
     """A page of a browser that has never seen the lab."""
-    context = browser.new_context()
+    context = visitors.browser.new_context()
     page = context.new_page()
     page.set_default_timeout(PATIENCE_MS)
     yield page

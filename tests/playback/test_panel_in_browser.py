@@ -14,12 +14,13 @@ from realitygap.playback import DrivePanel, WorldPanel
 from realitygap.playback import _panel as panels
 from realitygap.robots.jyro import Camera, JyroWorld, Pioneer
 from realitygap.world import paper_arena
+from tests.browsers import LOCAL
 
 from .page import PANEL, page_of
 from .test_panel import Driven
-from .test_player_in_browser import PATIENCE_MS, browser, pytestmark  # noqa: F401
+from .test_player_in_browser import PATIENCE_MS
 
-pytestmark = [pytestmark, pytest.mark.slow]
+pytestmark = pytest.mark.slow
 
 PAD = {
     "axes": [0, 0], "buttons": [{"pressed": False}], "connected": True, "id": "Test pad", "index": 0, "mapping": "",
@@ -27,17 +28,9 @@ PAD = {
 
 
 @pytest.fixture
-def show(browser, tmp_path):  # noqa: F811
-    complaints: list[str] = []
-    contexts = []
-
+def show(visitors, tmp_path):
     def open_page(panel: Any, *, answers: bool = True, **options: Any) -> Any:
-        context = browser.new_context(viewport={"width": 900, "height": 800}, **options)
-        contexts.append(context)
-        page = context.new_page()
-        page.set_default_timeout(PATIENCE_MS)
-        page.on("console", lambda message: complaints.append(f"{message.type}: {message.text}"))
-        page.on("pageerror", lambda error: complaints.append(str(error)))
+        page = visitors.open_page((900, 800), LOCAL, PATIENCE_MS, **options)
 
         def kernel(message):
             replies = []
@@ -55,9 +48,7 @@ def show(browser, tmp_path):  # noqa: F811
         return page
 
     yield open_page
-    for context in contexts:
-        context.close()
-    assert complaints == []
+    visitors.leave("file://")
 
 
 @pytest.fixture

@@ -5,7 +5,6 @@ Every test also fails on any message of the console and on any request but for t
 
 from __future__ import annotations
 
-import shutil
 import time
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -13,57 +12,24 @@ from typing import Any
 import pytest
 
 from realitygap.playback import play
+from tests.browsers import LOCAL
 
 from .page import page_of
 from .trials import straight, turning
 
-playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright: uv sync --extra dev")
-
-CHROMIUM = next(
-    filter(
-        None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable"))
-    ),
-    None,
-)
 PATIENCE_MS = 60_000
 """Time after which a page that does not get on counts as hung; a machine with other work is slow."""
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium or Chrome on the PATH")
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with playwright.sync_playwright() as driver:
-        browser = driver.chromium.launch(
-            executable_path=CHROMIUM, args=["--no-sandbox", "--disable-gpu", "--no-first-run"]
-        )
-        yield browser
-        browser.close()
 
 
 @pytest.fixture
-def show(browser, tmp_path) -> Iterator[Callable[..., Any]]:
-    contexts, complaints = [], []
-
+def show(visitors, tmp_path) -> Iterator[Callable[..., Any]]:
     def open_page(widget: Any, **options: Any) -> Any:
-        context = browser.new_context(viewport={"width": 900, "height": 800}, **options)
-        contexts.append(context)
-        page = context.new_page()
-        page.set_default_timeout(PATIENCE_MS)
-        page.on("console", lambda message: complaints.append(f"{message.type}: {message.text}"))
-        page.on("pageerror", lambda error: complaints.append(str(error)))
-        context.on(
-            "request",
-            lambda request: (
-                None if request.url.startswith(("file:", "data:")) else complaints.append(request.url)
-            ),
-        )
+        page = visitors.open_page((900, 800), LOCAL, PATIENCE_MS, **options)
         page.goto(page_of(widget, tmp_path / "page.html").as_uri())
         return page
 
     yield open_page
-    for context in contexts:
-        context.close()
-    assert complaints == []
+    visitors.leave("file://")
 
 
 def clock(page) -> str:

@@ -12,9 +12,9 @@ import pytest
 from realitygap.report import compare_choices, write_closing_page, write_report
 from realitygap.report._tally import read_tally
 from tests.report.results import describe, random_runs, write_results
-from tests.report.test_in_browser import DESKTOP, PHONE, browser, page_file, pytestmark, show  # noqa: F401
+from tests.report.test_in_browser import DESKTOP, PHONE, page_file, show  # noqa: F401
 
-pytestmark = [pytestmark, pytest.mark.slow]
+pytestmark = pytest.mark.slow
 
 WHERE = """([anchor, wide, name, label]) => {
   const { frames, panels } = JSON.parse(document.getElementById('marks').textContent)[anchor];

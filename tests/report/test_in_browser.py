@@ -6,7 +6,6 @@ Every test also fails on any message of the console and on any request but for t
 from __future__ import annotations
 
 import re
-import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -22,40 +21,16 @@ from realitygap.report._tally import read_tally, settings_of
 from realitygap.runs import Condition, replay
 from realitygap.study import parse_study, run_study
 from realitygap.trials import Trajectory
+from tests.browsers import LOCAL
 
-playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright: uv sync --extra dev")
-
-CHROMIUM = next(
-    filter(
-        None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable"))
-    ),
-    None,
-)
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium or Chrome on the PATH")
-
-ARGUMENTS = [
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-]
+PATIENCE_MS = 60_000
+"""Other tests may have the processors."""
 DESKTOP, PHONE = (1280, 900), (390, 844)
 EVIL = "</script><img src=x onerror=alert(1)>\"'&,/@%"
 
 NUMBERS = "() => [...document.querySelectorAll('#replay-rows tr')].map(" + (
     "row => [...row.querySelectorAll('td')].map(cell => cell.textContent))"
 )
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with playwright.sync_playwright() as driver:
-        browser = driver.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
-        yield browser
-        browser.close()
 
 
 @pytest.fixture(scope="module")
@@ -66,30 +41,17 @@ def page_file(tiny_html, tmp_path_factory) -> Path:
 
 
 @pytest.fixture
-def show(browser, page_file) -> Iterator[Callable[..., Any]]:
+def show(visitors, page_file) -> Iterator[Callable[..., Any]]:
     """Shows the page, in a window of its own."""
-    contexts, complaints = [], []
 
     def open_page(fragment: str = "", size=DESKTOP, file: Path | None = None, **options: Any) -> Any:
-        context = browser.new_context(viewport={"width": size[0], "height": size[1]}, **options)
-        contexts.append(context)
-        page = context.new_page()
-        page.set_default_timeout(60_000)  # other tests may have the processors
-        page.on("console", lambda message: complaints.append(f"{message.type}: {message.text}"))
-        page.on("pageerror", lambda error: complaints.append(str(error)))
-        page.on("dialog", lambda dialog: (complaints.append(dialog.message), dialog.dismiss()))
-        context.on("request", lambda request: check_request(request.url))
+        page = visitors.open_page(size, LOCAL, PATIENCE_MS, **options)
+        page.on("dialog", lambda dialog: (visitors.complaints.append(dialog.message), dialog.dismiss()))
         page.goto((file or page_file).as_uri() + fragment)
         return page
 
-    def check_request(url: str) -> None:
-        if not url.startswith(("file:", "data:")):
-            complaints.append(f"request: {url}")
-
     yield open_page
-    for context in contexts:
-        context.close()
-    assert complaints == []
+    visitors.leave("file://")
 
 
 @pytest.fixture(scope="module")

@@ -21,8 +21,8 @@ from contextlib import contextmanager
 from typing import Any
 
 import realitygap.emulator  # noqa: F401  # its ports are known from then on
-from realitygap.robots.scribbler import Scribbler
-from realitygap.robots.scribbler.opcodes import FLUKE_2_COMMANDS, ROBOT_ANSWERS, S2_ANSWERS, Op
+from realitygap.families.scribbler import Scribbler
+from realitygap.families.scribbler.opcodes import FLUKE_2_COMMANDS, ROBOT_ANSWERS, S2_ANSWERS, Op
 
 SETUPS = (("s1", "none"), ("s2", "none"), ("s1", "1"), ("s2", "1"), ("s2", "2"))
 LOOPS = 200

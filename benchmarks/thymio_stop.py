@@ -19,13 +19,13 @@ from collections.abc import Callable
 
 import numpy as np
 
-from realitygap.emulator import Playground
+from realitygap.families.thymio import Playground
 from realitygap.world import Pose
 
 DRIVER = """
 import sys
 from realitygap.robots import Command
-from realitygap.robots.thymio import Thymio
+from realitygap.families.thymio import Thymio
 with Thymio(sys.argv[1], step_s=0.1) as robot:
     print("driving", flush=True)
     while True:

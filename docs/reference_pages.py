@@ -25,14 +25,7 @@ from realitygap import myro
 from realitygap.cli import app
 from realitygap.evolution import DISTANCES, NAMED_SETTINGS, NeatSettings, NoveltySettings
 from realitygap.myro._catalog import DONE, LEFT_OUT
-from realitygap.platforms import (
-    EnkiPlatform,
-    JyroPlatform,
-    ScribblerPlatform,
-    SimPlatform,
-    ThymioPlatform,
-    TwinPlatform,
-)
+from realitygap.platforms import built_in_platforms
 from realitygap.records import column_table, derived_table, ledger_tables
 from realitygap.runs import Condition
 from realitygap.settings import is_hidden
@@ -68,12 +61,7 @@ TABLES: dict[str, type[BaseModel]] = {
     "[controller]": ControllerSettings,
     "[neat]": NeatSettings,
     "[novelty]": NoveltySettings,
-    "[platform.jyro]": JyroPlatform,
-    "[platform.sim]": SimPlatform,
-    "[platform.twin]": TwinPlatform,
-    "[platform.scribbler]": ScribblerPlatform,
-    "[platform.thymio]": ThymioPlatform,
-    "[platform.enki]": EnkiPlatform,
+    **{f"[platform.{model.name}]": model for model in built_in_platforms() if model.is_for_studies},
     "[trials]": TrialsSection,
     "[report]": ReportSection,
     "[[condition]]": Condition,

@@ -247,13 +247,13 @@ def _valid_description() -> bytes:
 
 
 def _memory(path: Path) -> Any:
-    from realitygap.emulator._memory import Memory
+    from realitygap.families.scribbler.emulator._memory import Memory
 
     return Memory("s2", path)
 
 
 def _valid_memory() -> bytes:
-    from realitygap.emulator._memory import Memory
+    from realitygap.families.scribbler.emulator._memory import Memory
 
     return _written("memory.json", lambda path: Memory("s2", path))
 

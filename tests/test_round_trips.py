@@ -17,8 +17,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
-from realitygap.emulator._memory import Memory
 from realitygap.evolution import Genome, NeatSettings, Population
+from realitygap.families.scribbler.emulator._memory import Memory
 from realitygap.logs import (
     Commands,
     LogMap,

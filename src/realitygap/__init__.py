@@ -74,6 +74,7 @@ _PACKAGES = {
     "emulator",
     "errors",
     "evolution",
+    "families",
     "gap",
     "gym",
     "lab",

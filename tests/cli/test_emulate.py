@@ -147,7 +147,6 @@ def test_in_a_terminal_there_is_a_live_view():
 @pytest.mark.parametrize(
     ("options", "says"),
     [
-        (["robbie"], "Unknown robot 'robbie'"),
         (["scribbler", "--model", "s9"], "s1 or s2"),
         (["scribbler", "--fluke", "3"], "none, 1, 2"),
         (["scribbler", "--arena", "nowhere.toml"], "There is no arena file nowhere.toml."),

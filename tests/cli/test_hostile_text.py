@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 from realitygap.cli import app
 from realitygap.cli._progress import RunsBar, TrialsBar
-from realitygap.emulator import _memory
+from realitygap.families.scribbler.emulator import _memory
 from realitygap.lab._server import _clean_pages
 from realitygap.lab._studies import Studies
 from realitygap.records import LEDGER_NAME, ResultsFolder

@@ -383,7 +383,7 @@ def test_despite_preflight_drives_an_emulated_robot_with_a_weak_battery(tmp_path
             main()
         return ended.value.code, capsys.readouterr().err
 
-    monkeypatch.setattr("realitygap.robots.scribbler.Scribbler.least_battery_v", 20.0)
+    monkeypatch.setattr("realitygap.families.scribbler.Scribbler.least_battery_v", 20.0)
     code, said = run()
     assert code
     assert re.search(

@@ -45,7 +45,8 @@ PRINTED_BY = {
     "cli/_demo.py": ("demo",),
     "cli/_operator.py": ("drive",),
     "cli/_telling.py": ("drive",),
-    "emulator/_serve.py": ("emulate",),
+    "emulator/_serve.py": ("emulate scribbler",),
+    "emulator/command.py": ("emulate scribbler",),
     "gap/_measure.py": ("gap",),
     "lab/_server.py": ("lab",),
     "logs/_log_map.py": ("calibrate", "import"),
@@ -99,7 +100,12 @@ PRINTED_BY = {
     "world/_calibration.py": ("calibrate",),
 }
 """Commands that print the messages of a module. A message of others names the command: `realitygap run --fresh`."""
-OTHER_PROGRAMS = ("_how_to_run.py", "emulator/thymio/_playground.py", "myro/__main__.py", "cli/_commands.py")
+OTHER_PROGRAMS = (
+    "_how_to_run.py",
+    "families/thymio/playground/_playground.py",
+    "myro/__main__.py",
+    "cli/_commands.py",
+)
 """Modules with the options of other programs, and of the list of commands."""
 OPTION = re.compile(r"(?<![\w-])(?<!dask worker )--(?!show-completion)[a-z][a-z-]*[a-z]")
 PART = re.compile(r"\s*(--[a-z-]+[ =]?(\{\})?\s*)+")
@@ -141,7 +147,9 @@ def test_options_that_messages_name_are_options_of_the_command_that_prints_them(
         known[("calibrate",)] | known[("gap",)] | known[("transfer",)]
     )  # it passes options on
     for module, names in PRINTED_BY.items():
-        printed_by.setdefault(module, set()).update((name,) for name in names)
+        printed_by.setdefault(module, set()).update(tuple(name.split()) for name in names)
+    robots = [options for words, options in known.items() if words[0] == "emulate"]
+    known["emulate",] = set.intersection(*robots)  # those of every robot
     wrong, seen = [], 0
     for path in sorted(SOURCES.rglob("*.py")):
         module = path.relative_to(SOURCES).as_posix()

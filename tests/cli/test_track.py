@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from realitygap.cli import main
-from realitygap.emulator import why_not
 from realitygap.errors import VisionError
+from realitygap.families.thymio.playground._playground import why_not
 from realitygap.records import (
     LEDGER_NAME,
     PATH_PARTS,

@@ -2,7 +2,7 @@
 
 import pytest
 
-from realitygap.robots.scribbler.opcodes import (
+from realitygap.families.scribbler.opcodes import (
     FLUKE_2_COMMANDS,
     FLUKE_COMMANDS,
     ROBOT_ANSWERS,

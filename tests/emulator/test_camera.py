@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from realitygap.emulator import Emulator, Scene
+from realitygap.families.scribbler.emulator import Emulator, Scene
 from realitygap.world import Floor, Pose, paper_arena
 
 from .wire import make, say

@@ -2,8 +2,8 @@
 
 import pytest
 
-from realitygap.emulator import Emulator, Faults
 from realitygap.errors import RobotError
+from realitygap.families.scribbler.emulator import Emulator, Faults
 
 from .wire import packet, say
 

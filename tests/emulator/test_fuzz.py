@@ -5,7 +5,7 @@ import traceback
 
 import pytest
 
-from realitygap.emulator import Emulator, Faults
+from realitygap.families.scribbler.emulator import Emulator, Faults
 
 from .wire import SET_UPS, packet, say
 
@@ -133,7 +133,7 @@ def test_bytes_that_come_too_fast_are_bounded():
 
 def test_the_path_is_bounded():
     robot = Emulator("s2", "none", timing=False)
-    import realitygap.emulator._table as table
+    import realitygap.families.scribbler.emulator._table as table
 
     before = table.MOST_POINTS
     table.MOST_POINTS = 1000

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from realitygap.emulator import Emulator
+from realitygap.families.scribbler.emulator import Emulator
 from realitygap.world import Arena, Grid, Pose
 
 from .wire import OPEN_FIELD, ask, long, make, packet, say, signed, word

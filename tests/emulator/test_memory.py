@@ -2,8 +2,8 @@
 
 import pytest
 
-from realitygap.emulator import Emulator
 from realitygap.errors import RobotError
+from realitygap.families.scribbler.emulator import Emulator
 
 from .wire import ask, packet, say
 

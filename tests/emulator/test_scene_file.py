@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from realitygap.emulator import Emulator, open_scene
-from realitygap.emulator._view import picture
-from realitygap.emulator._walls import Walls
 from realitygap.errors import RobotError
+from realitygap.families.scribbler.emulator import Emulator, open_scene
+from realitygap.families.scribbler.emulator._view import picture
+from realitygap.families.scribbler.emulator._walls import Walls
 
 from .wire import ask
 

@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 import serial
 
-from realitygap.emulator import Emulator, Faults, Server, connect_witness, serve_pty, serve_tcp
+from realitygap.emulator import Server, connect_witness, serve_pty, serve_tcp
 from realitygap.emulator._serve import PtyChannel
 from realitygap.errors import RobotError
+from realitygap.families.scribbler.emulator import Emulator, Faults
 from realitygap.world import Pose
 
 from .wire import packet
@@ -212,9 +213,8 @@ def test_tones_take_their_time_over_the_wire():
 
 def test_the_watch_function_is_called_repeatedly():
     seen = []
-    server = Server(
-        robot(), PtyChannel(), watch=lambda emulator: seen.append(emulator.now), watch_s=0.01
-    ).start()
+    watched = robot()
+    server = Server(watched, PtyChannel(), watch=lambda: seen.append(watched.now), watch_s=0.01).start()
     until = time.monotonic() + 60
     while len(seen) <= 3 and time.monotonic() < until:
         time.sleep(0.01)

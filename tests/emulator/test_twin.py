@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from realitygap.emulator import Emulator, RobotOfItsOwn
 from realitygap.errors import RobotError
+from realitygap.families.scribbler import Scribbler
+from realitygap.families.scribbler.emulator import Emulator, RobotOfItsOwn
 from realitygap.robots import Command
-from realitygap.robots.scribbler import Scribbler
 from realitygap.robots.twin import TwinBody, TwinModel, TwinRobot, sample_twin
 from realitygap.robots.twin._shape import STEP_S
 from realitygap.world import Pose, paper_arena

@@ -1,6 +1,6 @@
 """What the tests of the emulator share: packets, and a conversation without real time."""
 
-from realitygap.emulator import Emulator
+from realitygap.families.scribbler.emulator import Emulator
 from realitygap.world import Arena, Grid, Pose
 
 SET_UPS = [(model, fluke) for model in ("s1", "s2") for fluke in ("none", "1", "2")]

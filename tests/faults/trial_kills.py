@@ -17,7 +17,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from realitygap.emulator import Emulator, Server, serve_pty
+from realitygap.emulator import Server, serve_pty
+from realitygap.families.scribbler.emulator import Emulator
 from realitygap.records import NO_LINE, ObservationsFile, TrialRecord, read_observations
 from realitygap.study import (
     calibrate,

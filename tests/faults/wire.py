@@ -14,11 +14,11 @@ from typing import Any
 import serial
 
 import realitygap.emulator  # noqa: F401  # its ports are known from then on
-from realitygap.emulator._faults import Faults, FaultyLink
 from realitygap.emulator._time import nanoseconds
 from realitygap.errors import RobotError
+from realitygap.families.scribbler import Scribbler
+from realitygap.families.scribbler.emulator._faults import Faults, FaultyLink
 from realitygap.robots import Command
-from realitygap.robots.scribbler import Scribbler
 
 SETUPS = ("s1?fluke=1", "s2?fluke=none", "s2?fluke=1", "s2?fluke=2")
 KINDS = ("drop", "double", "add", "change", "delay", "break")

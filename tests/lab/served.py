@@ -23,7 +23,7 @@ import realitygap.lab.pages  # noqa: F401
 from realitygap.lab import _child, open_lab
 from realitygap.lab._counts import Counts
 from realitygap.lab.pages import _robot
-from realitygap.robots.scribbler import PortGuess
+from realitygap.robots import PortGuess
 from tests.forks import fork_context
 
 from .forked_children import FOR_CHILDREN, Forking

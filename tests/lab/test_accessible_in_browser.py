@@ -6,7 +6,8 @@ import re
 
 import pytest
 
-from realitygap.emulator import Emulator, serve_tcp
+from realitygap.emulator import serve_tcp
+from realitygap.families.scribbler.emulator import Emulator
 from realitygap.study import parse_study, run_study
 
 from .conftest import open_advanced, open_fold

@@ -6,7 +6,8 @@ import re
 
 import pytest
 
-from realitygap.emulator import Emulator, serve_tcp
+from realitygap.emulator import serve_tcp
+from realitygap.families.scribbler.emulator import Emulator
 from realitygap.lab.pages._calibrate import _KINDS, PLACING_S
 from realitygap.platforms import class_of
 from realitygap.records import read_observations

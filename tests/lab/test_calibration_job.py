@@ -7,7 +7,8 @@ from typing import Any
 
 import pytest
 
-from realitygap.emulator import Emulator, serve_tcp
+from realitygap.emulator import serve_tcp
+from realitygap.families.scribbler.emulator import Emulator
 from realitygap.lab._calibration_job import CalibrationJob
 from realitygap.orders import CalibrateOrder
 from realitygap.records import read_observations

@@ -10,7 +10,9 @@ from collections.abc import Callable
 
 import pytest
 
-from realitygap.emulator import Emulator, serve_pty, serve_tcp, why_not
+from realitygap.emulator import serve_pty, serve_tcp
+from realitygap.families.scribbler.emulator import Emulator
+from realitygap.families.thymio.playground._playground import why_not
 
 from .conftest import NEW_PYTHONS, PHONE, expect, playwright
 from .page_checks import wrong_bars

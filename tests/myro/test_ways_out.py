@@ -9,7 +9,8 @@ import time
 import pytest
 
 from realitygap import myro
-from realitygap.emulator import Emulator, serve_pty, serve_tcp
+from realitygap.emulator import serve_pty, serve_tcp
+from realitygap.families.scribbler.emulator import Emulator
 
 pytestmark = pytest.mark.slow
 

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 
 from realitygap.errors import ControllerError, StudyError
 from realitygap.evolution import ControllerInterface, Genome, inputs_of_robot
+from realitygap.families.scribbler import Scribbler, ScribblerPlatform
 from realitygap.platforms import (
     JyroPlatform,
-    ScribblerPlatform,
     SimEnsemble,
     SimPlatform,
     TwinPlatform,
@@ -27,7 +27,6 @@ from realitygap.platforms._stepwise import trial_of
 from realitygap.platforms.sim._robot import SimRobot
 from realitygap.playback import WatchedRobot
 from realitygap.robots import Command, RecordedRobot, channels_of, read_recording
-from realitygap.robots.scribbler import Scribbler
 from realitygap.robots.twin import load_twin, sample_twin
 from realitygap.study import drive_study, gap_between, load_study, parse_study, run_study, transfer
 from realitygap.trials import NoiseKey, TrialPlan, drive_trial

@@ -11,16 +11,14 @@ import numpy as np
 import pytest
 
 from realitygap.errors import RobotError
+from realitygap.families.thymio import EnkiPlatform, build_enki, harness_path
+from realitygap.families.thymio.enki import _build
+from realitygap.families.thymio.enki._harness import Harness, arena_lines
 from realitygap.platforms import (
-    EnkiPlatform,
     SimPlatform,
-    build_enki,
-    harness_path,
     open_target,
     platform_class,
 )
-from realitygap.platforms.enki import _build
-from realitygap.platforms.enki._harness import Harness, arena_lines
 from realitygap.robots import Command
 from realitygap.testing import check_platform
 from realitygap.trials import TrialPlan

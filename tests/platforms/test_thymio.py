@@ -13,13 +13,14 @@ import numpy as np
 import pytest
 
 import realitygap.gym  # noqa: F401  # registers the tasks
-from realitygap.emulator import Playground, connect_witness, why_not
-from realitygap.emulator.thymio import _playground
+from realitygap.emulator import connect_witness
 from realitygap.errors import RobotError, StudyError
-from realitygap.platforms import SimPlatform, ThymioPlatform, open_target, platform_of
+from realitygap.families.thymio import Playground, Thymio, ThymioPlatform
+from realitygap.families.thymio.playground import _playground
+from realitygap.families.thymio.playground._playground import why_not
+from realitygap.platforms import SimPlatform, open_target, platform_of
 from realitygap.records import Ledger
 from realitygap.robots import open_on
-from realitygap.robots.thymio import Thymio
 from realitygap.study import calibrate, connect_robot, drive_study, load_study
 from realitygap.trials import TrialPlan
 from realitygap.world import Arena, Obstacle, Pose, paper_arena

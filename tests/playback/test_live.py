@@ -8,10 +8,10 @@ import pytest
 import realitygap.emulator  # noqa: F401 - makes its ports known
 from realitygap import Condition
 from realitygap.errors import RealityGapError
+from realitygap.families.scribbler import Scribbler
 from realitygap.platforms import JyroRobot
 from realitygap.playback import WatchedRobot, _live, play
 from realitygap.robots import Command, Robot
-from realitygap.robots.scribbler import Scribbler
 from realitygap.runs import genome_of, run_replicates
 from realitygap.testing import check_robot
 from realitygap.trials import NoiseKey, drive_trial

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from realitygap.emulator._memory import Memory
 from realitygap.errors import RecordError
+from realitygap.families.scribbler.emulator._memory import Memory
 from realitygap.lab._drawn import keep_drawn
 from realitygap.lab._photos import Photos
 from realitygap.records import (

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
-from realitygap.robots.scribbler.opcodes import (
+from realitygap.families.scribbler.opcodes import (
     COUNTED,
     FLUKE_2_COMMANDS,
     FLUKE_COMMANDS,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from realitygap.errors import ProtocolError, RobotError
-from realitygap.robots.scribbler import Blob, Scribbler, _images
+from realitygap.families.scribbler import Blob, Scribbler, _images
 
 from .peers import INFOS, ScriptedPort, greeting
 from .pictures import counted, jpeg_parts, slope

@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from realitygap.errors import ProtocolError
-from realitygap.robots.scribbler import _codec as codec
-from realitygap.robots.scribbler.opcodes import ROBOT_ANSWERS, S2_ANSWERS, Op
+from realitygap.families.scribbler import _codec as codec
+from realitygap.families.scribbler.opcodes import ROBOT_ANSWERS, S2_ANSWERS, Op
 
 from .peers import INFOS
 

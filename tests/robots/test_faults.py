@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 
 import realitygap.emulator  # noqa: F401  # its ports are known from then on
 from realitygap.errors import ProtocolError, RobotError, RobotTimeout
+from realitygap.families.scribbler import Scribbler
 from realitygap.robots import Command
-from realitygap.robots.scribbler import Scribbler
 
 from .peers import INFOS, FakePort, FakeScribbler, ScriptedPort, Wire, greeting, packet
 

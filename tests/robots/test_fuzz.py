@@ -12,9 +12,9 @@ import tracemalloc
 import pytest
 
 from realitygap.errors import ProtocolError, RobotError
+from realitygap.families.scribbler import Scribbler, _codec, _images
+from realitygap.families.scribbler._link import Link
 from realitygap.robots import Command
-from realitygap.robots.scribbler import Scribbler, _codec, _images
-from realitygap.robots.scribbler._link import Link
 
 from .peers import INFOS, FakePort, FakeScribbler
 from .pictures import jpeg_parts, slope

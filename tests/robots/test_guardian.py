@@ -16,13 +16,16 @@ from pathlib import Path
 
 import pytest
 
-from realitygap.emulator import Emulator, Server, serve_pty, serve_tcp
+from realitygap.emulator import Server, serve_pty, serve_tcp
 from realitygap.errors import RobotError
+from realitygap.families.scribbler import Scribbler
+from realitygap.families.scribbler._holder import LOCKS
+from realitygap.families.scribbler._link import STOP_ANSWER
+from realitygap.families.scribbler._link import STOP_BYTES as STOP
+from realitygap.families.scribbler.emulator import Emulator
+from realitygap.families.scribbler.opcodes import Op
 from realitygap.robots import Command
-from realitygap.robots.scribbler import Scribbler
-from realitygap.robots.scribbler._guardian_process import STOP, n_stops
-from realitygap.robots.scribbler._holder import LOCKS
-from realitygap.robots.scribbler.opcodes import Op
+from realitygap.robots._guardian_process import n_answers
 
 pytestmark = [
     pytest.mark.slow,
@@ -42,7 +45,7 @@ BUSY_S = 10.0
 DRIVE = """
 import sys, time
 from realitygap.robots import Command
-from realitygap.robots.scribbler import Scribbler
+from realitygap.families.scribbler import Scribbler
 robot = Scribbler(sys.argv[1], step_s=0.05)
 robot.drive(Command(1, 0))
 print("driving", robot.link.guardian_id, flush=True)
@@ -393,7 +396,7 @@ def test_rfc_2217_is_refused_with_what_to_do():
 
 def test_answers_to_motors_off_are_counted():
     block = bytes([1, 0, 0, 108, 108, 108, 0, 102, 0, 1, 0])
-    assert n_stops(STOP + block) == 1
-    assert n_stops(b"\x6d\xc8" + STOP + block + STOP + block) == 2
-    assert n_stops(STOP + STOP + STOP) == 0, "an S1 echoes while it is deaf"
-    assert n_stops(STOP + block[:10]) == 0
+    assert n_answers(STOP + block, STOP_ANSWER) == 1
+    assert n_answers(b"\x6d\xc8" + STOP + block + STOP + block, STOP_ANSWER) == 2
+    assert n_answers(STOP + STOP + STOP, STOP_ANSWER) == 0, "an S1 echoes while it is deaf"
+    assert n_answers(STOP + block[:10], STOP_ANSWER) == 0

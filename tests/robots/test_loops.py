@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from realitygap.robots.scribbler import Scribbler
+from realitygap.families.scribbler import Scribbler
 
 from .peers import BLOCK
 

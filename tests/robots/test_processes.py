@@ -11,22 +11,23 @@ from collections.abc import Iterator
 import pytest
 import serial
 
-from realitygap.emulator import Emulator, Server, serve_pty, serve_tcp
+from realitygap.emulator import Server, serve_pty, serve_tcp
 from realitygap.errors import RobotError
-from realitygap.robots.scribbler import Scribbler, label_of
+from realitygap.families.scribbler import Scribbler, label_of
+from realitygap.families.scribbler.emulator import Emulator
 
 pytestmark = pytest.mark.slow
 
 DRIVE = """
 import sys, time
-from realitygap.robots.scribbler import Scribbler
+from realitygap.families.scribbler import Scribbler
 robot = Scribbler(sys.argv[1])
 robot.motors(1, 1)
 print("driving", flush=True)
 """
 IN_A_BLOCK = """
 import sys, time
-from realitygap.robots.scribbler import Scribbler
+from realitygap.families.scribbler import Scribbler
 with Scribbler(sys.argv[1]) as robot:
     robot.motors(1, 1)
     print("driving", flush=True)
@@ -140,7 +141,7 @@ def test_a_port_that_cannot_be_opened_is_one_message_with_advice(port, message):
 
 
 OPENINGS = {
-    "a driver": "from realitygap.robots.scribbler import Scribbler; robot = Scribbler(sys.argv[1])",
+    "a driver": "from realitygap.families.scribbler import Scribbler; robot = Scribbler(sys.argv[1])",
     "a port": "from realitygap.robots import open_on; robot = open_on(sys.argv[1])[1]",
     "a platform": "from realitygap.platforms import platform_of; from realitygap.world import paper_arena; "
     "robot = platform_of(sys.argv[1]).open_robot(paper_arena())",

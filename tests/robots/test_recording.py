@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from realitygap.errors import RecordError, RecordVersionError, RobotError
+from realitygap.families.scribbler import Scribbler
 from realitygap.robots import Command, RecordedRobot, Robot, export_mcap, read_recording
-from realitygap.robots.scribbler import Scribbler
 from realitygap.testing import RobotContractError, check_robot
 
 from .peers import FakePort, FakeScribbler, Wire

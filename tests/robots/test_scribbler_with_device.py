@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import time
 
+from realitygap.families.scribbler import Scribbler
 from realitygap.robots import Command, RecordedRobot
-from realitygap.robots.scribbler import Scribbler
 from realitygap.testing import check_robot
 
 

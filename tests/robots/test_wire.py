@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from realitygap.errors import RobotError
+from realitygap.families.scribbler import Scribbler, SensorBlock
 from realitygap.robots import Command, Robot
-from realitygap.robots.scribbler import Scribbler, SensorBlock
 
 from .peers import INFOS, ScriptedPort, echoed, greeting
 

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from realitygap.errors import RecordError
-from realitygap.platforms import SimPlatform, SimTarget, build_enki
+from realitygap.families.thymio import build_enki
+from realitygap.platforms import SimPlatform, SimTarget
 from realitygap.report import goal_table, write_closing_page
 from realitygap.study import PLANS, SMALL, ClosingPlan, choose_condition, closing_the_gap, summarize_closing
 from realitygap.study._closing.plan import adopt_plan

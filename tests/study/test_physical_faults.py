@@ -12,8 +12,9 @@ from pathlib import Path
 
 import pytest
 
-from realitygap.emulator import Emulator, Server, serve_tcp
+from realitygap.emulator import Server, serve_tcp
 from realitygap.errors import LedgerError, RealityGapError, RecordVersionError
+from realitygap.families.scribbler.emulator import Emulator
 from realitygap.records import LEDGER_NAME, Ledger
 from realitygap.study import drive_study
 from tests.byte_proxy import DIRECTIONS, KINDS, ByteProxy

@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from realitygap.errors import RobotError
+from realitygap.families.scribbler import Scribbler
 from realitygap.platforms import JyroRobot, SimRobot
 from realitygap.robots import Command, Observation
-from realitygap.robots.scribbler import Scribbler
 from realitygap.testing import RobotContractError, check_robot
 from realitygap.world import load_arena
 

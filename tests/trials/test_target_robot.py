@@ -14,10 +14,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from realitygap.emulator import Emulator, serve_tcp
+from realitygap.emulator import serve_tcp
 from realitygap.errors import RecordError, RobotError, StudyError
 from realitygap.evolution import Genome, NeatSettings, Population
-from realitygap.platforms import ScribblerPlatform
+from realitygap.families.scribbler import ScribblerPlatform
+from realitygap.families.scribbler.emulator import Emulator
 from realitygap.records import TrialRecord, read_observations, trial_to_dict
 from realitygap.robots import Command
 from realitygap.robots.twin import sample_twin

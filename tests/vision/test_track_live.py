@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from realitygap.errors import RobotError, StudyError, VisionError
-from realitygap.platforms import ScribblerPlatform
+from realitygap.families.scribbler import ScribblerPlatform
 from realitygap.records import LEDGER_NAME, Ledger
 from realitygap.study import CameraObserver, connect_robot, drive_study
 from realitygap.testing import Film, FilmedCamera, path_through

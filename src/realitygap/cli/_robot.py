@@ -12,13 +12,16 @@ import typer
 from realitygap._numbers import fixed
 from realitygap._terminal import echo
 from realitygap.errors import RobotError
+from realitygap.robot_families import default_family, own_families, ports_by_family, robot_families
 
 from ._json import print_json
 
 robot = typer.Typer(
     name="robot",
     help='Connect to a robot and send it commands.\n\nIn Python: realitygap.robots.open_on("/dev/rfcomm0")',
-    epilog="Example: realitygap robot info /dev/rfcomm0\n\nExample: realitygap robot info thymio:/dev/ttyACM0",
+    epilog="\n\n".join(
+        f"Example: realitygap robot info {family.as_typed(family.ports[0])}" for family in own_families()
+    ),
     no_args_is_help=True,
     rich_markup_mode=None,
 )
@@ -27,9 +30,7 @@ Port = Annotated[
     str,
     typer.Argument(
         metavar="PORT",
-        help="Port of a Scribbler: /dev/rfcomm0, COM3, socket://HOST:PORT or emulator://s2?fluke=2. Port of a Thymio: "
-        "thymio:/dev/ttyACM0, thymio:socket://HOST:PORT or thymio:emulator://playground. "
-        "`realitygap robot list` lists the ports of this machine.",
+        help=f"{ports_by_family()} `realitygap robot list` lists the ports of this machine.",
     ),
 ]
 Record = Annotated[
@@ -39,17 +40,17 @@ Json = Annotated[bool, typer.Option("--json", help="Print data as JSON.")]
 
 LONGEST_DRIVE_S = 3600.0
 
-_NO_PORTS = ("sim", "jyro", "enki", "emulator", "scribbler", "thymio")
-"""Words for robots that newcomers give as a port."""
+_NO_PORTS = ("sim", "jyro", "emulator")
+"""Words for robots that newcomers give as a port, besides the names of families and their platforms."""
 
 
 @contextmanager
 def _opened(port: str, record: Path | None) -> Iterator[tuple[Any, Any]]:
     """Yield the functions of the robot's family and the robot on a port, stopped and let go of in the end."""
-    if port in _NO_PORTS:
+    if port in _NO_PORTS or any(port in (family.name, *family.platforms) for family in robot_families()):
         raise RobotError(
-            f"{port} is no port. For an emulated robot, use emulator://s2. `realitygap robot list` lists the ports of "
-            "this machine."
+            f"{port} is no port. For an emulated robot, use {default_family().emulated}. `realitygap robot list` lists "
+            "the ports of this machine."
         )
     if port.startswith("recording:"):
         raise RobotError(f"{port} is a recording: `realitygap robot show-recording` shows it.")
@@ -95,11 +96,11 @@ def list_ports(as_json: Json = False) -> None:
 def info(port: Port, as_json: Json = False, record: Record = None) -> None:
     """Identify the robot on a port.
 
-    Prints the robot, its Fluke, their firmware, and whether the robot is real or emulated.
+    Prints the model of the robot, its firmware, and whether the robot is real or emulated.
 
     Example: realitygap robot info /dev/rfcomm0
 
-    In Python: realitygap.robots.scribbler.Scribbler("/dev/rfcomm0").info
+    In Python: realitygap.robots.open_on("/dev/rfcomm0")[1].info
     """
     with _opened(port, record) as (terminal, opened):
         found = terminal.info(opened)
@@ -112,7 +113,7 @@ def sense(port: Port, as_json: Json = False, record: Record = None) -> None:
 
     Example: realitygap robot sense /dev/rfcomm0
 
-    In Python: realitygap.robots.scribbler.Scribbler("/dev/rfcomm0").sensors()
+    In Python: realitygap.robots.open_on("/dev/rfcomm0")[1].sensors()
     """
     with _opened(port, record) as (terminal, opened):
         seen = terminal.sense(opened)
@@ -139,7 +140,7 @@ def drive(
 
     Example: realitygap robot drive /dev/rfcomm0 -- -0.5
 
-    In Python: realitygap.robots.scribbler.Scribbler("/dev/rfcomm0", step_s=2).drive(Command(0.5, 0.2))
+    In Python: realitygap.robots.open_on("/dev/rfcomm0")[1].drive(Command(0.5, 0.2))
     """
     from realitygap.robots import Command
 
@@ -161,7 +162,7 @@ def stop(port: Port) -> None:
 
     Example: realitygap robot stop /dev/rfcomm0
 
-    In Python: realitygap.robots.scribbler.Scribbler("/dev/rfcomm0").stop()
+    In Python: realitygap.robots.open_on("/dev/rfcomm0")[1].stop()
     """
     with _opened(port, None) as (_, opened):
         opened.stop()
@@ -172,11 +173,9 @@ def stop(port: Port) -> None:
 def battery(port: Port, as_json: Json = False, record: Record = None) -> None:
     """Read the battery.
 
-    A Scribbler has about 9 V when full. Below 6.15 V it is low.
-
     Example: realitygap robot battery /dev/rfcomm0
 
-    In Python: realitygap.robots.scribbler.Scribbler("/dev/rfcomm0").battery()
+    In Python: realitygap.robots.open_on("/dev/rfcomm0")[1].battery()
     """
     with _opened(port, record) as (terminal, opened):
         name, value = terminal.battery(opened)
@@ -200,11 +199,11 @@ def picture(
     ] = "jpeg",
     record: Record = None,
 ) -> None:
-    """Take a picture with the Fluke's camera (PNG).
+    """Take a picture with the robot's camera (PNG).
 
     Example: realitygap robot picture /dev/rfcomm0 -o picture.png
 
-    In Python: realitygap.robots.scribbler.Scribbler("/dev/rfcomm0").picture()
+    In Python: realitygap.robots.open_on("/dev/rfcomm0")[1].picture()
     """
     if out.suffix.lower() != ".png":
         raise RobotError(f"{out} does not end in .png: pictures are written as PNG.")
@@ -228,7 +227,7 @@ def beep(
 
     Example: realitygap robot beep /dev/rfcomm0 --hz 440
 
-    In Python: realitygap.robots.scribbler.Scribbler("/dev/rfcomm0").beep(0.5, 440)
+    In Python: realitygap.robots.open_on("/dev/rfcomm0")[1].beep(0.5, 440)
     """
     with _opened_with("beep", port, record) as opened:
         opened.beep(seconds, hz, hz2)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import inspect
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
@@ -9,6 +11,7 @@ import typer
 
 from realitygap._terminal import echo
 from realitygap.errors import RealityGapError
+from realitygap.robot_families import load, robot_families
 
 from ._json import print_json
 
@@ -71,19 +74,17 @@ def _print_rows(rows: list[dict[str, str]]) -> None:
         echo("  ".join(row[key].ljust(width) for key, width in widths.items()).rstrip())
 
 
-@twin.command("build-enki")
-def build() -> None:
-    """Compile the program in which Enki simulates a Thymio.
+def _add_builder(name: str, build: Callable[[], Path]) -> None:
+    """Add the command that compiles a program of a family of robots."""
 
-    The platform enki needs it. It needs g++ and libenki-dev.
+    @twin.command(f"build-{name}", help=inspect.getdoc(build))
+    def command() -> None:
+        echo(f"Built: {build()}")
 
-    Example: realitygap twin build-enki
 
-    In Python: realitygap.platforms.build_enki()
-    """
-    from realitygap.platforms import build_enki
-
-    echo(f"Built: {build_enki()}")
+for _family in robot_families():
+    for _name, _reference in _family.builds.items():
+        _add_builder(_name, load(_reference))
 
 
 @twin.command("sample")

@@ -1,47 +1,34 @@
-"""Robots for real client programs: a Scribbler with any simulated robot behind it, and the playground's Thymio.
+"""Emulated robots for real client programs: what all families share, such as ports, servers, and witnesses.
 
-Importing this package lets pyserial open ports such as `emulator://s2?fluke=2&seed=1&speed=off` and
-`emulator://playground?speed=8`.
+Importing this package lets pyserial open ports whose names begin with `emulator://`.
 """
 
+from ._arena import open_arena
 from ._client import run_client
-from ._emulator import Emulator
-from ._faults import Faults
-from ._port import make_emulator, register
-from ._scene import Scene
-from ._scene_file import open_scene
-from ._serve import PtyChannel, Server, TcpChannel, serve_pty, serve_tcp
-from ._simulated import SCRIBBLER_BODY, BoxOnWheels, RobotOfItsOwn, SimulatedRobot
-from ._view import LiveView
-from ._witness import Witness, connect_witness
-from .thymio._playground import LACKS, Playground, why_not
-from .thymio._port import open_playground
-from .thymio._serve import PlaygroundServer
+from ._emulated import EmulatedRobot
+from ._port import EmulatedPort, number_in, register
+from ._serve import PtyChannel, Server, TcpChannel, WitnessDoor, serve_pty, serve_tcp
+from ._time import MILLISECOND, SECOND, nanoseconds
+from ._witness import Witness, cells_at_times, connect_witness
 
 register()
 
 __all__ = [
-    "LACKS",
-    "SCRIBBLER_BODY",
-    "BoxOnWheels",
-    "Emulator",
-    "Faults",
-    "LiveView",
-    "Playground",
-    "PlaygroundServer",
+    "MILLISECOND",
+    "SECOND",
+    "EmulatedPort",
+    "EmulatedRobot",
     "PtyChannel",
-    "RobotOfItsOwn",
-    "Scene",
     "Server",
-    "SimulatedRobot",
     "TcpChannel",
     "Witness",
+    "WitnessDoor",
+    "cells_at_times",
     "connect_witness",
-    "make_emulator",
-    "open_playground",
-    "open_scene",
+    "nanoseconds",
+    "number_in",
+    "open_arena",
     "run_client",
     "serve_pty",
     "serve_tcp",
-    "why_not",
 ]

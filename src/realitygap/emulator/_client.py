@@ -1,7 +1,7 @@
 """Running a client program against a pseudo-terminal, which refuses the modem lines that some clients set.
 
-Myro 2.9.9 sets DTR when it opens a port. A pseudo-terminal has no such line, the call fails (ENOTTY), and Myro waits
-for the port for ever. Python looks for a module `sitecustomize` when it starts; the one written here, for the child
+Some old clients set DTR when they open a port. A pseudo-terminal has no such line, the call fails (ENOTTY), and they
+wait for ever. Python looks for a module `sitecustomize` when it starts; the one written here, for the child
 program only, lets such a call do nothing. It is written for Python 2 and 3, and for every pyserial.
 """
 
@@ -19,7 +19,7 @@ from realitygap.errors import RobotError
 PORT_VARIABLE = "REALITYGAP_PORT"
 
 PATCH = """\
-# Written by `realitygap emulate --exec`: a pseudo-terminal has no modem lines, and setting one does nothing.
+# Written for the client of an emulated robot: a pseudo-terminal has no modem lines, and setting one does nothing.
 import errno
 import os
 import sys

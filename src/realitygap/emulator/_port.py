@@ -7,9 +7,9 @@ passes: the port's clock is that of the emulator, waiting for bytes lets time pa
 from __future__ import annotations
 
 import time
-from pathlib import Path
+from collections.abc import Mapping
 from threading import RLock
-from typing import Any
+from typing import Any, ClassVar
 from urllib.parse import parse_qsl, urlsplit
 
 import serial
@@ -17,20 +17,15 @@ from serial.serialutil import PortNotOpenError, SerialBase, SerialException, Tim
 
 from realitygap.errors import RobotError, did_you_mean
 from realitygap.robots import SystemClock
-from realitygap.robots.twin import TwinBody, load_twin
-from realitygap.world import Arena
 
-from ._emulator import Emulator
-from ._faults import Faults
-from ._scene_file import open_scene
+from ._emulated import EmulatedRobot
 from ._time import SECOND, nanoseconds
 from ._witness import DirectWitness
 
 SCHEME = "emulator"
-KEYS = ("fluke", "arena", "seed", "speed", "timing", "faults", "state", "id", "twin")
 FASTEST = 1000.0
 _REAL_TIME = SystemClock()
-_shared: dict[str, tuple[Emulator, RLock]] = {}
+_shared: dict[str, tuple[EmulatedRobot, RLock]] = {}
 
 
 class EmulatorClock:
@@ -53,16 +48,19 @@ class EmulatorClock:
 
 
 class EmulatedPort(SerialBase):  # type: ignore[misc]  # pyserial has no types
-    """A serial port with an emulated robot at its other end.
+    """A serial port with an emulated robot at its other end. A family has a subclass with `make_robot`.
 
     Attributes:
+        options: Options of an address that `make_robot` takes, besides `speed` and `id`.
         emulator: The robot; None before it was first opened.
         clock: Clock of the emulated robot.
         witness: Witness of the emulated robot.
     """
 
+    options: ClassVar[tuple[str, ...]] = ("arena", "seed")
+
     def __init__(self, *args: Any, **kwargs: Any) -> None:
-        self.emulator: Emulator | None = None
+        self.emulator: EmulatedRobot | None = None
         self._lock = RLock()
         self._buffer = bytearray()
         self._speed: float | None = 1.0
@@ -90,15 +88,15 @@ class EmulatedPort(SerialBase):  # type: ignore[misc]  # pyserial has no types
         self._reconfigure_port()
 
     def _make(self, url: str) -> None:
-        model, options = _parse(url)
+        host, options = self._parse(url)
         speed = options.pop("speed", "1")
-        self._speed = None if speed == "off" else _number("speed", speed, 0.001, FASTEST)
+        self._speed = None if speed == "off" else number_in("speed", speed, 0.001, FASTEST)
         shared = options.pop("id", None)
         if shared in _shared:
             self.emulator, self._lock = _shared[shared]
         else:
             try:
-                self.emulator = make_emulator(model, options)
+                self.emulator = self.make_robot(host, options)
             except RobotError as error:
                 raise RobotError(f"{url}: {error}") from error
             if shared:
@@ -106,8 +104,26 @@ class EmulatedPort(SerialBase):  # type: ignore[misc]  # pyserial has no types
         self._begun = time.monotonic() - self.emulator.now / (self._speed or 1.0)
         self.witness = DirectWitness(self.emulator, self._lock)
 
+    def _parse(self, url: str) -> tuple[str, dict[str, str]]:
+        """Return the host and the options of emulator://HOST?seed=1&speed=off."""
+        parts = urlsplit(url)
+        options = dict(parse_qsl(parts.query, keep_blank_values=True))
+        known = (*self.options, "speed", "id")
+        for key in options:
+            if key not in known:
+                raise RobotError(f"{url}: unknown option {key!r}. {did_you_mean(key, known)}")
+        return parts.netloc, options
+
+    def make_robot(self, host: str, options: Mapping[str, str]) -> EmulatedRobot:
+        """Return the robot that an address describes.
+
+        Raises:
+            RobotError: An option is out of range.
+        """
+        raise NotImplementedError
+
     @property
-    def _robot(self) -> Emulator:
+    def _robot(self) -> EmulatedRobot:
         if self.emulator is None:
             raise PortNotOpenError
         return self.emulator
@@ -255,47 +271,12 @@ class EmulatedPort(SerialBase):  # type: ignore[misc]  # pyserial has no types
         return self.emulator is not None and self._robot.is_connected
 
 
-def _parse(url: str) -> tuple[str, dict[str, str]]:
-    """Return the model and options of emulator://s2?fluke=2&seed=1."""
-    parts = urlsplit(url)
-    options = dict(parse_qsl(parts.query, keep_blank_values=True))
-    for key in options:
-        if key not in KEYS:
-            raise RobotError(f"{url}: unknown option {key!r}. {did_you_mean(key, KEYS)}")
-    return parts.netloc or "s2", options
-
-
-def make_emulator(model: str, options: dict[str, str]) -> Emulator:
-    """Return the emulator that text options describe: fluke, arena, seed, timing, faults, state, twin.
+def number_in(name: str, text: str, least: float, most: float, *, whole: bool = False) -> float:
+    """Return the number that an option of an emulator's address gives.
 
     Raises:
-        RobotError: One of them is not known or out of range.
+        RobotError: It is no number, or out of range.
     """
-    timing = options.get("timing", "on")
-    if timing not in ("on", "off"):
-        raise RobotError(f"timing={timing}: expected on or off.")
-    scene = open_scene(options.get("arena", "paper"))
-    return Emulator(
-        model,  # type: ignore[arg-type]  # checked there
-        options.get("fluke", "2" if model == "s2" else "1"),  # type: ignore[arg-type]  # checked there
-        arena=scene,
-        seed=int(_number("seed", options.get("seed", "0"), 0, 2**63, whole=True)),
-        faults=Faults.parse(options.get("faults", "")),
-        timing=timing == "on",
-        state=Path(options["state"]) if options.get("state") else None,
-        robot=_twin(options["twin"], scene.arena) if options.get("twin") else None,
-    )
-
-
-def _twin(file: str, arena: Arena) -> TwinBody:
-    """Return a twin's body from its file."""
-    try:
-        return TwinBody(load_twin(file), arena)
-    except ValueError as error:
-        raise RobotError(f"{error}") from error
-
-
-def _number(name: str, text: str, least: float, most: float, *, whole: bool = False) -> float:
     try:
         value = int(text) if whole else float(text)
     except ValueError:

@@ -15,7 +15,7 @@ from threading import Event, RLock, Thread
 from realitygap._closing import ClosedOnExit
 from realitygap.errors import RobotError, check_finite
 
-from ._emulator import Emulator
+from ._emulated import EmulatedRobot
 from ._time import SECOND, nanoseconds
 from ._witness import DirectWitness, ServedWitness, answer_witness
 
@@ -303,7 +303,7 @@ class Server(ClosedOnExit):
         speed: Seconds of the emulator in one of real time; 0: its time passes only while it answers, and when its
             witness lets it.
         witness: The port on which its witness is served, 0 for any; None for not at all.
-        watch: Called about every `watch_s`, with the emulator.
+        watch: Called about every `watch_s`.
         watch_s: Time between two calls of `watch` [s].
 
     Attributes:
@@ -314,12 +314,12 @@ class Server(ClosedOnExit):
 
     def __init__(
         self,
-        emulator: Emulator,
+        emulator: EmulatedRobot,
         channel: Channel,
         *,
         speed: float = 1.0,
         witness: int | None = None,
-        watch: Callable[[Emulator], None] | None = None,
+        watch: Callable[[], None] | None = None,
         watch_s: float = 0.125,
     ) -> None:
         check_finite({"speed": speed, "watch_s": watch_s})
@@ -396,7 +396,7 @@ class Server(ClosedOnExit):
         """Return the time until there is work again [s], or None while only a client can change anything."""
         with self._lock:
             due = self.emulator.next_event()
-            turning = self.emulator.table.motors.turning
+            turning = self.emulator.is_turning
         times = []
         if self._waits:
             if due is not None and self._is_asked and not self._waiting:
@@ -407,7 +407,7 @@ class Server(ClosedOnExit):
             times.append(IDLE_S)
         if self._watch:
             times.append(self._watched + self._watch_s - time.monotonic())
-        if self.emulator.faults.hangup:
+        if self.emulator.may_hang_up:
             times.append(IDLE_S)
         return max(0.0, min(times)) if times else None
 
@@ -459,7 +459,7 @@ class Server(ClosedOnExit):
         latest = time.monotonic() + LONGEST_S
         while self.emulator.now_ns < until:
             self.emulator.advance_to(min(until, self.emulator.now_ns + PASSED_AT_ONCE_NS))
-            self.emulator.table.advance_to(self.emulator.now_ns)
+            self.emulator.compute_motion()
             if (
                 time.monotonic() > latest
             ):  # its body takes longer: time passes as fast as that can, and it answers
@@ -480,7 +480,7 @@ class Server(ClosedOnExit):
         if self._watch and time.monotonic() >= self._watched + self._watch_s:
             self._watched = time.monotonic()
             with self._lock:
-                self._watch(self.emulator)
+                self._watch()
 
     def _follow_link(self) -> None:
         """Disconnect the client when the emulated link is interrupted."""
@@ -492,7 +492,7 @@ class Server(ClosedOnExit):
 
 
 def serve_pty(
-    emulator: Emulator, link: Path | None = None, *, speed: float = 1.0, witness: int | None = None
+    emulator: EmulatedRobot, link: Path | None = None, *, speed: float = 1.0, witness: int | None = None
 ) -> Server:
     """Return an emulator on a pseudo-terminal, served by a thread until the server is closed.
 
@@ -505,6 +505,8 @@ def serve_pty(
     return Server(emulator, PtyChannel(link), speed=speed, witness=witness).start()
 
 
-def serve_tcp(emulator: Emulator, port: int = 0, *, speed: float = 1.0, witness: int | None = None) -> Server:
+def serve_tcp(
+    emulator: EmulatedRobot, port: int = 0, *, speed: float = 1.0, witness: int | None = None
+) -> Server:
     """Return an emulator on a TCP port of this machine, 0 for any, served by a thread until the server is closed."""
     return Server(emulator, TcpChannel(port), speed=speed, witness=witness).start()

@@ -16,13 +16,13 @@ from realitygap._limits import parse_json
 from realitygap.errors import RobotError
 from realitygap.world import Arena, Grid, Pose
 
-from ._emulator import Emulator
+from ._emulated import EmulatedRobot
 
 
 class Witness(Protocol):
     """An observer that places an emulated robot and records where it drives.
 
-    Headings are those of the end that is ahead at present: the Fluke's with "Fluke ahead", else the Scribbler's.
+    Headings are those of the end that is ahead at present, for a robot that can drive with either end ahead.
     """
 
     def now(self) -> float:
@@ -86,7 +86,7 @@ class DirectWitness:
     """
 
     def __init__(
-        self, emulator: Emulator, lock: RLock | None = None, *, waits: bool = False, speed: float = 0.0
+        self, emulator: EmulatedRobot, lock: RLock | None = None, *, waits: bool = False, speed: float = 0.0
     ) -> None:
         self._emulator = emulator
         self._lock = lock or RLock()
@@ -128,7 +128,7 @@ class DirectWitness:
 
     def arena(self) -> Arena:
         """Return the arena in which the robot drives."""
-        return self._emulator.scene.arena
+        return self._emulator.arena
 
     def identity(self) -> str:
         """Return a description of what is emulated."""
@@ -156,7 +156,7 @@ class DirectWitness:
 
     def cells_at(self, times: Sequence[float]) -> tuple[int, ...]:
         """Return cells at given times."""
-        return cells_at_times(self.path(), self._emulator.scene.arena.grid, times)
+        return cells_at_times(self.path(), self._emulator.arena.grid, times)
 
 
 def cells_at_times(path: NDArray[np.float64], grid: Grid, times: Sequence[float]) -> tuple[int, ...]:
@@ -221,13 +221,14 @@ class RemoteWitness(ClosedOnExit):
         if not (port.isdecimal() and 0 < int(port) < 65536):
             raise RobotError(
                 f"No witness at {address!r}, expected HOST:PORT such as 127.0.0.1:7002, as `realitygap emulate "
-                "--witness PORT` prints it."
+                "ROBOT --witness PORT` prints it."
             )
         try:
             self._socket = socket.create_connection((host or "127.0.0.1", int(port)), timeout=timeout_s)
         except OSError as error:
             raise RobotError(
-                f"No witness at {address} ({error}). Start realitygap emulate --witness PORT, and give 127.0.0.1:PORT."
+                f"No witness at {address} ({error}). Start realitygap emulate ROBOT --witness PORT, and "
+                "give 127.0.0.1:PORT."
             ) from error
         self._file = self._socket.makefile("rb")
         # of a question and its answer: a page that shows a trial looks from a thread of its own
@@ -305,5 +306,5 @@ class RemoteWitness(ClosedOnExit):
 
 
 def connect_witness(address: str) -> RemoteWitness:
-    """Return the witness that `realitygap emulate --witness PORT` serves, by 127.0.0.1:PORT."""
+    """Return the witness that `realitygap emulate ROBOT --witness PORT` serves, by 127.0.0.1:PORT."""
     return RemoteWitness(address)

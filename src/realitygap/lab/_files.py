@@ -13,6 +13,7 @@ from urllib.parse import parse_qsl
 from realitygap._limits import parse_toml
 from realitygap.errors import StudyError
 from realitygap.platforms import names_a_port, platform_names, platform_of, split_spec
+from realitygap.robot_families import ports_in_words
 from realitygap.robots import split_port
 from realitygap.settings import shown
 from realitygap.study import Study, python_tasks
@@ -120,10 +121,7 @@ def refuse_port(root: Path, port: str) -> None:
             if key in _EMULATORS_FILES:
                 refuse_outside(root, value)
         return
-    raise StudyError(
-        f"{shown(port)} is no port that the lab opens. Expected a device such as /dev/rfcomm0 or COM3, "
-        "socket://HOST:PORT, emulator://s2?fluke=2, or thymio: and one of these."
-    )
+    raise StudyError(f"{shown(port)} is no port that the lab opens. Expected {ports_in_words()}.")
 
 
 def refuse_camera(root: Path, spec: str) -> None:

@@ -14,6 +14,7 @@ from realitygap.errors import StudyError
 from realitygap.orders import CalibrateOrder, GapOrder
 from realitygap.platforms import names_a_port, platform_of
 from realitygap.records import refuse_links
+from realitygap.robots import typed_port
 from realitygap.runs import NAME_PATTERN
 from realitygap.settings import shown
 
@@ -94,7 +95,7 @@ _RobotUser = Hand | StudyJob | GapJob | CalibrationJob
 def _port_of(job: _RobotUser) -> str:
     """Return the port of the robot that something uses or used; empty if it needs none."""
     if isinstance(job, GapJob | CalibrationJob):
-        return job.platform.removeprefix("scribbler:") if names_a_port(job.platform) else ""
+        return typed_port(job.platform) if names_a_port(job.platform) else ""
     return job.port
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from realitygap.errors import StudyError
-from realitygap.platforms import platform_of
+from realitygap.platforms import emulated_robot, platform_of
 from realitygap.robots import Robot
 from realitygap.runs import Condition
 
@@ -23,14 +23,14 @@ def open_robot(condition: Condition, spec: str = "") -> tuple[Robot, int]:
     """
     own, arena = condition.on, condition.placed_arena
     if own.is_physical and not spec:
-        spec = own.emulated  # in this program
+        spec = emulated_robot(own.name)  # in this program
     if spec in ("", own.spec):
         return own.in_double().open_robot(arena, noise=condition.noise), own.steps
     platform = platform_of(spec)
     if platform.needs_person:
         raise StudyError(
             f"{spec!r} cannot be driven live, because a person must place this robot. Expected an emulated one, such "
-            f"as {platform.emulated!r}."
+            f"as {emulated_robot(platform.name)!r}."
         )
     if platform.name == own.name:
         platform = platform.model_copy(update={"steps": own.steps})

@@ -7,8 +7,8 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from realitygap.families.scribbler import Scribbler as Driver
     from realitygap.robots import Clock
-    from realitygap.robots.scribbler import Scribbler as Driver
 
     from ._simulation import Simulation
 

@@ -8,8 +8,8 @@ from typing import Any
 
 from realitygap._foreign_text import printable
 from realitygap.errors import RobotError
-from realitygap.robots.scribbler import Scribbler as Driver
-from realitygap.robots.scribbler import find_ports
+from realitygap.families.scribbler import Scribbler as Driver
+from realitygap.families.scribbler import find_ports
 
 from ._mistakes import MyroError
 from ._simulation import Simulation, is_simulation, parse_simulation

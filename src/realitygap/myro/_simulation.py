@@ -10,7 +10,7 @@ from urllib.parse import parse_qsl, urlencode
 import numpy as np
 
 from realitygap.errors import RobotError
-from realitygap.robots.scribbler import Scribbler as Driver
+from realitygap.families.scribbler import Scribbler as Driver
 from realitygap.world import NAMED_STARTS, Arena, Pose, is_inside
 
 from ._mistakes import MyroError, choice, number, whole

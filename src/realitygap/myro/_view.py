@@ -141,7 +141,7 @@ def _screen(svg: str) -> Any:
 
 def to_svg(simulation: Watched) -> str:
     """Return the arena, the line that the pen drew, and the robot, as SVG."""
-    from realitygap.emulator import SCRIBBLER_BODY
+    from realitygap.families.scribbler.emulator import SCRIBBLER_BODY
 
     arena, grid = simulation.arena, simulation.arena.grid
     left, bottom, right, top = _bounds(simulation)

@@ -2,10 +2,12 @@
 
 from ._fleet import Array, Fleet, Outline, Points
 from ._platform import Opening, Platform
+from ._port import PortPlatform
 from ._python import PYTHON, allow_code, load_platform
 from ._registry import (
     GROUP,
     built_in_platforms,
+    emulated_robot,
     emulated_robots,
     platform_class,
     platform_names,
@@ -25,15 +27,12 @@ from ._spec import (
     split_spec,
 )
 from ._try import open_trials, scores_of, trace_genome, trace_genomes, traced_at_once, try_genomes
-from .enki._build import build_enki, harness_path
-from .enki._platform import EnkiPlatform
 from .jyro._platform import JyroPlatform
 from .jyro._robot import JyroRobot
 from .jyro._settings import STEP_S, JyroSettings
 from .jyro._trials import JyroTrials, jyro_rules, jyro_scene
 from .recorded._platform import RecordedPlatform
 from .recorded._target import RecordedTarget
-from .scribbler._platform import ScribblerPlatform
 from .sim._ensemble import Play, Rehearsal, SimEnsemble
 from .sim._platform import SimPlatform, as_sim
 from .sim._robot import SimRobot
@@ -41,7 +40,6 @@ from .sim._scene import SimScene, sim_scene
 from .sim._settings import ARENA, DEFAULT_ROBOT, NOISE, SimSettings, as_numbers
 from .sim._trials import SimTrials
 from .sim._world import SimWorld, SimWorldRobot
-from .thymio._platform import ThymioPlatform
 from .twin._open import SimTwin, open_twin
 from .twin._platform import TwinPlatform
 from .twin._robots import TwinRobots
@@ -56,7 +54,6 @@ __all__ = [
     "PYTHON",
     "STEP_S",
     "Array",
-    "EnkiPlatform",
     "Fleet",
     "JyroPlatform",
     "JyroRobot",
@@ -68,10 +65,10 @@ __all__ = [
     "PlatformSettings",
     "Play",
     "Points",
+    "PortPlatform",
     "RecordedPlatform",
     "RecordedTarget",
     "Rehearsal",
-    "ScribblerPlatform",
     "SimEnsemble",
     "SimPlatform",
     "SimRobot",
@@ -83,20 +80,18 @@ __all__ = [
     "SimWorld",
     "SimWorldRobot",
     "SimulatedPlatform",
-    "ThymioPlatform",
     "TwinPlatform",
     "TwinRobots",
     "TwinTarget",
     "allow_code",
     "as_numbers",
     "as_sim",
-    "build_enki",
     "built_in_platforms",
     "class_of",
     "close_twins",
     "described_platform",
+    "emulated_robot",
     "emulated_robots",
-    "harness_path",
     "is_physical",
     "jyro_rules",
     "jyro_scene",

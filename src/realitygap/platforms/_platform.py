@@ -146,7 +146,7 @@ class Platform(PlatformSettings):
             return WitnessObserver(remote)
         raise StudyError(
             f"No operator places the robot of {how.name} and reports its cells. Name the witness of an "
-            "emulator (HOST:PORT, from realitygap emulate --witness PORT), or give an observer."
+            "emulator (HOST:PORT, from realitygap emulate ROBOT --witness PORT), or give an observer."
         )
 
     def prepare(

@@ -5,10 +5,10 @@ from __future__ import annotations
 import functools
 import sys
 from collections.abc import Mapping
-from importlib import import_module
-from importlib.metadata import EntryPoint, entry_points
+from typing import NamedTuple
 
 from realitygap.errors import StudyError, did_you_mean
+from realitygap.robot_families import load, own_families, points_in, robot_families, source_of
 
 from ._platform import Platform
 
@@ -25,20 +25,24 @@ RESERVED = frozenset(
 )
 """Names that study files use for something else."""
 
-_BUILT_IN = {
-    "jyro": ".jyro._platform:JyroPlatform",
-    "sim": ".sim._platform:SimPlatform",
-    "twin": ".twin._platform:TwinPlatform",
-    "scribbler": ".scribbler._platform:ScribblerPlatform",
-    "thymio": ".thymio._platform:ThymioPlatform",
-    "enki": ".enki._platform:EnkiPlatform",
-    "recorded": ".recorded._platform:RecordedPlatform",
+_SIMULATORS = {
+    "jyro": f"{__package__}.jyro._platform:JyroPlatform",
+    "sim": f"{__package__}.sim._platform:SimPlatform",
+    "twin": f"{__package__}.twin._platform:TwinPlatform",
 }
+_RECORDED = {"recorded": f"{__package__}.recorded._platform:RecordedPlatform"}
+
+
+@functools.cache
+def _built_in() -> Mapping[str, str]:
+    """Return the reference to the class of each platform that comes with realitygap."""
+    robots = [family.platforms for family in own_families()]
+    return {**_SIMULATORS, **{name: of for each in robots for name, of in each.items()}, **_RECORDED}
 
 
 def built_in_platforms() -> tuple[type[Platform], ...]:
     """Return the classes of the platforms that come with realitygap."""
-    return tuple(platform_class(name) for name in _BUILT_IN)
+    return tuple(platform_class(name) for name in _built_in())
 
 
 def study_platforms() -> tuple[str, ...]:
@@ -47,13 +51,18 @@ def study_platforms() -> tuple[str, ...]:
 
 
 def emulated_robots() -> tuple[str, ...]:
-    """Return how users name an emulated robot in this program, for each platform that has one."""
-    return tuple(model.emulated for model in built_in_platforms() if model.emulated)
+    """Return how users name an emulated robot in this program, for each family of robots that has one."""
+    return tuple(family.named(family.emulated) for family in robot_families() if family.emulated)
+
+
+def emulated_robot(name: str) -> str:
+    """Return how users name an emulated robot of a platform in this program; empty if there is none."""
+    return next((spec for spec in emulated_robots() if spec.partition(":")[0] == name), "")
 
 
 def platform_names() -> tuple[str, ...]:
     """Return the names of all platforms; those of other packages after ours."""
-    return (*_BUILT_IN, *sorted(_plugins()))
+    return (*_built_in(), *sorted(_plugins()))
 
 
 def platform_class(name: str) -> type[Platform]:
@@ -64,24 +73,23 @@ def platform_class(name: str) -> type[Platform]:
     Raises:
         StudyError: There is no such platform, its package cannot be used, or two packages add it.
     """
-    if name in _BUILT_IN:
-        module, _, attribute = _BUILT_IN[name].partition(":")
-        built_in: type[Platform] = getattr(import_module(module, __package__), attribute)
+    if name in _built_in():
+        built_in: type[Platform] = load(_built_in()[name])
         return built_in
-    points = _plugins().get(name)
-    if points is None:
+    offers = _plugins().get(name)
+    if offers is None:
         raise StudyError(f"There is no platform {name!r}. {did_you_mean(name, platform_names())}")
-    if len(points) > 1:
-        packages = " and ".join(sorted(map(_source, points)))
+    if len(offers) > 1:
+        packages = " and ".join(sorted(offer.source for offer in offers))
         raise StudyError(f"{packages} both add a platform {name!r}. Remove one.")
-    (point,) = points
+    (offer,) = offers
     try:
-        found = point.load()
+        found = load(offer.reference)
     except (Exception, SystemExit) as error:  # whatever an outside package does
         raise StudyError(
-            f"Platform {name!r} of {_source(point)} cannot be imported: {type(error).__name__}: {error}."
+            f"Platform {name!r} of {offer.source} cannot be imported: {type(error).__name__}: {error}."
         ) from error
-    return _checked(found, name, _source(point))
+    return _checked(found, name, offer.source)
 
 
 def _checked(found: object, name: str, source: str) -> type[Platform]:
@@ -100,21 +108,27 @@ def _checked(found: object, name: str, source: str) -> type[Platform]:
     return found
 
 
-def _plugins() -> Mapping[str, list[EntryPoint]]:
-    """Return the entry points of other packages by name, none of which is imported; names of ours are left out."""
+class _Offer(NamedTuple):
+    """A platform of another package: the reference to its class, and the package with its version."""
+
+    reference: str
+    source: str
+
+
+def _plugins() -> Mapping[str, list[_Offer]]:
+    """Return the platforms of other packages by name, none of which is imported; names of ours are left out."""
     return _plugins_on(tuple(sys.path))
 
 
 @functools.lru_cache(maxsize=4)
-def _plugins_on(path: tuple[str, ...]) -> Mapping[str, list[EntryPoint]]:
-    """Return the plugins on a path of modules, cached, because each search reads the names of all packages."""
-    plugins: dict[str, list[EntryPoint]] = {}
-    for point in entry_points(group=GROUP):
-        points = plugins.setdefault(point.name, [])
-        if all(point.value != other.value for other in points):
-            points.append(point)
-    return {name: points for name, points in plugins.items() if name not in _BUILT_IN}
-
-
-def _source(point: EntryPoint) -> str:
-    return f"package {point.dist.name} {point.dist.version}" if point.dist else point.value
+def _plugins_on(path: tuple[str, ...]) -> Mapping[str, list[_Offer]]:
+    """Return the plugins on a path of modules, cached."""
+    offers = [(point.name, _Offer(point.value, source_of(point))) for point in points_in(GROUP)]
+    for family in robot_families():
+        offers += [(name, _Offer(reference, family.source)) for name, reference in family.platforms.items()]
+    plugins: dict[str, list[_Offer]] = {}
+    for name, offer in offers:
+        others = plugins.setdefault(name, [])
+        if name not in _built_in() and all(offer.reference != other.reference for other in others):
+            others.append(offer)
+    return {name: others for name, others in plugins.items() if others}

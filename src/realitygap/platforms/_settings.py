@@ -12,6 +12,7 @@ from pydantic import Field
 from realitygap.drawing import Picture
 from realitygap.errors import StudyError
 from realitygap.evolution import ControllerInterface, inputs_of_robot
+from realitygap.robot_families import default_family
 from realitygap.settings import Settings
 from realitygap.world import JYRO_SCRIBBLER, Arena, Body, RangeSensors, RobotModel, check_start, robot_picture
 
@@ -19,7 +20,7 @@ from realitygap.world import JYRO_SCRIBBLER, Arena, Body, RangeSensors, RobotMod
 class PlatformSettings(Settings):
     """The settings of a platform, `[platform.NAME]` of a study file, and its capabilities.
 
-    Figures draw the paper's Scribbler unless a subclass has another `body`.
+    Figures draw the paper's robot unless a subclass has another `body`.
 
     Attributes:
         name: The part before the colon.
@@ -41,7 +42,6 @@ class PlatformSettings(Settings):
         takes_several: Whether several robots can be tried in one arena.
         full_scale: Raw reading that counts as 1 in stored trials, independent of a study's scale of readings.
         base_robot: Name of the robot file that calibrations of its robots build on.
-        emulated: Name of an emulated robot in this program, for a platform with robots on ports.
         version: Version of its code, if another package or a file adds it: results of another version are not extended.
     """
 
@@ -63,8 +63,7 @@ class PlatformSettings(Settings):
     channels: ClassVar[tuple[str, ...]] = ()
     takes_several: ClassVar[bool] = False
     full_scale: ClassVar[float] = 1.0
-    base_robot: ClassVar[str] = "scribbler-s2-fluke2"
-    emulated: ClassVar[str] = ""
+    base_robot: ClassVar[str] = default_family().robot
     version: ClassVar[str] = ""
 
     steps: int = Field(100, ge=1, le=100_000, description="Steps of a trial.")
@@ -121,7 +120,7 @@ class PlatformSettings(Settings):
 
     @property
     def body(self) -> Body:
-        """Outline of the robot in figures: the box of 0.18 x 0.16 m around the paper's Scribbler."""
+        """Outline of the robot in figures: the box of 0.18 x 0.16 m around the paper's robot."""
         return JYRO_SCRIBBLER
 
     @property
@@ -229,7 +228,7 @@ class PlatformSettings(Settings):
     @property
     def outline_words(self) -> str:
         """The origin of the outline in figures, for their captions."""
-        return "the box that holds a Scribbler’s"
+        return "the box around the paper’s robot"
 
     def at_port(self, port: str) -> Self:
         """Return the platform with the port of its robot.

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realitygap.errors import RealityGapError
-from realitygap.platforms import ScribblerPlatform
+from realitygap.platforms import platform_class
+from realitygap.robot_families import default_family
 from realitygap.robots import Command, Label, Observation, Robot, channels_of, select_channels
 from realitygap.world import Arena, Grid, Pose, VisitedCells
 
@@ -322,10 +323,10 @@ def _whereabouts(robot: Robot, witness: Any) -> Callable[[], Pose] | None:
 
 
 def _shape_of(robot: Robot) -> RobotShape:
-    """Return the shape of the robot's platform, or the Scribbler's box with one ray per sensor."""
+    """Return the shape of the robot's platform, or that of the default family with one ray per sensor."""
     platform: Any = getattr(robot, "platform", None)
     is_known = hasattr(platform, "body") and hasattr(platform, "sensors")
-    shape = RobotShape.of(platform if is_known else ScribblerPlatform())
+    shape = RobotShape.of(platform if is_known else platform_class(default_family().name)())
     n = robot.n_sensors
     if n == len(shape.mounts):
         return shape

@@ -1,7 +1,7 @@
-"""Platforms, which try controllers, and the contract of a robot."""
+"""The contract of a robot, and what drivers of all families share: ports, recordings, guardians, clocks."""
 
-from . import scribbler, thymio, twin
-from ._clock import Clock, SystemClock, VirtualClock
+from . import twin
+from ._clock import HEAR_S, Clock, SystemClock, VirtualClock
 from ._contract import (
     Command,
     Label,
@@ -12,35 +12,50 @@ from ._contract import (
     check_observation,
     select_channels,
 )
-from ._families import is_in_this_program, list_ports, open_on, split_port
+from ._exits import EXITS
+from ._guardian import Guardian, descriptor_of
+from ._guardian_process import GIVE_UP_S, SILENT_S
 from ._in_program import ProgramRobot
+from ._port_driver import PortDriver
+from ._ports import PortGuess, Terminal, is_in_this_program, list_ports, open_on, split_port, typed_port
 from ._recorded_robot import RecordedRobot
 from ._recording import Recorder, Recording, read_recording
 from ._recording_mcap import export_mcap
+from ._serial_port import reason_of, serial_port
 
 __all__ = [
+    "EXITS",
+    "GIVE_UP_S",
+    "HEAR_S",
+    "SILENT_S",
     "Clock",
     "Command",
+    "Guardian",
     "Label",
     "Observation",
+    "PortDriver",
+    "PortGuess",
     "ProgramRobot",
     "RecordedRobot",
     "Recorder",
     "Recording",
     "Robot",
     "SystemClock",
+    "Terminal",
     "VirtualClock",
     "channels_of",
     "check_command",
     "check_observation",
+    "descriptor_of",
     "export_mcap",
     "is_in_this_program",
     "list_ports",
     "open_on",
     "read_recording",
-    "scribbler",
+    "reason_of",
     "select_channels",
+    "serial_port",
     "split_port",
-    "thymio",
     "twin",
+    "typed_port",
 ]

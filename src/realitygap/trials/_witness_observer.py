@@ -50,7 +50,7 @@ class WitnessObserver(OwnSenses):
         if self._witness is None:
             raise RobotError(
                 "This robot has no witness: it is not an emulator in this program. Name the address of an "
-                "emulator's witness, HOST:PORT (realitygap emulate --witness PORT), or count its cells by "
+                "emulator's witness, HOST:PORT (realitygap emulate ROBOT --witness PORT), or count its cells by "
                 "hand."
             )
         return self._witness
@@ -171,5 +171,6 @@ def _refuse_other_arena(there: Arena, wanted: Arena) -> None:
     if there.grid != wanted.grid or set(there.walls) != set(wanted.walls):
         raise RobotError(
             f"The emulated robot drives in the arena {there.name!r}, and the study is about {wanted.name!r}: other "
-            "walls or cells. Start it with the study's arena (`realitygap emulate --arena`, or arena= in its port)."
+            "walls or cells. Start it with the study's arena (`realitygap emulate ROBOT --arena`, or arena= in its "
+            "port)."
         )

@@ -16,6 +16,7 @@ from realitygap._image_file import MOST_IMAGE_BYTES, on_white, open_image, plain
 from realitygap._limits import MOST_TOML_BYTES, is_file, parse_toml
 from realitygap._named_file import NamedFileError, open_named
 from realitygap.errors import DescriptionError, did_you_mean
+from realitygap.robot_families import RobotFamily, own_families, robot_families
 
 from ._arena import NAMED_STARTS, Arena, paper_arena
 from ._arena_file import ArenaFile, in_meters
@@ -29,17 +30,13 @@ T = TypeVar("T")
 
 LONGEST_NAME = 500  # in a message
 MOST_BASES = 8  # robots that build on robots
-BOARDS = ("fluke1", "fluke2")  # what may be plugged into a Scribbler
-CARDBOARD = "cardboard"  # what may be put around it, last
 
 
 def robot_names() -> list[str]:
-    """Return the names of the robots that come with realitygap."""
-    alone = _names("robots")
-    scribblers = [name for name in alone if name.startswith("scribbler")]
-    equipped = [f"{name}-{board}" for name in scribblers for board in BOARDS]
-    boxed = [f"{name}-{CARDBOARD}" for name in (*scribblers, *equipped)]
-    return sorted([*alone, *equipped, *boxed])
+    """Return the names of the robots that come with realitygap, or with families of other packages."""
+    return sorted(
+        [*_names("robots"), *(name for family in robot_families() for name in family.robot_names())]
+    )
 
 
 def load_robot(robot: str | Path) -> RobotModel:
@@ -58,12 +55,12 @@ def load_robot(robot: str | Path) -> RobotModel:
 def _robot_values(robot: str | Path, chain: list[str]) -> tuple[dict[str, Any], str]:
     """Return the values of a robot's file laid over those of the robot it builds on, and what to call it."""
     below, addition = _taken_apart(str(robot))
-    if addition:
-        file = resources.files(__package__) / "robots" / "additions" / f"{addition}.toml"
+    if addition is not None:
+        file = addition
         values, origin = _values_of(file, str(robot)), str(robot)
         values |= {"name": str(robot), "base": below}
     else:
-        file, origin = _find("robot", robot_names(), robot)
+        file, origin = _find("robot", robot_names, robot)
         values = read_toml(file, origin)
         if not is_calibration(values):
             values = _values_of(file, origin)
@@ -104,7 +101,7 @@ def read_calibration(robot: str | Path) -> Calibration | None:
         DescriptionError: It is a calibration with mistakes.
     """
     path = Path(robot)
-    if str(robot) in robot_names() or not str(robot) or not is_file(path):
+    if not is_file(path) or str(robot) in robot_names():
         return None
     values = read_toml(path, str(path))
     return _as_calibration(values, str(path)) if is_calibration(values) else None
@@ -150,11 +147,13 @@ def _beside(robot: str, origin: str) -> str | Path:
     return beside if is_file(origin) and is_file(beside) else robot
 
 
-def _taken_apart(name: str) -> tuple[str, str]:
-    """Return the robot and the addition in a name, such as scribbler-s2 and fluke2; no addition otherwise."""
+def _taken_apart(name: str) -> tuple[str, Traversable | None]:
+    """Return the robot that a name like ROBOT-ADDITION begins with, and the file of the addition; None without one."""
     rest, _, last = name.rpartition("-")
-    is_made = last in (*BOARDS, CARDBOARD) and name in robot_names()
-    return (rest, last) if is_made else (name, "")
+    family = _family_with(name) if rest else None
+    if family is not None and any(last in group for group in family.additions):
+        return rest, family.robot_folder() / "additions" / f"{last}.toml"
+    return name, None
 
 
 def _texts(value: Any) -> list[Any]:
@@ -248,7 +247,7 @@ def load_arena(arena: str | Path) -> Arena:
         raise DescriptionError(
             f"{arena} looks like a map of ROS, expected an arena. Convert it: realitygap arena {arena} -o arena.toml"
         )
-    file, origin = _find("arena", arena_names(), arena)
+    file, origin = _find("arena", arena_names, arena)
     if origin.lower().endswith(".svg"):
         text = read_text(file, origin)
         values = _checked(origin, lambda: svg_values(text))
@@ -347,12 +346,15 @@ def _names(folder: str) -> list[str]:
     )
 
 
-def _find(what: str, known: list[str], name: str | Path) -> tuple[Traversable, str]:
+def _find(what: str, names: Callable[[], list[str]], name: str | Path) -> tuple[Traversable, str]:
     """Return the file of that name or path, and what to call it in messages."""
     if not isinstance(name, str | Path):
         raise TypeError(f"{what} is {name!r}, expected the name of one, or the path of its file.")
-    if str(name) in known:
+    if str(name) in _names(f"{what}s"):
         return resources.files(__package__) / f"{what}s" / f"{name}.toml", str(name)
+    family = _family_with(str(name)) if what == "robot" else None
+    if family is not None:
+        return family.robot_folder() / f"{name}.toml", str(name)
     path = Path(name)
     if str(name) and is_file(path):
         return path, str(path)
@@ -360,8 +362,16 @@ def _find(what: str, known: list[str], name: str | Path) -> tuple[Traversable, s
         raise DescriptionError(f"There is no {what} file {_short(str(path))}.")
     endings = ".toml or .svg" if what == "arena" else ".toml"
     raise DescriptionError(
-        f"Unknown {what} {_short(str(name))!r}. {did_you_mean(str(name), known)} A file ends in {endings}."
+        f"Unknown {what} {_short(str(name))!r}. {did_you_mean(str(name), names())} A file ends in {endings}."
     )
+
+
+def _family_with(name: str) -> RobotFamily | None:
+    """Return the family with a robot of that name; None if there is none. Other packages are searched last."""
+    own = next((family for family in own_families() if name in family.robot_names()), None)
+    if own is not None or is_file(name):
+        return own
+    return next((family for family in robot_families() if name in family.robot_names()), None)
 
 
 def _short(name: str) -> str:

@@ -4,7 +4,7 @@ from collections.abc import Generator, Iterator
 
 import pytest
 
-from realitygap.emulator import Playground
+from realitygap.families.thymio import Playground
 from realitygap.world import Pose
 
 SPEED = 8.0

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from realitygap.errors import RobotError
-from realitygap.robots.thymio import _messages as messages
-from realitygap.robots.thymio._messages import Decoder, Kind, Message
-from realitygap.robots.thymio._program import CHECK, DRIVE, OWN, TICK_S
+from realitygap.families.thymio import _messages as messages
+from realitygap.families.thymio._messages import Decoder, Kind, Message
+from realitygap.families.thymio._program import CHECK, DRIVE, OWN, TICK_S
 
 from ..peers import BufferPort, Wire
 

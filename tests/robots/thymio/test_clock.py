@@ -2,9 +2,9 @@
 
 import random
 
-from realitygap.robots.thymio import _clock as module
-from realitygap.robots.thymio._clock import BoardClock
-from realitygap.robots.thymio._program import TICK_S
+from realitygap.families.thymio import _clock as module
+from realitygap.families.thymio._clock import BoardClock
+from realitygap.families.thymio._program import TICK_S
 
 
 def test_a_wait_ends_however_long_each_look_takes(monkeypatch):

@@ -3,10 +3,10 @@
 import pytest
 
 from realitygap.errors import RobotError, RobotTimeout
-from realitygap.robots.thymio import Thymio
-from realitygap.robots.thymio import _messages as messages
-from realitygap.robots.thymio._messages import Decoder, Kind, Message
-from realitygap.robots.thymio._stall import StallRule
+from realitygap.families.thymio import Thymio
+from realitygap.families.thymio import _messages as messages
+from realitygap.families.thymio._messages import Decoder, Kind, Message
+from realitygap.families.thymio._stall import StallRule
 
 
 class Answering:

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from realitygap.errors import ProtocolError, RobotError
-from realitygap.robots.thymio import _messages as messages
-from realitygap.robots.thymio._messages import Decoder, Kind, Message
+from realitygap.families.thymio import _messages as messages
+from realitygap.families.thymio._messages import Decoder, Kind, Message
 
 
 @pytest.mark.parametrize(

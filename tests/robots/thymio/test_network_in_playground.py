@@ -9,12 +9,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from realitygap.emulator import Playground, why_not
 from realitygap.evolution import ControllerInterface, Network, to_aseba
 from realitygap.evolution._fixed_point import ONE, fixed_point
-from realitygap.robots.thymio import _messages as messages
-from realitygap.robots.thymio._link import Link, open_port
-from realitygap.robots.thymio._messages import Kind
+from realitygap.families.thymio import Playground
+from realitygap.families.thymio import _messages as messages
+from realitygap.families.thymio._link import Link, open_port
+from realitygap.families.thymio._messages import Kind
+from realitygap.families.thymio.playground._playground import why_not
 from realitygap.world import Pose, paper_arena
 
 from ...evolution.test_export import KINDS, evolved

@@ -13,11 +13,11 @@ from dataclasses import replace
 
 import pytest
 
-from realitygap.emulator import Playground, why_not
 from realitygap.errors import RecordError, RobotError, RobotStopped
+from realitygap.families.thymio import Playground, Thymio
+from realitygap.families.thymio._program import TICK_S
+from realitygap.families.thymio.playground._playground import why_not
 from realitygap.robots import Command, RecordedRobot, read_recording
-from realitygap.robots.thymio import Thymio
-from realitygap.robots.thymio._program import TICK_S
 from realitygap.testing import check_robot
 from realitygap.trials import EndReason, run_trial
 from realitygap.world import Pose, paper_arena
@@ -86,8 +86,8 @@ def test_the_button_ends_a_trial_until_the_robot_is_armed_again(playground):
 DRIVER = """
 import sys, time
 from realitygap.robots import Command, RecordedRobot, read_recording
-from realitygap.robots.thymio import Thymio
-from realitygap.robots.thymio._program import TICK_S
+from realitygap.families.thymio import Thymio
+from realitygap.families.thymio._program import TICK_S
 with Thymio(sys.argv[1], step_s=0.1) as robot:
     print("driving", robot.link._guardian.process_id, flush=True)
     if sys.argv[2] == "long life":
@@ -254,7 +254,10 @@ def test_a_playground_that_ends_is_a_lost_link():
 
 
 def test_a_playground_ends_with_the_program_that_started_it():
-    program = "import time, realitygap.emulator as e; p = e.Playground(); print(p.process_id, flush=1); time.sleep(9)"
+    program = (
+        "import time\nfrom realitygap.families.thymio import Playground\n"
+        "p = Playground(); print(p.process_id, flush=1); time.sleep(9)"
+    )
     with subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True) as starter:
         number = int(starter.stdout.readline())
         os.kill(number, 0)

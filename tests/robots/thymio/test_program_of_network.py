@@ -9,8 +9,8 @@ from realitygap.errors import ControllerError
 from realitygap.evolution import ControllerInterface, Network, to_aseba
 from realitygap.evolution._aseba import FULL_SPEED, GROUND_BLACK, GROUND_WHITE, MOST_WORDS, READING_MAX
 from realitygap.evolution._fixed_point import ONE, SATURATED, errors, fixed_point, tangent
-from realitygap.robots.thymio import Thymio, _robot
-from realitygap.robots.thymio._robot import FULL_SCALE
+from realitygap.families.thymio import Thymio, _robot
+from realitygap.families.thymio._robot import FULL_SCALE
 
 from ...evolution.test_export import IDS, KINDS, evolved
 from . import aseba

@@ -8,11 +8,11 @@ from serial.tools import list_ports
 from typer.testing import CliRunner
 
 from realitygap.cli._robot import robot
-from realitygap.emulator import Playground, why_not
 from realitygap.errors import RobotError
-from realitygap.robots import open_on
-from realitygap.robots._families import split_port
-from realitygap.robots.thymio._ports import label_of
+from realitygap.families.thymio import Playground
+from realitygap.families.thymio._ports import label_of
+from realitygap.families.thymio.playground._playground import why_not
+from realitygap.robots import open_on, split_port
 
 
 def device(name, vendor, product):

@@ -6,10 +6,10 @@ from types import SimpleNamespace
 import pytest
 
 from realitygap.errors import RobotError, RobotTimeout
+from realitygap.families.thymio import Thymio, _clock, _link, _robot
+from realitygap.families.thymio._link import Description, Link
+from realitygap.families.thymio._messages import Kind, Message
 from realitygap.robots import Command
-from realitygap.robots.thymio import Thymio, _clock, _link, _robot
-from realitygap.robots.thymio._link import Description, Link
-from realitygap.robots.thymio._messages import Kind, Message
 
 from ..peers import BufferPort, Wire
 from .peers import EVENTS, FIRST_FREE, LEFT, OFFSETS, PROX, VARIABLES, FakePort, FakeThymio, text

@@ -11,9 +11,15 @@ from starlette.requests import Request
 from realitygap.lab._hand import Hand
 from realitygap.lab._lab import Lab, Visitor
 from realitygap.lab._pace import duration
-from realitygap.platforms import emulated_robots
-from realitygap.robots import list_ports
-from realitygap.robots.scribbler import PortGuess
+from realitygap.robot_families import (
+    Reading,
+    RobotFamily,
+    default_family,
+    find_family,
+    ports_in_words,
+    robot_families,
+)
+from realitygap.robots import PortGuess, list_ports, split_port
 
 from ._fields import Form
 from ._frame import framed, hint, section, visitor_of
@@ -24,29 +30,11 @@ from ._part import Part, watching
 
 LIVE_S = 0.05
 """Time between two updates of the readings [s]."""
-EMULATED = "emulator://s2?fluke=2"
-THYMIO = "thymio:emulator://playground"
-_Sensor = tuple[str, str, float]
-"""Name of a sensor, its range in words, and its largest reading."""
-_RANGE: dict[int, tuple[_Sensor, ...]] = {
-    3: tuple((f"{place} obstacle", "0 to 6400", 6400.0) for place in ("Left", "Center", "Right")),
-    2: tuple((f"{place} infrared", "0 or 1", 1.0) for place in ("Left", "Right")),
-    7: tuple(
-        (f"{place} infrared", "0 to 4505", 4505.0)
-        for place in ("Left", "Center left", "Center", "Center right", "Right", "Rear left", "Rear right")
-    ),
-}
-"""Range sensors of a robot by their number: a Scribbler with a Fluke, one without, and a Thymio."""
 _DOING = {  # shown meanwhile: over Bluetooth, a picture takes seconds
     "preflight": "Running the pre-flight…",
     "picture": "Taking a picture…",
     "place": "Putting the robot at its start…",
 }
-_LIGHT = tuple(
-    (f"{place} light", "0 bright to 65,535 dark", 65_535.0) for place in ("Left", "Center", "Right")
-)
-_LINE = tuple((f"{place} line", "1 on dark floor", 1.0) for place in ("Left", "Right"))
-_GROUND = tuple((f"{place} ground", "0 dark to 1023 bright", 1023.0) for place in ("Left", "Right"))
 
 
 class DrivePad(Element, component="drive_pad.js"):
@@ -69,24 +57,24 @@ def add_robot(lab: Lab) -> None:
     @ui.page("/robot", response_timeout=30)
     async def robot(request: Request) -> None:
         ports = await run.io_bound(list_ports)
-        has_playground = await run.io_bound(_has_playground)
+        families = await run.io_bound(_emulated_families)
         with framed(lab, "Robot", "/robot", is_wide=True):
-            _Page(lab, visitor_of(request), ports or [], has_playground=bool(has_playground)).show()
+            _Page(lab, visitor_of(request), ports or [], families or []).show()
 
 
-def _has_playground() -> bool:
-    """Return whether an emulated Thymio can be started here."""
-    from realitygap.emulator import why_not  # takes a moment, and only this page needs it
-
-    return not why_not()
+def _emulated_families() -> list[RobotFamily]:
+    """Return the families with an emulated robot that can be started here; the default one first."""
+    return [family for family in robot_families() if not family.lack()]
 
 
 class _Page:
-    def __init__(self, lab: Lab, visitor: Visitor, ports: list[PortGuess], *, has_playground: bool) -> None:
+    def __init__(
+        self, lab: Lab, visitor: Visitor, ports: list[PortGuess], families: list[RobotFamily]
+    ) -> None:
         self._lab = lab
         self._visitor = visitor
         self._ports = ports
-        self._has_playground = has_playground
+        self._families = families
         self._n_shown = -1
         self._n_points = 0
         self._pad: DrivePad | None = None
@@ -161,14 +149,9 @@ class _Page:
                 ui.button("Retry", on_click=lambda: attempt(lambda: self._connect(last.port))).props(
                     "unelevated no-caps"
                 )
-            ui.button(
-                "Use an emulated robot", on_click=lambda: attempt(lambda: self._connect(EMULATED))
-            ).props(f"{'outline' if is_failed else 'unelevated'} no-caps")
-            if self._has_playground:
-                ui.button(
-                    "Use an emulated Thymio", on_click=lambda: attempt(lambda: self._connect(THYMIO))
-                ).props("outline no-caps")
-        hint("The emulated robot is a Scribbler in a simulated arena. It needs no hardware.")
+            for family in self._families:
+                self._show_emulated(family, is_failed=is_failed)
+        hint(f"The emulated robot is a {default_family().noun} in a simulated arena. It needs no hardware.")
         section("Ports of this computer")
         if not self._ports:
             hint("No serial ports found. Plug in or pair the robot, then reload the page.")
@@ -185,8 +168,7 @@ class _Page:
             form.text(
                 "port",
                 "Port",
-                explanation="For example /dev/rfcomm0, COM3, socket://HOST:PORT, or thymio:/dev/ttyACM0. Emulated "
-                f"robots: {', '.join(emulated_robots())}.",
+                explanation=f"For example {ports_in_words()}.",
                 is_needed=True,
             )
             form.text(
@@ -199,6 +181,15 @@ class _Page:
                 self._connect(values["port"], values["witness"])
 
             ui.button("Connect", on_click=lambda: form.submit(connect)).props("unelevated no-caps")
+
+    def _show_emulated(self, family: RobotFamily, *, is_failed: bool) -> None:
+        """Show the button that connects to an emulated robot of a family."""
+        noun = "robot" if family.is_default else family.noun
+        port = family.as_typed(family.emulated)
+        look = "unelevated" if family.is_default and not is_failed else "outline"
+        ui.button(f"Use an emulated {noun}", on_click=lambda: attempt(lambda: self._connect(port))).props(
+            f"{look} no-caps"
+        )
 
     def _show_port(self, guess: PortGuess) -> None:
         port = guess.port
@@ -251,8 +242,9 @@ class _Page:
                     ).classes("lab-sketch")
                 section("Sensors")
                 self._motion = ui.label("Standing").props('role="status"')
-                line = _GROUND if hand.n_sensors == 7 else _LINE
-                kinds = {"raw": _RANGE.get(hand.n_sensors, ()), "light": _LIGHT, "line": line}
+                family = find_family(split_port(hand.port)[0]) or default_family()
+                kinds: dict[str, tuple[Reading, ...]] = {"raw": family.range_readings.get(hand.n_sensors, ())}
+                kinds |= family.channel_readings
                 for kind, sensors in kinds.items():
                     if kind == "raw" or kind in hand.more:
                         with ui.element("div").classes("lab-gauges"):

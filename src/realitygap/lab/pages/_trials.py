@@ -16,8 +16,8 @@ from realitygap.lab._lab import Lab, Visitor
 from realitygap.lab._photos import Photos
 from realitygap.lab._study_job import StudyJob
 from realitygap.report import measure_agreement
-from realitygap.robots import list_ports
-from realitygap.robots.scribbler import PortGuess
+from realitygap.robot_families import default_family
+from realitygap.robots import PortGuess, list_ports
 
 from ._counting import Counting
 from ._driving import Driving
@@ -31,7 +31,6 @@ from ._questions import show_question
 from ._steps import show_steps
 from ._videos import Videos
 
-EMULATED = "emulator://s2?fluke=2"
 """Emulated robot of a study whose platform has none."""
 _STEPS = ("Place", "Drive", "Score", "Close")
 _STEP_OF = {"settle": "Drive", "go on": "Drive", "score": "Score", "close": "Close"}
@@ -92,7 +91,7 @@ class _Page:
         self._is_looking = self._is_shown = False
         self._can_begin: _Beginning | None = None
         self._agreement = ""
-        self._emulated = counts.emulated_robot or EMULATED
+        self._emulated = counts.emulated_robot or default_family().emulated
 
     async def show(self) -> None:
         await self._load()

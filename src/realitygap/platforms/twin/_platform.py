@@ -80,7 +80,7 @@ class TwinPlatform(Platform):
     @property
     def outline_words(self) -> str:
         """The origin of the outline in figures, for their captions."""
-        return "the box that holds a Scribbler’s, and the sensors are that robot’s: the twin’s own are in its file"
+        return "the box around the paper’s robot, and the sensors are that robot’s: the twin’s own are in its file"
 
     def identified(self) -> Self:
         """Return the platform with the hash of its file.

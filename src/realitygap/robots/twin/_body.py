@@ -28,7 +28,7 @@ AT_REST = 1e-4  # speed of a wheel that has come to rest [m/s]
 class TwinBody:
     """A twin that the emulator moves, in the Scribbler's frame: the end without the caster is ahead.
 
-    It has the interface of `realitygap.emulator.SimulatedRobot` and the optional parts of a body: infrared, battery,
+    It has the interface of a simulated robot behind an emulator, and the optional parts of a body: infrared, battery,
     noise. The firmware sets the steps of speed, so `motors.stepped` and `step_s` have no effect.
 
     Args:

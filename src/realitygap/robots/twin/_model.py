@@ -19,7 +19,7 @@ Offset = Annotated[float, Field(ge=-0.5, le=0.5)]
 Angle = Annotated[float, Field(ge=-6.3, le=6.3)]
 
 # The Scribbler's shell from above, the end with the Fluke ahead, before it is grown by the radius of its corners.
-# Source: as in world/robots/scribbler-s1.toml, turned half round.
+# Source: as in scribbler-s1.toml, turned half round.
 SHELL = (
     *((0.079, 0.0455), (0.063, 0.0615), (0.047, 0.0695), (-0.047, 0.0695), (-0.079, 0.0535)),
     *((-0.079, -0.0535), (-0.047, -0.0695), (0.047, -0.0695), (0.063, -0.0615), (0.079, -0.0455)),

@@ -1,0 +1,77 @@
+"""The Parallax Scribbler (S1, S2, S3), alone or with a Fluke (1, 2), over its serial or Bluetooth port.
+
+`_codec` converts values to bytes and back, `_reading` reads an answer, and `_link` owns the port and recovers from
+lost bytes. Wheels, sensors, sound and light, identity, camera, functions of an S2 only, and further functions of the
+Fluke have a file each. `_robot` combines them and meets the contract. `emulator` is the robot for real client programs.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from realitygap.robot_families import Reading, RobotFamily
+
+if TYPE_CHECKING:
+    from ._codec import Blob, MotorStats, SensorBlock
+    from ._device import RobotInfo
+    from ._link import Exchange, Faults
+    from ._platform import ScribblerPlatform
+    from ._ports import find_ports, label_of
+    from ._robot import Scribbler
+
+_HOME = {
+    "Blob": "._codec",
+    "Exchange": "._link",
+    "Faults": "._link",
+    "MotorStats": "._codec",
+    "RobotInfo": "._device",
+    "Scribbler": "._robot",
+    "ScribblerPlatform": "._platform",
+    "SensorBlock": "._codec",
+    "find_ports": "._ports",
+    "label_of": "._ports",
+}
+
+FAMILY = RobotFamily(
+    name="scribbler",
+    noun="Scribbler",
+    package=__name__,
+    platforms={"scribbler": f"{__name__}._platform:ScribblerPlatform"},
+    terminal=f"{__name__}._terminal",
+    ports=("/dev/rfcomm0", "COM3", "socket://HOST:PORT"),
+    emulated="emulator://s2?fluke=2",
+    emulators=dict.fromkeys(("s1", "s2"), f"{__name__}.emulator._port:ScribblerPort"),
+    emulate=f"{__name__}._emulate:emulate",
+    robot="scribbler-s2-fluke2",
+    additions=(("fluke1", "fluke2"), ("cardboard",)),
+    range_readings={
+        3: tuple(Reading(f"{side} obstacle", "0 to 6400", 6400.0) for side in ("Left", "Center", "Right")),
+        2: tuple(Reading(f"{side} infrared", "0 or 1", 1.0) for side in ("Left", "Right")),
+    },
+    channel_readings={
+        "light": tuple(
+            Reading(f"{side} light", "0 bright to 65,535 dark", 65_535.0)
+            for side in ("Left", "Center", "Right")
+        ),
+        "line": tuple(Reading(f"{side} line", "1 on dark floor", 1.0) for side in ("Left", "Right")),
+    },
+    is_default=True,
+)
+
+__all__ = [
+    "Blob",
+    "Exchange",
+    "Faults",
+    "MotorStats",
+    "RobotInfo",
+    "Scribbler",
+    "ScribblerPlatform",
+    "SensorBlock",
+    "find_ports",
+    "label_of",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(_HOME[name], __name__), name)

@@ -1,0 +1,77 @@
+"""The Thymio II, driven over its own protocol (Aseba). It was tried on Aseba's playground, never on a robot.
+
+`playground` starts that simulator, and `enki` is its engine alone, as a platform.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from realitygap.robot_families import Reading, RobotFamily
+
+if TYPE_CHECKING:
+    from ._platform import ThymioPlatform
+    from ._ports import find_ports
+    from ._robot import Thymio, ThymioInfo
+    from .enki._build import build_enki, harness_path
+    from .enki._platform import EnkiPlatform
+    from .playground._playground import Playground
+    from .playground._port import open_playground
+
+_HOME = {
+    "EnkiPlatform": ".enki._platform",
+    "Playground": ".playground._playground",
+    "Thymio": "._robot",
+    "ThymioInfo": "._robot",
+    "ThymioPlatform": "._platform",
+    "build_enki": ".enki._build",
+    "find_ports": "._ports",
+    "harness_path": ".enki._build",
+    "open_playground": ".playground._port",
+}
+
+FAMILY = RobotFamily(
+    name="thymio",
+    noun="Thymio",
+    package=__name__,
+    platforms={
+        "thymio": f"{__name__}._platform:ThymioPlatform",
+        "enki": f"{__name__}.enki._platform:EnkiPlatform",
+    },
+    terminal=f"{__name__}._terminal",
+    ports=("/dev/ttyACM0", "socket://HOST:PORT"),
+    emulated="emulator://playground",
+    emulators={"playground": f"{__name__}.playground._port:PlaygroundPort"},
+    emulate=f"{__name__}._emulate:emulate",
+    lacks=f"{__name__}.playground._playground:why_not",
+    builds={"enki": f"{__name__}.enki._build:build_enki"},
+    robot="thymio",
+    range_readings={
+        7: tuple(
+            Reading(f"{place} infrared", "0 to 4505", 4505.0)
+            for place in ("Left", "Center left", "Center", "Center right", "Right", "Rear left", "Rear right")
+        )
+    },
+    channel_readings={
+        "line": tuple(
+            Reading(f"{side} ground", "0 dark to 1023 bright", 1023.0) for side in ("Left", "Right")
+        )
+    },
+)
+
+__all__ = [
+    "EnkiPlatform",
+    "Playground",
+    "Thymio",
+    "ThymioInfo",
+    "ThymioPlatform",
+    "build_enki",
+    "find_ports",
+    "harness_path",
+    "open_playground",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(_HOME[name], __name__), name)

@@ -7,7 +7,7 @@ from abc import ABC, abstractmethod
 import numpy as np
 from numpy.typing import NDArray
 
-from realitygap.world import Arena, Pose
+from realitygap.world import Arena, Pose, cells_along
 
 
 class EmulatedRobot(ABC):
@@ -75,22 +75,29 @@ class EmulatedRobot(ABC):
         return any(self.wheel_speeds())
 
     @property
-    @abstractmethod
     def pose(self) -> Pose:
         """Pose of its pen."""
+        return Pose(*self._points[-1][1:])
 
-    @abstractmethod
     def place(self, pose: Pose, seed: int) -> None:
-        """Place the robot at a pose with its motors off; the pen's path and the sensors' noise restart."""
+        """Place the robot at a pose; the pen's path restarts.
+
+        Override it to turn the motors off, and to restart the sensors' noise with the seed.
+        """
+        self._points = [(self.now, *map(float, pose))]
+
+    def move_to(self, pose: Pose) -> None:
+        """Add the present pose to the pen's path."""
+        self._points.append((self.now, *pose))
 
     @abstractmethod
     def wheel_speeds(self) -> tuple[float, float]:
         """Return the speeds of the left and the right wheel [m/s]."""
 
-    @abstractmethod
     def path(self) -> NDArray[np.float64]:
         """Return time [s], x [m], y [m] and heading [rad] of the pen since it was placed, (t, 4)."""
+        return np.array(self._points, dtype=float)
 
-    @abstractmethod
     def cells(self) -> tuple[int, ...]:
         """Return cells of the arena's grid along the driven line, in order of first visits."""
+        return cells_along(self.path()[:, 1:3], self.arena.grid)

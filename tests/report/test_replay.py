@@ -57,7 +57,8 @@ def test_the_typical_run_of_each_condition_is_embedded_whole(tiny):
         assert [tuple(trial[:2]) for trial in condition["trials"]] == rows.select(
             "generation", "individual"
         ).rows()
-        n_cells = condition["grid"][3] * condition["grid"][4]
+        grid = condition["scene"]["grid"]
+        n_cells = grid["columns"] * grid["rows"]
         assert [trial[2] / n_cells for trial in condition["trials"]] == rows["coverage_line"].to_list()
         assert [trial[3] / n_cells for trial in condition["trials"]] == rows["coverage_ends"].to_list()
 

@@ -9,7 +9,7 @@ from ._live import Page, WatchedRobot
 from ._movie import WIDTH, save_movie
 from ._moving import MovingTrial, RobotShape, first_visits, in_motion, placed, ray_ends
 from ._panel import DrivePanel, WorldPanel
-from ._player import pack_scene, pack_trials, play
+from ._player import pack_pen, pack_scene, pack_shape, pack_trials, play
 from ._twin import TwinDrive, save_twin_trial, wander
 
 __all__ = [
@@ -26,7 +26,9 @@ __all__ = [
     "in_motion",
     "measure_divergence",
     "own_divergence",
+    "pack_pen",
     "pack_scene",
+    "pack_shape",
     "pack_trials",
     "placed",
     "play",

@@ -42,25 +42,25 @@ class Divergence:
         return int(self.distance.shape[1]) - 1
 
 
-def measure_divergence(one: Sequence[Posed], other: Sequence[Posed]) -> Divergence:
-    """Measure the divergence of each trial of `one` from its counterpart in `other`, after each step that all have.
+def measure_divergence(first: Sequence[Posed], second: Sequence[Posed]) -> Divergence:
+    """Measure the divergence of each trial of `first` from its counterpart in `second`, after each step that all have.
 
     A step is one command on every platform, whatever time it lasts there, so trials are compared by steps.
 
     Args:
-        one: n trials.
-        other: n trials, each compared with one of `trials`.
+        first: n trials.
+        second: n trials, in the order of `first`.
 
     Raises:
-        ValueError: There is none, or there are more of the one than of the other.
+        ValueError: There is none, or their numbers differ.
     """
-    if not one or len(one) != len(other):
+    if not first or len(first) != len(second):
         raise ValueError(
-            f"There are {len(one)} trials beside {len(other)}, expected as many of both, and at least one."
+            f"There are {len(first)} trials beside {len(second)}, expected as many of both, and at least one."
         )
-    n_rows = min(len(trial.poses) for trial in (*one, *other))
-    first, second = (np.array([trial.poses[:n_rows] for trial in trials]) for trials in (one, other))
-    apart = second - first
+    n_rows = min(len(trial.poses) for trial in (*first, *second))
+    poses = [np.array([trial.poses[:n_rows] for trial in trials]) for trials in (first, second)]
+    apart = poses[1] - poses[0]
     turned = np.abs(apart[..., 2] - math.tau * np.rint(apart[..., 2] / math.tau))
     return Divergence(np.hypot(apart[..., 0], apart[..., 1]), turned)
 

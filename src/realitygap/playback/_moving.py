@@ -162,16 +162,13 @@ class MovingTrial(ShownAsCard):
     def at(self, time: float) -> Moment:
         """Return the state at a time since the start [s], interpolated between steps, and the last state afterwards."""
         last = len(self.poses) - 1
-        place = min(max(time / self.step_s * self.parts, 0.0), float(last))
-        row = min(math.floor(place + 1e-9), last)
-        share, onward = max(place - row, 0.0), min(row + 1, last)
-        here, there = self.poses[row], self.poses[onward]
-        turn = math.remainder(there[2] - here[2], math.tau)
-        pose = (
-            float(here[0] + share * (there[0] - here[0])),
-            float(here[1] + share * (there[1] - here[1])),
-            float(here[2] + share * turn),
-        )
+        exact_row = min(max(time / self.step_s * self.parts, 0.0), float(last))
+        row = min(math.floor(exact_row + 1e-9), last)
+        share, onward = max(exact_row - row, 0.0), min(row + 1, last)
+        x, y, heading = self.poses[row].tolist()
+        next_x, next_y, next_heading = self.poses[onward].tolist()
+        turn = math.remainder(next_heading - heading, math.tau)
+        pose = (x + share * (next_x - x), y + share * (next_y - y), heading + share * turn)
         rays = self.rays[row] + share * (self.rays[onward] - self.rays[row])
         n_cells = int(np.searchsorted(self.visited_at, row, "right"))
         return Moment(row, row // self.parts, pose, rays, bool(self.stalled[row]), n_cells)

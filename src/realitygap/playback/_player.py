@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Sequence
 from functools import cache
 from importlib import import_module, resources
-from typing import Any
+from typing import Any, TypedDict
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from realitygap.drawing import PENS, Disc, Ink, Line, Shape, theme_rules, themed
 from realitygap.errors import RealityGapError
 from realitygap.world import Arena, floor_shapes, things_in
 
-from ._moving import MovingTrial, all_trials, extent
+from ._moving import MovingTrial, RobotShape, all_trials, extent
 from ._screen import LETTERS, MOST_TRIALS
 
 _DIGITS = 4
@@ -56,7 +56,9 @@ def check_speed(speed: float) -> float:
     """
     speeds = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0)
     if speed not in speeds:
-        raise ValueError(f"speed is {speed:g}, expected one of {', '.join(f'{each:g}' for each in speeds)}.")
+        raise ValueError(
+            f"speed is {speed:g}, expected one of {', '.join(f'{choice:g}' for choice in speeds)}."
+        )
     return float(speed)
 
 
@@ -110,13 +112,13 @@ def pack_scene(arena: Arena | None, title: str) -> dict[str, Any]:
     return {
         "title": title,
         "extent": [round(float(end), _DIGITS) for end in extent(arena)],
-        "shapes": [_pack_shape(shape) for shape in (*floor_shapes(arena.floor), *things_in(arena))],
+        "shapes": [_pack_thing(shape) for shape in (*floor_shapes(arena.floor), *things_in(arena))],
         "walls": [list(wall) for wall in arena.walls],
         "grid": {"x": grid.x, "y": grid.y, "cell": grid.cell, "columns": grid.columns, "rows": grid.rows},
     }
 
 
-def _pack_shape(shape: Shape) -> dict[str, Any]:
+def _pack_thing(shape: Shape) -> dict[str, Any]:
     """Return a plain shape of an object in the arena, ready for JSON."""
     if isinstance(shape, Line):
         points = [[round(x, _DIGITS), round(y, _DIGITS)] for x, y in shape.points]
@@ -148,13 +150,10 @@ def pack_trials(trials: Sequence[MovingTrial], *, placed: bool = True) -> list[d
         {
             "title": trial.title,
             "label": trial.label,
-            "letter": LETTERS[pen],
-            "color": themed_color(PENS[pen][0] if len(trials) > 1 else Ink.OURS),
-            "dashes": list(PENS[pen][1]) if len(trials) > 1 else [],
             "placed": placed,
-            "outlines": [[list(corner) for corner in outline] for outline in trial.shape.outlines],
-            "mounts": [list(mount) for mount in trial.shape.mounts],
-            "reach": list(trial.shape.reach),
+            **pack_pen(pen),
+            **({} if len(trials) > 1 else {"color": themed_color(Ink.OURS)}),
+            **pack_shape(trial.shape),
             "step_s": trial.step_s,
             "parts": trial.parts,
             "poses": np.round(trial.poses, _DIGITS).tolist(),
@@ -165,6 +164,37 @@ def pack_trials(trials: Sequence[MovingTrial], *, placed: bool = True) -> list[d
         }
         for pen, trial in enumerate(trials)
     ]
+
+
+class PackedPen(TypedDict):
+    """Letter, color, and dashes [pt] of a trial on a page."""
+
+    letter: str
+    color: str
+    dashes: list[float]
+
+
+class PackedShape(TypedDict):
+    """The drawn shape of a robot on a page; see `RobotShape`."""
+
+    outlines: list[list[list[float]]]
+    mounts: list[list[float]]
+    reach: list[float]
+
+
+def pack_pen(pen: int) -> PackedPen:
+    """Return the letter, the color, and the dashes [pt] of the trial with a pen, ready for JSON."""
+    color, dashes = PENS[pen]
+    return {"letter": LETTERS[pen], "color": themed_color(color), "dashes": list(dashes)}
+
+
+def pack_shape(shape: RobotShape) -> PackedShape:
+    """Return the drawn shape of a robot, ready for JSON."""
+    return {
+        "outlines": [[list(corner) for corner in outline] for outline in shape.outlines],
+        "mounts": [list(mount) for mount in shape.mounts],
+        "reach": list(shape.reach),
+    }
 
 
 def pack_rays(lengths: Iterable[float]) -> list[float | None]:

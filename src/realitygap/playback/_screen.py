@@ -61,10 +61,10 @@ def paler(color: str, share: float) -> tuple[int, int, int]:
     return red, green, blue
 
 
-def _mixed(one: str, other: str, share: float) -> tuple[float, float, float]:
+def _mixed(start: str, end: str, share: float) -> tuple[float, float, float]:
     """Return a color between two, 0 to 1."""
     red, green, blue = (
-        (first + share * (second - first)) / 255 for first, second in zip(rgb(one), rgb(other), strict=True)
+        (first + share * (second - first)) / 255 for first, second in zip(rgb(start), rgb(end), strict=True)
     )
     return red, green, blue
 
@@ -374,10 +374,10 @@ class _Robot:
         ends: NDArray[np.float64] = ray_ends(trial.shape, moment)
         colors = [ray_color(float(share)) for share in near]
         self._rays.set_segments(list(ends[known]))
-        self._rays.set_color([color for color, there in zip(colors, known, strict=True) if there])
+        self._rays.set_color([color for color, is_known in zip(colors, known, strict=True) if is_known])
         meets = known & (near > 0)
         self._hits.set_segments([[end, end + _DOT] for end in ends[meets, 1]])
-        self._hits.set_color([color for color, there in zip(colors, meets, strict=True) if there])
+        self._hits.set_color([color for color, is_met in zip(colors, meets, strict=True) if is_met])
 
     def move_letter(self, place: NDArray[np.float64]) -> None:
         """Put its letter at a place in the arena [m]."""

@@ -123,8 +123,8 @@ def _from_above(trial: TwinDrive) -> MovingTrial:
         seen.append(robot.observe())
         poses.append(robot.pose)
     shape = RobotShape.of(robot.platform) if isinstance(robot, SimTwin) else _shape(trial.model)
-    rays = np.array(shape.reach) * (1 - np.array([one.readings for one in seen]))
-    stalled = np.array([one.stalled for one in seen], np.bool_)
+    rays = np.array(shape.reach) * (1 - np.array([observation.readings for observation in seen]))
+    stalled = np.array([observation.stalled for observation in seen], np.bool_)
     return MovingTrial.of_rows(
         trial.title, "TWIN", trial.arena, shape, robot.step_s, np.array(poses), rays, stalled
     )
@@ -162,6 +162,6 @@ def _save_filmed(trial: TwinDrive, path: Path, camera: TwinCamera, speed: float)
     wanted = np.linspace(0.0, times[-1], max(1, round(shown_s / period_s)) + 1)
     rows = np.minimum(np.searchsorted(times, wanted), len(times) - 1)
     pictures = [Image.fromarray(camera.picture(Pose(*points[row].tolist()))) for row in rows]
-    said = f"realitygap: TWIN, {trial.title}"
-    write_whole(path, video_of(encoder, pictures) if encoder else gif_of(pictures, shown_s, said))
+    comment = f"realitygap: TWIN, {trial.title}"
+    write_whole(path, video_of(encoder, pictures) if encoder else gif_of(pictures, shown_s, comment))
     return path

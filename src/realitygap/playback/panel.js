@@ -116,16 +116,16 @@ function render({ model, el }) {
   }
   function readGamepad() {
     if (!gamepad.checked) return;
-    const found = [...navigator.getGamepads()].find((each) => each && each.connected);
-    if (!found) {
+    const connected = [...navigator.getGamepads()].find((candidate) => candidate && candidate.connected);
+    if (!connected) {
       if (held === "gamepad") release();
       status.textContent = lost ? status.textContent : "No gamepad yet. Connect one, and press one of its buttons.";
       return;
     }
-    if (!lost) status.textContent = `Gamepad: ${found.id}`;
-    const [x = 0, y = 0] = [...found.axes].map((value) => (Math.abs(value) < DEAD_ZONE ? 0 : value));
+    if (!lost) status.textContent = `Gamepad: ${connected.id}`;
+    const [x = 0, y = 0] = [...connected.axes].map((value) => (Math.abs(value) < DEAD_ZONE ? 0 : value));
     if (!x && !y) parked = false;
-    if (found.buttons.some((each) => each.pressed)) {
+    if (connected.buttons.some((button) => button.pressed)) {
       parked = true; // until the stick was in its middle
       release();
     } else if ((x || y) && !parked && document.hasFocus()) hold("gamepad", -y, -x);

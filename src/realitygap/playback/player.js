@@ -1,43 +1,46 @@
-// Trials in motion below a notebook's cell: one module, which fetches nothing.
+// Trials in motion, on three pages: a report, a lab, and below a notebook's cell. It fetches nothing.
 //
-// `scene` says what stands still, `trials` what happened in each trial (row 0 is the start, `parts` rows a step), and
-// while `live` is true messages say where a robot is now. Lengths are meters, angles radians, times seconds.
+// A scene is an arena with its extent, cells, and walls. A trial has poses, rays, and stalls, of which row 0 is the start
+// and `parts` rows are a step, and the cells that it visits, each at a row. Lengths are meters, angles radians, times
+// seconds. A notebook and a lab give `render` a model; a report's page goes on with a script of its own.
 
-const NS = "http://www.w3.org/2000/svg";
 const MM = 1000;
 const SPEEDS = [0.25, 0.5, 1, 2, 4, 8];
-const FAN = 0.042; // around a robot's middle, where several letters would stand on one spot, as a part of the width
+const FAN = 48; // from a robot's middle to its letter, if another robot is nearer than that [mm]
+const PLAY = "M4 2.5v11L13 8z", PAUSE = "M3.5 2.5h3.2v11H3.5zM9.3 2.5h3.2v11H9.3z";
+const still = window.matchMedia("(prefers-reduced-motion: reduce)");
 
-const make = (name, attributes = {}, parent = null) => {
-  const element = document.createElementNS(NS, name);
+function make(name, attributes = {}, parent = null) {
+  const element = document.createElementNS("http://www.w3.org/2000/svg", name);
   for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
   if (parent) parent.append(element);
   return element;
-};
-const tag = (name, attributes = {}, text = "") => {
+}
+function tag(name, text = "", attributes = {}) {
   const element = document.createElement(name);
-  for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
   element.textContent = text;
+  for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
   return element;
-};
+}
 const short = (value) => value.toFixed(1);
-const share = (value) => value.toFixed(3).replace(/^0/, "");
-
-// colors of the style sheet, which follow the theme
-
-const mixed = (one, other, part) => `color-mix(in srgb, var(--rg-${other}) ${(100 * part).toFixed(1)}%, var(--rg-${one}))`;
-function rayColor(near) {
-  if (near <= 0) return "var(--rg-far)";
-  return near < 0.5 ? mixed("far", "middle", 2 * near) : mixed("middle", "near", 2 * near - 1);
+const dashesOf = (trial) => trial.dashes.map((part) => part * 1.5).join(" ");
+function onResize(element, listener) {
+  const observer = new ResizeObserver(listener);
+  observer.observe(element);
+  return observer;
 }
 
 // where a robot is
 
 // how many entries of a rising list are <= row
 function reached(rows, row) {
-  let n = 0;
-  while (n < rows.length && rows[n] <= row) n += 1;
-  return n;
+  let low = 0, high = rows.length;
+  while (low < high) {
+    const middle = (low + high) >> 1;
+    if (rows[middle] <= row) low = middle + 1;
+    else high = middle;
+  }
+  return low;
 }
 
 function turnedTo(from, to) {
@@ -45,318 +48,367 @@ function turnedTo(from, to) {
   return turn - 2 * Math.PI * Math.round(turn / (2 * Math.PI));
 }
 
-// a trial at a time; straight on between rows, and at the end afterwards
-function momentOf(trial, time, smooth) {
-  const last = trial.poses.length - 1;
-  const place = Math.min(Math.max((time / trial.step_s) * trial.parts, 0), last);
-  const row = Math.min(Math.floor(place + 1e-9), last), onward = Math.min(row + 1, last);
-  const part = smooth ? Math.max(place - row, 0) : 0;
-  const [x, y, heading] = trial.poses[row], next = trial.poses[onward];
-  const rays = trial.rays[row].map((value, k) => (value === null || trial.rays[onward][k] === null ? value : value + part * (trial.rays[onward][k] - value)));
+const between = (from, to, part) => [from[0] + part * (to[0] - from[0]), from[1] + part * (to[1] - from[1]), from[2] + part * turnedTo(from[2], to[2])];
+const nRows = (trial) => trial.poses.length - 1;
+const nSteps = (trial) => Math.floor(nRows(trial) / trial.parts);
+
+// a trial at a time; straight on between rows, unless motion is reduced, and at the end afterwards
+function momentOf(trial, time) {
+  const row = Math.min(Math.max((time / trial.step_s) * trial.parts, 0), nRows(trial));
+  const first = Math.floor(row + 1e-9), next = Math.min(first + 1, nRows(trial)), part = still.matches ? 0 : Math.max(row - first, 0);
+  const rays = trial.rays[first].map((length, k) => (length === null || trial.rays[next][k] === null ? length : length + part * (trial.rays[next][k] - length)));
   return {
-    row, rays, step: Math.floor(row / trial.parts), stalled: Boolean(trial.stalled[row]),
-    pose: [x + part * (next[0] - x), y + part * (next[1] - y), heading + part * turnedTo(heading, next[2])],
-    nCells: reached(trial.visited_at, row),
+    row: first, rays, step: Math.floor(first / trial.parts), isStalled: Boolean(trial.stalled[first]),
+    pose: between(trial.poses[first], trial.poses[next], part), nCells: reached(trial.visited_at, first),
   };
 }
 
-// the view
+// the arena with the robots of some trials, drawn into an svg element
 
-function render({ model, el }) {
-  const calm = window.matchMedia("(prefers-reduced-motion: reduce)");
-  const root = tag("div", { class: "rg-player", role: "group", "aria-label": "Trials in motion" });
-  el.append(root);
-  let scene, trials, drawn, frame, tiles, duration, nSteps, unit;
-  let at = 0, playing = false, last = null, request = null, closed = false;
-  let live = null; // of a robot that runs: where it was and is shown, since when, and what it has done
+function rayColor(near) {
+  if (near <= 0) return "var(--rg-far)";
+  const [from, to, part] = near < 0.5 ? ["far", "middle", 2 * near] : ["middle", "near", 2 * near - 1];
+  return `color-mix(in srgb, var(--rg-${to}) ${(100 * part).toFixed(1)}%, var(--rg-${from}))`;
+}
 
-  // head: label, title, clock
-  const head = tag("div", { class: "rg-head" }), labels = tag("span"), title = tag("strong");
-  const clock = tag("span", { class: "rg-clock" });
-  head.append(labels, title, clock);
-  const svg = make("svg", { class: "rg-field", role: "img", tabindex: "0" });
-  const names = tag("div", { class: "rg-names" });
+function makeStage(svg) {
+  let scene = null, layers, tiles, drawn = [], cellsShown = "";
+  let pixel = 1; // size of a pixel in the arena [mm]
+  const toX = (x) => (x - scene.extent[0]) * MM, toY = (y) => (scene.extent[3] - y) * MM;
+  const points = (corners) => corners.map(([x, y]) => `${short(toX(x))},${short(toY(y))}`).join(" ");
 
-  // controls
-  const bar = tag("div", { class: "rg-bar" });
-  const play = tag("button", { type: "button", class: "rg-play", "aria-label": "Play trials" });
-  const slider = tag("input", { type: "range", min: "0", step: "1", value: "0", "aria-label": "Step" });
-  const speed = tag("select", { "aria-label": "Speed" });
-  for (const value of SPEEDS) speed.append(tag("option", { value: String(value) }, `${value}×`));
-  speed.value = SPEEDS.includes(model.get("speed")) ? String(model.get("speed")) : "1";
-  bar.append(play, slider, speed);
-  const shows = {};
-  for (const what of ["rays", "trails", "cells"]) {
-    const label = tag("label"), box = tag("input", { type: "checkbox" });
-    box.checked = true;
-    box.addEventListener("change", draw);
-    label.append(box, what);
-    bar.append(label);
-    shows[what] = box;
-  }
-  const status = tag("div", { class: "rg-status", role: "status" });
-  root.append(head, svg, names, bar, status);
-
-  // what stands still
-
-  function toX(x) { return (x - scene.extent[0]) * MM; }
-  function toY(y) { return (scene.extent[3] - y) * MM; }
-
-  function build() {
-    scene = model.get("scene");
-    trials = model.get("trials");
-    if (!scene.extent) return;
-    live = model.get("live") ? live || { shown: null, now: null, trail: [], cells: [], step: 0, time: 0 } : null;
-    const [left, right, bottom, top] = scene.extent;
+  function drawScene(next) {
+    if (scene === next) return;
+    scene = next;
+    const [left, right, bottom, top] = scene.extent, unit = ((right - left) * MM) / 820; // of a page that is 820 px wide
     svg.setAttribute("viewBox", `0 0 ${short((right - left) * MM)} ${short((top - bottom) * MM)}`);
     svg.replaceChildren();
-    tiles = [];
-    if (scene.grid) {
-      const { x, y, cell, columns, rows } = scene.grid, gap = 0.035 * cell;
-      for (let k = 0; k < columns * rows; k++) {
-        const column = k % columns, row = Math.floor(k / columns);
-        const attributes = { x: short(toX(x + column * cell + gap)), y: short(toY(y + (row + 1) * cell - gap)), width: short((cell - 2 * gap) * MM), height: short((cell - 2 * gap) * MM) };
-        tiles.push(make("rect", { class: "rg-tile", ...attributes }, svg));
+    const { x, y, cell, columns, rows } = scene.grid || { columns: 0, rows: 0 }, gap = 0.035 * cell, side = short((cell - 2 * gap) * MM);
+    tiles = Array.from({ length: columns * rows }, (_, k) => {
+      const across = x + (k % columns) * cell + gap, up = y + (Math.floor(k / columns) + 1) * cell - gap;
+      return make("rect", { class: "rg-tile", x: short(toX(across)), y: short(toY(up)), width: side, height: side }, svg);
+    });
+    const cells = make("g", {}, svg);
+    for (const shape of scene.shapes || []) {
+      if (shape.points) {
+        make("polyline", { class: "rg-shape", points: points(shape.points), fill: shape.fill, stroke: shape.stroke, "stroke-width": shape.width, "stroke-dasharray": shape.dash.join(" ") }, svg);
+      } else if (shape.text) {
+        make("text", { class: "rg-word", x: short(toX(shape.x)), y: short(toY(shape.y) - shape.up * 1.4 * unit), fill: shape.fill, "font-size": short(11 * unit) }, svg).textContent = shape.text;
+      } else {
+        make("circle", { cx: short(toX(shape.x)), cy: short(toY(shape.y)), r: short(shape.radius * 1.4 * unit), fill: shape.fill }, svg);
       }
     }
-    unit = ((right - left) * MM) / 820; // of a page that is 820 px wide
-    for (const shape of scene.shapes || []) buildShape(shape);
     const walls = (scene.walls || []).map(([x1, y1, x2, y2]) => `M${short(toX(x1))} ${short(toY(y1))}L${short(toX(x2))} ${short(toY(y2))}`);
     make("path", { class: "rg-walls", d: walls.join("") }, svg);
-    frame = { trails: make("g", {}, svg), robots: make("g", {}, svg), letters: make("g", {}, svg) };
-    drawn = trials.map(buildRobot);
-    labels.replaceChildren(...[...new Set(trials.map((trial) => trial.label))].map((label) => tag("span", { class: `rg-label rg-${label.toLowerCase()}` }, label)));
-    title.textContent = scene.title;
-    names.replaceChildren(...(trials.length > 1 ? drawn.map((part) => part.line) : []));
-    duration = Math.max(0, ...trials.map((trial) => ((trial.poses.length - 1) / trial.parts) * trial.step_s));
-    nSteps = Math.max(...trials.map((trial) => Math.floor((trial.poses.length - 1) / trial.parts)));
-    slider.max = String(Math.round(duration / oneStep())); // of the shortest steps, where they differ
-    slider.disabled = play.disabled = live !== null;
-    root.classList.toggle("rg-live", live !== null);
-    at = Math.min(at, duration);
-    draw();
+    layers = { cells, trails: make("g", {}, svg), robots: make("g", {}, svg), letters: make("g", {}, svg) };
   }
 
-  // what stands in the arena beside walls: lines and areas, discs, words
-  function buildShape(shape) {
-    if (shape.points) {
-      const points = shape.points.map(([x, y]) => `${short(toX(x))},${short(toY(y))}`).join(" ");
-      make("polyline", { class: "rg-shape", points, fill: shape.fill, stroke: shape.stroke, "stroke-width": shape.width, "stroke-dasharray": shape.dash.join(" ") }, svg);
-    } else if (shape.text) {
-      make("text", { class: "rg-word", x: short(toX(shape.x)), y: short(toY(shape.y) - shape.up * 1.4 * unit), fill: shape.fill, "font-size": short(11 * unit) }, svg).textContent = shape.text;
-    } else {
-      make("circle", { cx: short(toX(shape.x)), cy: short(toY(shape.y)), r: short(shape.radius * 1.4 * unit), fill: shape.fill }, svg);
-    }
+  // a trial's pen is its letter, color, and dashes; robots beside the first one of a trial share its pen and its cells
+  function show(next, trials) {
+    drawScene(next);
+    for (const layer of Object.values(layers)) layer.replaceChildren();
+    drawn = trials.map((trial) => {
+      const style = `--pen: ${trial.color}`, corners = trial.outlines.map((outline) => outline.map(([forward, left]) => `${short(forward * MM)},${short(-left * MM)}`).join(" "));
+      const squares = make("path", { class: "rg-square", style }, layers.cells);
+      const start = make("g", { class: "rg-start" }, layers.trails);
+      for (const outline of corners) make("polygon", { points: outline }, start);
+      start.setAttribute("transform", placed(trial.poses[0]));
+      const trail = make("polyline", { class: "rg-trail", style, "stroke-dasharray": dashesOf(trial) }, layers.trails);
+      const blocked = make("path", { class: "rg-blocked" }, layers.trails);
+      const robot = make("g", { class: "rg-robot", style, "data-pen": trial.letter }, layers.robots);
+      const rays = trial.mounts.map(([forward, left]) => make("line", { class: "rg-ray", x1: short(forward * MM), y1: short(-left * MM) }, robot));
+      for (const outline of corners) make("polygon", { class: "rg-body", points: outline }, robot);
+      const front = Math.max(...trial.outlines.flat().map(([forward]) => forward)) * MM;
+      make("path", { class: "rg-nose", d: `M${short(0.55 * front)} ${short(-0.28 * front)}L${short(0.88 * front)} 0L${short(0.55 * front)} ${short(0.28 * front)}` }, robot);
+      const hits = trial.mounts.map(() => make("circle", { class: "rg-hit", r: 0 }, robot));
+      const letter = make("text", { class: "rg-letter" }, layers.letters);
+      return { trial, squares, start, trail, blocked, robot, rays, hits, letter, row: -1, line: "", crosses: "" };
+    });
+    cellsShown = "";
+    svg.classList.toggle("rg-several", trials.length > 1);
+    measure();
   }
 
-  function buildRobot(trial) {
-    const several = trials.length > 1, style = `--pen: ${trial.color}`;
-    const trail = make("polyline", { class: "rg-trail", style, "stroke-dasharray": several ? trial.dashes.map((part) => part * 1.5).join(" ") : "" }, frame.trails);
-    const blocked = make("path", { class: "rg-blocked" }, frame.trails);
-    const robot = make("g", { class: several ? "rg-robot" : "rg-robot rg-only", style, "data-letter": trial.letter }, frame.robots);
-    const rays = trial.mounts.map(() => make("line", { class: "rg-ray" }, robot));
-    for (const outline of trial.outlines) make("polygon", { class: "rg-body", points: outline.map(([forward, left]) => `${short(forward * MM)},${short(-left * MM)}`).join(" ") }, robot);
-    const front = Math.max(...trial.outlines.flat().map(([forward]) => forward)) * MM;
-    make("path", { class: "rg-nose", d: `M${short(0.55 * front)} ${short(-0.28 * front)}L${short(0.85 * front)} 0L${short(0.55 * front)} ${short(0.28 * front)}` }, robot);
-    const hits = trial.mounts.map(() => make("circle", { class: "rg-hit", r: "0" }, robot));
-    const letter = make("g", { class: "rg-letter", style, visibility: several ? "visible" : "hidden" }, frame.letters);
-    make("circle", { r: short(12.5 * unit) }, letter);
-    make("text", { "font-size": short(16.5 * unit) }, letter).textContent = trial.letter;
-    const line = tag("span", { class: "rg-name" });
-    const swatch = make("svg", { class: "rg-swatch", viewBox: "0 0 30 8", "aria-hidden": "true" });
-    make("path", { d: "M0 4H30", stroke: trial.color, "stroke-width": "2.4", "stroke-dasharray": trial.dashes.join(" ") }, swatch);
-    const words = tag("span");
-    line.append(swatch, words);
-    return { trial, trail, blocked, robot, rays, hits, letter, line, words, points: { row: -1, text: "", crosses: "" } };
+  const placed = ([x, y, heading]) => `translate(${toX(x).toFixed(2)} ${toY(y).toFixed(2)}) rotate(${((-heading * 180) / Math.PI).toFixed(2)})`;
+
+  // letters and crosses keep their size on the screen
+  function measure() {
+    const { width, height } = svg.getBoundingClientRect();
+    if (!scene || !width) return;
+    const [left, right, bottom, top] = scene.extent;
+    pixel = MM / Math.min(width / (right - left), height / (top - bottom));
+    layers.letters.style.fontSize = `${(13 * pixel).toFixed(2)}px`;
+    layers.letters.style.strokeWidth = `${(3 * pixel).toFixed(2)}px`;
+    for (const part of drawn) part.row = Infinity;
   }
 
-  // what moves
-
-  function draw() {
-    if (!scene || !scene.extent || closed) return;
-    const moments = live ? [liveMoment()] : trials.map((trial) => momentOf(trial, at, !calm.matches));
-    drawn.forEach((part, k) => { if (moments[k]) drawRobot(part, moments[k]); });
-    drawLetters(moments);
-    drawCells(moments);
-    drawWords(moments);
-  }
-
-  function drawRobot(part, moment) {
-    const { trial } = part, [x, y, heading] = moment.pose;
-    part.robot.setAttribute("transform", `translate(${toX(x).toFixed(2)} ${toY(y).toFixed(2)}) rotate(${((-heading * 180) / Math.PI).toFixed(2)})`);
-    part.robot.classList.toggle("rg-stalled", moment.stalled);
-    const trails = shows.trails.checked && trial.placed;
-    part.trail.style.display = part.blocked.style.display = trails ? "" : "none";
-    if (trails) drawTrail(part, moment);
+  function drawRobot(part, moment, shows) {
+    const { trial } = part, hasTrail = shows.trails && trial.placed;
+    part.robot.setAttribute("transform", placed(moment.pose));
+    part.robot.classList.toggle("rg-stalled", moment.isStalled);
+    for (const element of [part.start, part.trail, part.blocked]) element.style.display = hasTrail ? "" : "none";
+    if (hasTrail) drawTrail(part, moment);
     trial.mounts.forEach(([forward, left, direction], k) => {
-      const length = moment.rays[k], known = length !== null && length !== undefined && shows.rays.checked;
-      const near = known ? Math.min(Math.max(1 - length / trial.reach[k], 0), 1) : 0, color = rayColor(near);
-      const endX = (forward + (known ? length : 0) * Math.cos(direction)) * MM, endY = -(left + (known ? length : 0) * Math.sin(direction)) * MM;
-      const line = { x1: forward * MM, y1: -left * MM, x2: endX, y2: endY };
-      for (const [key, value] of Object.entries(line)) part.rays[k].setAttribute(key, short(value));
-      part.rays[k].style.stroke = part.hits[k].style.fill = color;
-      part.rays[k].style.display = known ? "" : "none";
-      part.hits[k].setAttribute("cx", short(endX));
-      part.hits[k].setAttribute("cy", short(endY));
-      part.hits[k].setAttribute("r", known && near > 0 ? short(3.6 * unit) : "0");
+      const ray = part.rays[k], hit = part.hits[k], length = moment.rays[k], isKnown = shows.rays && typeof length === "number";
+      const near = isKnown ? Math.min(Math.max(1 - length / trial.reach[k], 0), 1) : 0;
+      const x = short((forward + (isKnown ? length : 0) * Math.cos(direction)) * MM), y = short(-(left + (isKnown ? length : 0) * Math.sin(direction)) * MM);
+      for (const [element, key, value] of [[ray, "x2", x], [ray, "y2", y], [hit, "cx", x], [hit, "cy", y], [hit, "r", near > 1e-6 ? short(3.4 * pixel) : 0]]) element.setAttribute(key, value);
+      ray.style.stroke = hit.style.fill = rayColor(near);
+      ray.style.display = isKnown ? "" : "none";
     });
   }
 
   function drawTrail(part, moment) {
-    const [x, y] = moment.pose;
-    if (live) {
-      part.trail.setAttribute("points", [...live.trail, [x, y]].map(([u, v]) => `${short(toX(u))},${short(toY(v))}`).join(" "));
-      part.blocked.setAttribute("d", "");
+    const arm = short(4 * pixel), back = short(-8 * pixel), across = short(8 * pixel);
+    if (moment.row < part.row) Object.assign(part, { row: -1, line: "", crosses: "" });
+    while (part.row < moment.row) {
+      part.row += 1;
+      const [x, y] = part.trial.poses[part.row];
+      part.line += `${points([[x, y]])} `;
+      if (part.trial.stalled[part.row]) part.crosses += `M${short(toX(x) - arm)} ${short(toY(y) - arm)}l${across} ${across}m0 ${back}l${back} ${across}`;
+    }
+    part.trail.setAttribute("points", part.line + points([moment.pose]));
+    part.blocked.setAttribute("d", part.crosses);
+  }
+
+  // trials that share a cell have a square each at its own place in it, so that they differ without color as well
+  function drawCells(moments, isShown) {
+    const firsts = drawn.map((part, k) => ({ part, n: isShown ? moments[k].nCells : 0 })).filter(({ part }) => !part.trial.isOther), key = firsts.map(({ n }) => n).join();
+    if (key === cellsShown) return;
+    cellsShown = key;
+    const visited = new Set(), { x, y, cell, columns } = scene.grid || {}, across = firsts.length > 4 ? 3 : 2;
+    const room = (0.8 * cell) / across, side = short(0.6 * room * MM);
+    firsts.forEach(({ part, n }, pen) => {
+      const cells = part.trial.cells.slice(0, n), inset = (at) => 0.1 * cell + (at + 0.2) * room;
+      for (const index of cells) visited.add(index);
+      const corners = cells.map((k) => [x + (k % columns) * cell + inset(pen % across), y + (Math.floor(k / columns) + 1) * cell - inset(Math.floor(pen / across))]);
+      part.squares.setAttribute("d", firsts.length > 1 ? corners.map(([left, up]) => `M${short(toX(left))} ${short(toY(up))}h${side}v${side}h-${side}z`).join("") : "");
+    });
+    tiles.forEach((tile, k) => tile.classList.toggle("rg-visited", visited.has(k)));
+  }
+
+  // letters on the robots, or around them if several are on one spot, moved apart where they would cover one another
+  function drawLetters(moments) {
+    const high = 22 * pixel, bottom = (scene.extent[3] - scene.extent[2]) * MM, letters = new Set(drawn.map(({ trial }) => trial.letter)).size;
+    const spots = drawn.map(({ trial, letter }, k) => {
+      const angle = 2 * Math.PI * ("ABCDEFGH".indexOf(trial.letter) / Math.max(letters, 4) - 0.25), [x, y] = moments[k].pose;
+      const isCrowded = drawn.some((other, n) => other.trial.letter !== trial.letter && Math.hypot(moments[n].pose[0] - x, moments[n].pose[1] - y) * MM < FAN), away = isCrowded ? FAN : 0;
+      letter.textContent = trial.letter + (moments[k].isStalled ? " ×" : "");
+      return { letter, x: toX(x) + away * Math.cos(angle), y: toY(y) + away * Math.sin(angle), half: (moments[k].isStalled ? 18 : 9) * pixel };
+    });
+    for (let round = 0; round < 12; round++) {
+      spots.forEach((first, k) => {
+        for (const second of spots.slice(k + 1)) {
+          const apart = second.y - first.y;
+          if (Math.abs(second.x - first.x) >= first.half + second.half || Math.abs(apart) >= high) continue;
+          const push = ((high - Math.abs(apart)) / 2 + 0.01) * (apart < 0 ? -1 : 1);
+          first.y -= push;
+          second.y += push;
+        }
+      });
+      for (const spot of spots) spot.y = Math.min(Math.max(spot.y, high / 2), bottom - high / 2);
+    }
+    for (const { letter, x, y } of spots) for (const [key, value] of [["x", x], ["y", y]]) letter.setAttribute(key, short(value));
+  }
+
+  function draw(moments, shows = { rays: true, trails: true, cells: true }) {
+    drawn.forEach((part, k) => drawRobot(part, moments[k], shows));
+    drawCells(moments, shows.cells);
+    drawLetters(moments);
+  }
+  return { show, draw, measure };
+}
+
+// time
+
+// Seconds since the start, at a whole step unless it plays. The duration, a step, and the speed are functions; `draw` follows
+// each change of the time, and `changed` those by a reader.
+function makeClock(duration, stepS, speed, draw, changed) {
+  const clock = { at: 0, isPlaying: false };
+  let last = null;
+  clock.step = () => Math.floor(clock.at / stepS() + 1e-9);
+  clock.nSteps = () => Math.round(duration() / stepS());
+  clock.play = () => {
+    if (clock.at >= duration() - 1e-9) clock.at = 0;
+    clock.isPlaying = true;
+    last = null;
+    changed();
+    requestAnimationFrame(tick);
+  };
+  clock.goTo = (step) => {
+    clock.isPlaying = false;
+    clock.at = Math.min(Math.max(Math.round(step), 0) * stepS(), duration());
+    draw();
+    changed();
+  };
+  clock.pause = () => clock.isPlaying && clock.goTo(clock.step());
+  clock.toggle = () => (clock.isPlaying ? clock.pause() : clock.play());
+  function tick(now) {
+    if (!clock.isPlaying) return;
+    // a page that was in the background goes on where it was
+    if (last !== null) clock.at += (Math.min(now - last, 250) / 1000) * speed();
+    last = now;
+    if (clock.at >= duration()) {
+      clock.goTo(Infinity);
       return;
     }
-    const { trial, points } = part, arm = 4.5 * unit;
-    if (moment.row < points.row) Object.assign(points, { row: -1, text: "", crosses: "" });
-    while (points.row < moment.row) {
-      points.row += 1;
-      const [u, v] = trial.poses[points.row];
-      points.text += `${short(toX(u))},${short(toY(v))} `;
-      if (trial.stalled[points.row]) points.crosses += `M${short(toX(u) - arm)} ${short(toY(v) - arm)}l${short(2 * arm)} ${short(2 * arm)}m0 ${short(-2 * arm)}l${short(-2 * arm)} ${short(2 * arm)}`;
-    }
-    part.trail.setAttribute("points", `${points.text}${short(toX(x))},${short(toY(y))}`);
-    part.blocked.setAttribute("d", points.crosses);
-  }
-
-  // on the robots, and around the spot where several robots stand on one
-  function drawLetters(moments) {
-    const fan = FAN * (scene.extent[1] - scene.extent[0]);
-    drawn.forEach((part, k) => {
-      if (!moments[k]) return;
-      const [x, y] = moments[k].pose;
-      const crowd = moments.filter(({ pose }) => Math.hypot(pose[0] - x, pose[1] - y) < fan).length > 1;
-      const angle = Math.PI / 2 - (2 * Math.PI * k) / drawn.length, away = crowd ? fan : 0;
-      part.letter.setAttribute("transform", `translate(${short(toX(x + away * Math.cos(angle)))} ${short(toY(y + away * Math.sin(angle)))})`);
-    });
-  }
-
-  function drawCells(moments) {
-    const counts = new Array(tiles.length).fill(0);
-    if (shows.cells.checked) {
-      trials.forEach((trial, k) => {
-        for (const cell of live ? live.cells : trial.cells.slice(0, moments[k].nCells)) counts[cell] += 1;
-      });
-    }
-    const most = Math.max(trials.length - 1, 1);
-    tiles.forEach((rect, cell) => {
-      const fill = counts[cell] ? mixed("visited", "often", (counts[cell] - 1) / most) : "var(--rg-tile)";
-      if (rect.dataset.fill !== fill) rect.dataset.fill = rect.style.fill = fill;
-    });
-  }
-
-  function drawWords(moments) {
-    const step = Math.max(0, ...moments.map((moment) => moment.step)), nCells = tiles.length;
-    const time = live ? live.time : Math.min(at, duration);
-    const parts = [live ? `step ${step}` : `step ${step} of ${nSteps}`, `${time.toFixed(1)}\u00a0s`];
-    if (moments.length === 1 && nCells && trials[0].placed) parts.push(`coverage ${share(moments[0].nCells / nCells)}`);
-    if (moments.length === 1 && moments[0].stalled) parts.unshift("× blocked");
-    clock.textContent = parts.join(" · ");
-    slider.value = String(Math.round(time / oneStep()));
-    slider.setAttribute("aria-valuetext", `step ${step} of ${nSteps}, ${time.toFixed(1)} seconds`);
-    svg.setAttribute("aria-label", `${scene.title}: ${parts.join(", ")}`);
-    drawn.forEach((part, k) => {
-      const facts = [moments[k] && moments[k].stalled ? "× blocked" : "", nCells ? share(moments[k].nCells / nCells) : ""].filter(Boolean);
-      const text = [`${part.trial.letter} ${part.trial.title}`, ...facts].join(" · ");
-      if (part.words.textContent !== text) part.words.textContent = text;
-    });
-  }
-
-  // time
-
-  function setPlaying(wanted) {
-    if (live) return;
-    playing = wanted;
-    if (playing && at >= duration - 1e-9) at = 0;
-    last = null;
-    play.setAttribute("aria-label", playing ? "Pause trials" : "Play trials");
-    play.classList.toggle("rg-playing", playing);
-    status.textContent = playing ? "" : clock.textContent;
     draw();
-    schedule();
+    requestAnimationFrame(tick);
   }
+  return clock;
+}
 
-  function schedule() {
-    if (request === null && (playing || (live && live.until > performance.now()))) request = requestAnimationFrame(tick);
-  }
+function showPlaying(button, isPlaying) {
+  button.querySelector("path").setAttribute("d", isPlaying ? PAUSE : PLAY);
+  button.querySelector("span").textContent = isPlaying ? "Pause" : "Play";
+}
 
-  function tick(now) {
-    request = null;
-    if (closed) return;
-    if (playing) {
-      if (last !== null) at += ((now - last) / 1000) * Number(speed.value);
-      last = now;
-      if (at >= duration) {
-        at = duration;
-        setPlaying(false);
-      }
-    }
-    draw();
-    schedule();
-  }
-
-  function seek(time) {
-    at = Math.min(Math.max(time, 0), duration);
-    last = null;
-    draw();
-    if (!playing) status.textContent = clock.textContent;
-  }
-
-  const oneStep = () => Math.min(...trials.map((trial) => trial.step_s));
-  play.addEventListener("click", () => setPlaying(!playing));
-  slider.addEventListener("input", () => seek(Number(slider.value) * oneStep()));
-  speed.addEventListener("change", () => { model.set("speed", Number(speed.value)); model.save_changes(); });
-  svg.addEventListener("keydown", (event) => {
-    const step = oneStep() * (event.shiftKey ? 10 : 1);
-    const does = {
-      " ": () => setPlaying(!playing), ArrowRight: () => seek(at + step), ArrowLeft: () => seek(at - step),
-      Home: () => seek(0), End: () => seek(duration),
-    }[event.key];
-    if (!does || live) return;
+// Space, arrows, Home, End, and the signs of the speed
+function listenToKeys(element, clock, speed, toggle, done = () => {}) {
+  element.addEventListener("keydown", (event) => {
+    if (event.ctrlKey || event.altKey || event.metaKey) return;
+    const stride = event.shiftKey ? 10 : 1;
+    const faster = (by) => {
+      speed.selectedIndex = Math.min(Math.max(speed.selectedIndex + by, 0), speed.options.length - 1);
+      speed.dispatchEvent(new Event("change"));
+    };
+    const actions = {
+      " ": toggle, Home: () => clock.goTo(0), End: () => clock.goTo(Infinity),
+      ArrowLeft: () => clock.goTo(clock.step() - stride), ArrowRight: () => clock.goTo(clock.step() + stride),
+      "+": () => faster(1), "=": () => faster(1), "-": () => faster(-1), "−": () => faster(-1),
+    };
+    if (!Object.hasOwn(actions, event.key)) return;
     event.preventDefault();
-    event.stopPropagation();
-    does();
+    event.stopPropagation(); // a notebook moves between cells by these keys
+    actions[event.key]();
+    done(event.key);
   });
+}
+
+// below a notebook's cell, and in the lab
+
+// `scene` and `trials` of the model are what is shown; while `live` is true, messages say where a robot is now
+function render({ model, el }) {
+  const root = tag("div", "", { class: "rg-player", role: "group", "aria-label": "Trials in motion" });
+  const head = tag("div", "", { class: "rg-head" }), labels = tag("span"), title = tag("strong"), words = tag("span", "", { class: "rg-clock" });
+  const svg = make("svg", { class: "rg-field", role: "img", tabindex: "0" }), names = tag("div", "", { class: "rg-names" });
+  const bar = tag("div", "", { class: "rg-bar" }), status = tag("div", "", { class: "rg-status", role: "status" });
+  const play = tag("button", "", { type: "button", class: "rg-play" }), slider = tag("input", "", { type: "range", min: 0, step: 1, value: 0, "aria-label": "Step" });
+  make("path", {}, make("svg", { viewBox: "0 0 16 16", "aria-hidden": "true" }, play));
+  play.append(tag("span"));
+  const speed = tag("select", "", { "aria-label": "Speed" });
+  for (const value of SPEEDS) speed.append(tag("option", `${value}×`, { value }));
+  speed.value = String(model.get("speed"));
+  bar.append(play, slider, speed);
+  const boxes = ["rays", "trails", "cells"].map((name) => {
+    const label = tag("label"), box = tag("input", "", { type: "checkbox", name });
+    box.checked = true;
+    box.addEventListener("change", () => draw());
+    label.append(box, name);
+    bar.append(label);
+    return box;
+  });
+  head.append(labels, title, words);
+  root.append(head, svg, names, bar, status);
+  el.append(root);
+
+  let scene = {}, trials = [], lines = [];
+  let live = null; // of a robot that runs: from where to where it is drawn, and since and until when
+  const duration = () => Math.max(0, ...trials.map((trial) => (nRows(trial) / trial.parts) * trial.step_s));
+  const stepS = () => Math.min(...trials.map((trial) => trial.step_s));
+  const stage = makeStage(svg);
+  const clock = makeClock(duration, stepS, () => Number(speed.value), draw, () => {
+    showState();
+    status.textContent = clock.isPlaying ? "" : words.textContent;
+  });
+  function showState() {
+    showPlaying(play, clock.isPlaying);
+    play.setAttribute("aria-label", clock.isPlaying ? "Pause trials" : "Play trials");
+  }
+
+  function build() {
+    if (!model.get("scene").extent) return;
+    scene = model.get("scene");
+    const isLive = model.get("live");
+    trials = isLive ? structuredClone(model.get("trials")) : model.get("trials"); // what a robot drives is added to them
+    live = isLive ? { now: null, time: 0 } : null;
+    if (live) Object.assign(trials[0], { cells: [], parts: 1 }); // messages have all cells
+    stage.show(scene, trials);
+    labels.replaceChildren(...[...new Set(trials.map(({ label }) => label))].map((label) => tag("span", label, { class: `rg-label rg-${label.toLowerCase()}` })));
+    title.textContent = scene.title;
+    lines = trials.map((trial) => {
+      const line = tag("span", "", { class: "rg-name" }), swatch = make("svg", { class: "rg-swatch", viewBox: "0 0 30 8", "aria-hidden": "true" });
+      make("path", { d: "M0 4H30", stroke: trial.color, "stroke-width": 2.4, "stroke-dasharray": dashesOf(trial) }, swatch);
+      line.append(swatch, tag("span"));
+      return line;
+    });
+    names.replaceChildren(...(trials.length > 1 ? lines : []));
+    slider.max = clock.nSteps();
+    slider.disabled = play.disabled = isLive;
+    root.classList.toggle("rg-live", isLive);
+    clock.isPlaying = false;
+    clock.at = !isLive && model.get("was_live") ? duration() : 0;
+    showState();
+    draw();
+  }
+
+  function draw() {
+    if (!scene.extent) return;
+    const moments = live ? [liveMoment()] : trials.map((trial) => momentOf(trial, clock.at));
+    stage.draw(moments, Object.fromEntries(boxes.map(({ name, checked }) => [name, checked])));
+    const step = Math.max(0, ...moments.map((moment) => moment.step)), nCells = scene.grid ? scene.grid.columns * scene.grid.rows : 0;
+    const n = Math.max(...trials.map(nSteps)), time = live ? live.time : clock.at, share = (moment) => (moment.nCells / nCells).toFixed(3).replace(/^0/, "");
+    const facts = [live ? `step ${step}` : `step ${step} of ${n}`, `${time.toFixed(1)}\u00a0s`], [only] = moments;
+    if (moments.length === 1 && nCells && trials[0].placed) facts.push(`coverage ${share(only)}`);
+    if (moments.length === 1 && only.isStalled) facts.unshift("× blocked");
+    words.textContent = facts.join(" · ");
+    slider.value = clock.step();
+    slider.setAttribute("aria-valuetext", `step ${step} of ${n}, ${time.toFixed(1)} seconds`);
+    svg.setAttribute("aria-label", `${scene.title}: ${facts.join(", ")}`);
+    lines.forEach((line, k) => {
+      line.lastChild.textContent = [`${trials[k].letter} ${trials[k].title}`, moments[k].isStalled ? "× blocked" : "", nCells ? share(moments[k]) : ""].filter(Boolean).join(" · ");
+    });
+  }
+
+  play.addEventListener("click", clock.toggle);
+  slider.addEventListener("input", () => clock.goTo(Number(slider.value)));
+  speed.addEventListener("change", () => { model.set("speed", Number(speed.value)); model.save_changes(); });
+  listenToKeys(svg, clock, speed, () => live || clock.toggle());
 
   // a robot that runs
 
   function liveMoment() {
-    const { now, shown } = live, trial = trials[0];
-    if (!now) return momentOf(trial, 0, false);
-    const part = calm.matches || !(live.until > live.since) ? 1 : Math.min((performance.now() - live.since) / (live.until - live.since), 1);
-    const pose = shown ? [0, 1].map((k) => shown[k] + part * (now.pose[k] - shown[k])) : now.pose.slice(0, 2);
-    pose.push(shown ? shown[2] + part * turnedTo(shown[2], now.pose[2]) : now.pose[2]);
-    return { row: 0, step: now.step, rays: now.rays, stalled: now.stalled, pose, nCells: live.cells.length };
+    const { shown, now, since, until } = live, [trial] = trials;
+    if (!now) return momentOf(trial, 0);
+    const part = still.matches || until <= since ? 1 : Math.min((performance.now() - since) / (until - since), 1);
+    return { row: nRows(trial), step: now.step, rays: now.rays, isStalled: now.stalled, pose: between(shown, now.pose, part), nCells: trial.cells.length };
   }
 
-  function told(message) {
-    if (message.kind === "begin") live = { shown: null, now: null, trail: [], cells: [], step: 0, time: 0 };
-    if (message.kind !== "now" || !live) return draw();
-    const shown = live.now ? liveMoment().pose : null;
-    if (live.now) live.trail.push(live.now.pose.slice(0, 2));
-    live.trail.push(...(message.trail || []));
-    live.cells.push(...message.cells);
+  function follow(message) {
+    if (message.kind === "begin" && model.get("live")) build();
+    if (message.kind !== "now" || !live) return;
+    const shown = live.now ? liveMoment().pose : message.pose;
+    trials[0].poses.push(...(live.now ? [live.now.pose] : []), ...message.trail);
+    trials[0].cells.push(...message.cells);
     Object.assign(live, { shown, now: message, time: message.time, since: performance.now(), until: performance.now() + 1000 * message.lasts });
+    approach();
+  }
+  function approach() {
+    if (!live || !el.contains(root)) return;
     draw();
-    return schedule();
+    if (live.until > performance.now()) requestAnimationFrame(approach);
   }
 
-  const rebuild = () => { if (!model.get("live")) live = null; at = 0; build(); if (!live && trials.length && model.get("was_live")) seek(duration); };
-  model.on("change:trials", rebuild);
-  model.on("change:scene", build);
-  model.on("change:live", rebuild);
-  model.on("msg:custom", told);
+  const listeners = { "change:trials": build, "change:scene": build, "change:live": build, "msg:custom": follow };
+  for (const [name, listener] of Object.entries(listeners)) model.on(name, listener);
   build();
+  const observer = onResize(svg, () => { stage.measure(); draw(); });
   if (model.get("live")) model.send({ kind: "all" });
   return () => {
-    closed = true;
-    if (request !== null) cancelAnimationFrame(request);
-    model.off("change:trials", rebuild);
-    model.off("change:scene", build);
-    model.off("change:live", rebuild);
-    model.off("msg:custom", told);
+    clock.pause();
+    observer.disconnect();
+    root.remove();
+    for (const [name, listener] of Object.entries(listeners)) model.off(name, listener);
   };
 }
 

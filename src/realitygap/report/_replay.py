@@ -10,6 +10,7 @@ from __future__ import annotations
 import base64
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from importlib import resources
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
 
@@ -18,7 +19,7 @@ import numpy.typing as npt
 import polars as pl
 
 from realitygap.errors import RealityGapError
-from realitygap.playback import first_visits
+from realitygap.playback import RobotShape, first_visits, pack_pen, pack_scene, pack_shape
 from realitygap.report._path_figure import arena_extent, typical_replicate
 from realitygap.report._placed import as_json, hash_of
 from realitygap.report._tally import Tally, label_of, score_text, settings_of, task_of
@@ -91,15 +92,18 @@ def content(tally: Tally, lead: str) -> dict[str, Any]:
     with_trials = [run for run in runs if run.data is not None]
     packed = [run.data for run in with_trials]
     first = _lead_of(tally, with_trials, lead) if packed else None
-    script = template_text("replay.js")
+    player = resources.files("realitygap.playback")
+    module = player.joinpath("player.js").read_text("utf-8").replace("export default { render };", "")
+    # no module: those run last, after the script that looks for tables wider than the page
+    script = f'"use strict";\n(() => {{\n{module}{template_text("replay.js")}}})();\n'
     return {
-        "css": Markup(template_text("replay.css")),
+        "css": Markup(player.joinpath("player.css").read_text("utf-8") + template_text("replay.css")),
         "script": Markup(script),
         "script_hash": hash_of(script),
         "data": as_json(
             {
                 "units": UNITS,
-                "pens": N_PENS,
+                "pens": [pack_pen(pen) for pen in range(N_PENS)],
                 "measure": tally.measure,
                 "lead": first[:2] if first else [],
                 "conditions": packed,
@@ -161,10 +165,10 @@ def _picture(condition: Condition, trajectory: Trajectory, text: str) -> Markup:
     corners = np.array([[0, 0], [grid.columns, 0], [grid.columns, grid.rows], [0, grid.rows], [0, 0]])
     reach = path(corners * grid.cell + [grid.x, grid.y])
     walls = "".join(path(np.array(wall).reshape(2, 2)) for wall in arena.walls)
-    trails = "".join(f'<path class="trail pen0" d="{path(robot.poses)}"/>' for robot in trajectory.robots)
+    trails = "".join(f'<path class="rg-trail" d="{path(robot.poses)}"/>' for robot in trajectory.robots)
     return Markup(
-        '<svg viewBox="0 0 {:.0f} {:.0f}" role="img" aria-label="{}"><path class="reach" d="{}"/>'
-        '<path class="walls" d="{}"/>{}</svg>'
+        '<svg class="rg-field" viewBox="0 0 {:.0f} {:.0f}" role="img" aria-label="{}"><path class="rg-reach" d="{}"/>'
+        '<path class="rg-walls" d="{}"/>{}</svg>'
     ).format(1000 * (right - left), 1000 * (top - bottom), text, reach, walls, Markup(trails))
 
 
@@ -198,7 +202,7 @@ def _pack_run(tally: Tally, described: Mapping[str, Any], room: int) -> _Run:
             f"{len(trials):,} of {rows.height:,} trials, the best ones of each generation; "
             "more would make the page too large."
         )
-    data = _scene(condition) | {
+    data = _set_up(condition) | {
         "name": name,
         "run": replicate,
         "label": label_of(described),
@@ -224,18 +228,14 @@ def _choose(rows: pl.DataFrame, most: int, column: str) -> pl.DataFrame:
     return rows.filter(pl.col("generation").is_in(shown.tolist()) & (rank <= most // n_shown))
 
 
-def _scene(condition: Condition) -> dict[str, Any]:
-    """Return the arena, and the robot's body and sensors; lengths in meters."""
-    arena, platform = condition.placed_arena, condition.on
-    grid, mounts = arena.grid, platform.sensors.mounts
+def _set_up(condition: Condition) -> dict[str, Any]:
+    """Return the arena, and the robot's shape and sensors; lengths in meters."""
+    shape = RobotShape.of(condition.on)
     return {
-        "walls": [list(wall) for wall in arena.walls],
-        "grid": [grid.x, grid.y, grid.cell, grid.columns, grid.rows],
-        "body": [list(corner) for corner in platform.body.corners],
-        "mounts": [list(mount) for mount in mounts],
-        "sensors": _sensor_names([left for _, left, _ in mounts]),
-        "range": platform.sensors.max_range,
-        "steps": platform.steps,
+        "scene": pack_scene(condition.placed_arena, condition.name),
+        **pack_shape(shape),
+        "sensors": _sensor_names([left for _, left, _ in shape.mounts]),
+        "steps": condition.on.steps,
     }
 
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from realitygap.calibration import ranges_of, scribbler_prior
-from realitygap.calibration._handles import parameters_of, robot_numbers
+from realitygap.calibration._prior import parameters_of, robot_numbers
 from realitygap.platforms import SimEnsemble, SimPlatform
 from realitygap.records import TrialRecord
 from realitygap.trials import TrialPlan

@@ -7,8 +7,8 @@ import pytest
 from scipy.stats import binom
 
 from realitygap.calibration import contact_plans, fit_contact
-from realitygap.calibration._align_or_stall import encounters_of
-from realitygap.calibration._handles import CONTACT
+from realitygap.calibration._contact import encounters_of
+from realitygap.calibration._prior import CONTACT
 
 from .drawn_robots import ARENA, ENSEMBLE, PRIOR, ROBOT, carried_out, drawn
 

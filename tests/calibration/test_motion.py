@@ -9,8 +9,8 @@ import pytest
 from scipy.stats import binom, multivariate_normal
 
 from realitygap.calibration import MotionFit, fit_motion, motion_plans, step_of
-from realitygap.calibration._handles import MOTION, MOTION_NOISE
 from realitygap.calibration._identify import collinear_groups
+from realitygap.calibration._prior import MOTION, MOTION_NOISE
 from realitygap.calibration._scatter import LEAST, Scatter
 from realitygap.world import load_arena, load_robot
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from realitygap.calibration import Placement, fit_sensor, independence
-from realitygap.calibration.infrared._mixture import MixtureReadings, step_of
+from realitygap.calibration.infrared._mixture import MixtureReadings, resolution_of
 from realitygap.calibration.infrared._pulses import PulseReadings
 from realitygap.calibration.infrared._scales import AMPLITUDE, BURST, DECAY, DROP, GAIN, OUTLIER
 from realitygap.platforms import SimPlatform, SimRobot
@@ -219,8 +219,8 @@ def test_other_sensors_and_no_readings_are_refused():
 
 
 def test_the_step_of_a_sensor_is_what_its_readings_are_multiples_of():
-    assert step_of(np.array([0.0, 0.3, 0.4, 0.9])) == pytest.approx(0.1)
-    assert step_of(np.array([0.0, 0.3137, 0.4, 0.9])) < 1e-4
+    assert resolution_of(np.array([0.0, 0.3, 0.4, 0.9])) == pytest.approx(0.1)
+    assert resolution_of(np.array([0.0, 0.3137, 0.4, 0.9])) < 1e-4
 
 
 def test_placements_that_were_to_be_the_same_are_compared_wherever_a_camera_saw_them():

@@ -4,27 +4,33 @@ from ._abc import Effort, Posterior, fit_all, mixed
 from ._all_from_commands import fit_from_commands
 from ._all_from_poses import fit_from_poses
 from ._contact import fit_contact
-from ._contact_plans import contact_plans
 from ._evidence import LEAST_STEPS, Evidence, Vectors, evidence_of
-from ._excitation import excitation, random_controllers
-from ._handles import CONTACT, MOTION
 from ._held_out import DECISIVE, HeldOut, is_better
 from ._log_model import MotionLog
-from ._log_prediction import PathErrors, Steps, path_errors, summary_of
+from ._log_prediction import PathErrors, Steps, look_up_motion, path_errors, summary_of
 from ._marker import Marker, fit_marker
 from ._motion import MotionFit, fit_motion
 from ._motion_log import LogPrediction, MotionLogFit, fit_motion_log, fit_motion_logs, motion_log
-from ._motion_plans import motion_plans
 from ._next_trial import information_of, next_trials
 from ._path import PathFit, fit_path, path_plans
-from ._path_baselines import look_up_motion
+from ._plans import contact_plans, excitation, motion_plans, random_controllers
 from ._predict_table import look_up_readings, place_ranks, predict_range_table
 from ._predictive import PREDICTED, Misfit, misfits, prediction_errors
-from ._prior import Effect, Floats, Parameter, numbers_of, ranges_of, scribbler_prior, standard_of, values_of
+from ._prior import (
+    CONTACT,
+    MOTION,
+    Effect,
+    Floats,
+    Parameter,
+    numbers_of,
+    ranges_of,
+    scribbler_prior,
+    standard_of,
+    values_of,
+)
 from ._range_table import BearingFrom, MeasuredFrom, RangeTableFit, bearings_from_heading, fit_range_table
 from ._ruler import Moved, end_pose_of, moved_in, ruled
-from ._simulate import Simulate
-from ._step import of_one_length, step_of
+from ._simulate import Simulate, of_one_length, step_of
 from ._table_frame import TableFrame, choose_frame
 from .infrared._checks import Independence, independence
 from .infrared._fit import LEAST_PLACEMENTS, SensorFit, fit_sensor

@@ -25,10 +25,10 @@ from realitygap.world import RobotModel
 from ._evidence import Evidence, Vectors
 from ._posterior import N_DRAWS
 from ._prior import Floats, Parameter, numbers_of, values_of
-from ._score import Compression, learn_compression
+from ._score import learn_compression
 
 Effort = Literal["least", "small", "full"]
-Simulate = Callable[[Evidence, Mapping[str, Floats], int], Vectors]
+SimulateVectors = Callable[[Evidence, Mapping[str, Floats], int], Vectors]
 """A function that simulates trials with m sets of numbers and a key of random numbers, and returns vectors, (m, d)."""
 
 N_LEARN = {"least": 600, "small": 800, "full": 1500}
@@ -60,7 +60,7 @@ class Posterior:
 
 def fit_all(
     evidence: Sequence[Evidence],
-    simulate: Simulate,
+    simulate: SimulateVectors,
     prior: Sequence[Parameter],
     robot: RobotModel,
     *,
@@ -83,7 +83,7 @@ def fit_all(
     p = len(prior)
     groups = _groups(prior)
     low, high = np.full(p, -END), np.full(p, END)
-    seen = [one.seen[None] for one in evidence]
+    seen = [part.seen[None] for part in evidence]
     n_simulated = 0
     draws = np.zeros((0, p))
     off = np.zeros(p)
@@ -94,13 +94,13 @@ def fit_all(
         places = _draw(rng, low, high, n)
         numbers = numbers_of(prior, values_of(prior, places), robot)
         key = int(rng.integers(2**62))
-        return places, [simulate(one, numbers, key + k) for k, one in enumerate(evidence)]
+        return places, [simulate(part, numbers, key + k) for k, part in enumerate(evidence)]
 
     for turn in range(ROUNDS[effort]):
         is_last = turn == ROUNDS[effort] - 1
         places, vectors = make(N_LEARN[effort])
         learned = [
-            learn_compression(places, some, one.finest) for some, one in zip(vectors, evidence, strict=True)
+            learn_compression(places, some, part.finest) for some, part in zip(vectors, evidence, strict=True)
         ]
         del vectors
         places, vectors = make(N_LAST[effort] if is_last else N_REGRESS[effort])
@@ -118,13 +118,13 @@ def fit_all(
     return Posterior(keep, values_of(prior, keep), off, n_simulated)
 
 
-def mixed(one: Posterior, other: Posterior, prior: Sequence[Parameter], *, share: int) -> Posterior:
+def mixed(first: Posterior, second: Posterior, prior: Sequence[Parameter], *, share: int) -> Posterior:
     """Return draws of two posteriors by turns, `share` of the first for each of the other, as many as either has."""
-    n, p = min(len(one.places), len(other.places)) // (share + 1), len(prior)
-    turns = [one.places[: share * n].reshape(n, share, p), other.places[:n].reshape(n, 1, p)]
+    n, p = min(len(first.places), len(second.places)) // (share + 1), len(prior)
+    turns = [first.places[: share * n].reshape(n, share, p), second.places[:n].reshape(n, 1, p)]
     places = np.concatenate(turns, axis=1).reshape(-1, p)
-    off = (share * one.off + other.off) / (share + 1)
-    return Posterior(places, values_of(prior, places), off, one.n_simulated + other.n_simulated)
+    off = (share * first.off + second.off) / (share + 1)
+    return Posterior(places, values_of(prior, places), off, first.n_simulated + second.n_simulated)
 
 
 def _groups(prior: Sequence[Parameter]) -> list[NDArray[np.int64]]:
@@ -163,21 +163,23 @@ def _adjusted(
     n, p = places.shape
     scale = summaries.std(axis=0) + 1e-12
     middle = summaries.mean(axis=0)
-    there, here = (summaries - middle) / scale, np.clip((observed - middle) / scale, -6, 6)
+    scaled, here = (summaries - middle) / scale, np.clip((observed - middle) / scale, -6, 6)
     draws, off = np.empty((4 * N_DRAWS, p)), np.empty(p)
     for group in groups:
         mine = places[:, group]
-        told, told_here = _predict(there, mine, here)
-        spread = (mine - told).std(axis=0) + 1e-9
-        distance = (((told - told_here) / spread) ** 2).sum(axis=1)
+        predicted, observed_prediction = _predict(scaled, mine, here)
+        spread = (mine - predicted).std(axis=0) + 1e-9
+        distance = (((predicted - observed_prediction) / spread) ** 2).sum(axis=1)
         n_near = int(max(n // 4, min(n, 15 * len(group))))
         reach = np.partition(distance, n_near - 1)[n_near - 1]
         weight = np.maximum(1.0 - distance / (reach * 1.0001 + 1e-12), 0.0)
         near = weight > 0
-        moved = _local(told[near], mine[near], weight[near], told_here)
+        moved = _local(predicted[near], mine[near], weight[near], observed_prediction)
         which = rng.choice(near.sum(), len(draws), p=weight[near] / weight.sum())
         draws[:, group] = np.clip(moved[which], -END, END)
-        off[group] = (told_here - told[near].mean(axis=0)) / (told[near].std(axis=0) + 1e-9)
+        off[group] = (observed_prediction - predicted[near].mean(axis=0)) / (
+            predicted[near].std(axis=0) + 1e-9
+        )
     return draws, off
 
 
@@ -193,15 +195,15 @@ def _predict(summaries: Floats, places: Floats, here: Floats) -> tuple[Floats, F
     first, first_here = summaries @ slopes, here @ slopes
     scale = first.std(axis=0) + 1e-9
     first, first_here = first / scale, np.clip(first_here / scale, -4, 4)
-    one, other = np.triu_indices(places.shape[1])
-    if len(one) * 4 > len(places):
-        one = other = np.arange(places.shape[1])
-    squares = first[:, one] * first[:, other]
+    row_of, column_of = np.triu_indices(places.shape[1])
+    if len(row_of) * 4 > len(places):
+        row_of = column_of = np.arange(places.shape[1])
+    squares = first[:, row_of] * first[:, column_of]
     design = np.column_stack([summaries, squares - squares.mean(axis=0)])
-    row = np.concatenate([here, first_here[one] * first_here[other] - squares.mean(axis=0)])
+    row = np.concatenate([here, first_here[row_of] * first_here[column_of] - squares.mean(axis=0)])
     slopes, own = _ridge(design, places - mean)
-    told = mean + design @ slopes
-    return told - (places - told) * (own / (1.0 - own))[:, None], mean + row @ slopes
+    predicted = mean + design @ slopes
+    return predicted - (places - predicted) * (own / (1.0 - own))[:, None], mean + row @ slopes
 
 
 def _ridge(design: Floats, wanted: Floats) -> tuple[Floats, Floats]:
@@ -212,11 +214,11 @@ def _ridge(design: Floats, wanted: Floats) -> tuple[Floats, Floats]:
     return np.asarray(np.linalg.solve(gram, design.T @ wanted)), np.minimum(own, MOST_OWN)
 
 
-def _local(told: Floats, places: Floats, weight: Floats, here: Floats) -> Floats:
+def _local(predicted: Floats, places: Floats, weight: Floats, here: Floats) -> Floats:
     """Return places moved to `here` along a weighted linear regression on the summaries."""
-    design = np.column_stack([np.ones(len(told)), told - here])
+    design = np.column_stack([np.ones(len(predicted)), predicted - here])
     weighed = design * weight[:, None]
-    gram = design.T @ weighed + 1e-6 * weight.sum() * np.diag([0.0, *told.var(axis=0) + 1e-12])
+    gram = design.T @ weighed + 1e-6 * weight.sum() * np.diag([0.0, *predicted.var(axis=0) + 1e-12])
     slopes = np.linalg.solve(gram, weighed.T @ places)
     rest = places - design @ slopes
     n = weight.sum() ** 2 / (weight**2).sum()  # as many of weight 1
@@ -227,6 +229,3 @@ def _next_box(draws: Floats) -> tuple[Floats, Floats]:
     low, high = np.quantile(draws, [CUT, 1 - CUT], axis=0)
     margin = MARGIN * (high - low) + 0.02
     return np.maximum(low - margin, -END), np.minimum(high + margin, END)
-
-
-__all__ = ["Compression", "Effort", "Posterior", "Simulate", "fit_all", "mixed"]

@@ -115,8 +115,8 @@ def sensors_of(
             distances, cosines = rays_of(sensor, poses, arena)
             read = shots.readings[..., k][shots.known]
             placements += [
-                Placement(*each, cosines=c)  # type: ignore[misc]
-                for *each, c in zip(distances, read[:, None], cosines, strict=True)
+                Placement(lengths, reading, cosines=at_walls)
+                for lengths, reading, at_walls in zip(distances, read[:, None], cosines, strict=True)
             ]
     some = rng.permutation(len(placements))[:n_readings]
     chosen = [placements[k] for k in some]
@@ -143,11 +143,11 @@ def sensors_of(
     )
     which = rng.integers(len(places), size=N_DRAWS)
     drawn = places[which] + FINEST_PLACE * rng.standard_normal((N_DRAWS, len(free)))
-    found = values_at(free, np.clip(drawn, 0.0, 1.0))
+    draws = values_at(free, np.clip(drawn, 0.0, 1.0))
     for parameter in parameters:
-        if parameter.name not in found:
-            found[parameter.name] = np.asarray(parameter.prior.of(rng.uniform(size=N_DRAWS)))
-    return found
+        if parameter.name not in draws:
+            draws[parameter.name] = np.asarray(parameter.prior.of(rng.uniform(size=N_DRAWS)))
+    return draws
 
 
 WITH_SLIP = {
@@ -182,8 +182,8 @@ def _slips(parameter: Parameter, shots: Shots, rng: np.random.Generator) -> Floa
         return np.asarray(parameter.prior.of(rng.uniform(size=N_DRAWS)))
     lost = 1.0 - np.hypot(*shots.moved[forward][:, :2].T) / turned[forward]
     n = len(lost)
-    found = [np.median(lost[rng.integers(n, size=n)]) for _ in range(N_STALLS)]
-    draws = np.clip(np.array(found), parameter.prior.lowest, parameter.prior.highest)
+    medians = [np.median(lost[rng.integers(n, size=n)]) for _ in range(N_STALLS)]
+    draws = np.clip(np.array(medians), parameter.prior.lowest, parameter.prior.highest)
     return np.asarray(draws[rng.integers(N_STALLS, size=N_DRAWS)])
 
 

@@ -15,6 +15,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import groupby
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +45,8 @@ FINEST = {
 }
 """Smallest difference that counts for each kind of entry, in its unit. `readings` are those of a robot that is not put
 back."""
+
+Scalar = TypeVar("Scalar", bound=np.generic)
 
 
 @dataclass(frozen=True)
@@ -133,15 +136,15 @@ def evidence_of(
         if len(trial.commands) >= LEAST_STEPS
     ]
 
-    def alike(one: tuple[int, TrialRecord, Genome | None]) -> tuple[int, str, bool, str]:
-        _, trial, genome = one
+    def alike(row: tuple[int, TrialRecord, Genome | None]) -> tuple[int, Observe, bool, str]:
+        _, trial, genome = row
         interface = "" if genome is None or trial.observe == "track" else repr(genome.interface)
         return len(trial.commands), trial.observe, bool(interface), interface
 
-    found: list[Evidence] = []
+    evidence: list[Evidence] = []
     for (_, observe, is_driven, _), group in groupby(sorted(numbered, key=alike), key=alike):
-        found += _of_group(list(group), observe, is_driven, n_cells)  # type: ignore[arg-type]
-    return found
+        evidence += _of_group(list(group), observe, is_driven, n_cells)
+    return evidence
 
 
 def _of_group(
@@ -195,15 +198,15 @@ def _as_rehearsal(trials: Sequence[TrialRecord], n_cells: int) -> Rehearsal:
     for k, trial in enumerate(trials):
         cells[0, k, list(trial.cells)] = True
 
-    def stacked(name: str, dtype: type) -> NDArray[np.generic]:
+    def stacked(name: str, dtype: type[Scalar]) -> NDArray[Scalar]:
         return np.array([[getattr(trial, name) for trial in trials]], dtype)
 
     return Rehearsal(
-        stacked("poses", np.float64),  # type: ignore[arg-type]
-        stacked("readings", np.float32),  # type: ignore[arg-type]
-        stacked("stalled", np.bool_),  # type: ignore[arg-type]
-        stacked("wheels", np.float64) if all(len(t.wheels) for t in trials) else np.empty((1, len(trials), 0, 2)),  # type: ignore[arg-type]
-        stacked("commands", np.float32),  # type: ignore[arg-type]
+        stacked("poses", np.float64),
+        stacked("readings", np.float32),
+        stacked("stalled", np.bool_),
+        stacked("wheels", np.float64) if all(len(t.wheels) for t in trials) else np.empty((1, len(trials), 0, 2)),
+        stacked("commands", np.float32),
         cells,
     )  # fmt: skip
 

@@ -9,8 +9,7 @@ import numpy as np
 
 from realitygap.records import CALIBRATES, Observe
 
-from ._handles import Known, place_of
-from ._prior import Parameter
+from ._prior import Known, Parameter, place_of
 from ._simulate import Floats
 
 TELLS = 0.5  # of the prior's interval: a posterior wider than this is said not to be identified
@@ -66,13 +65,13 @@ def identify_from(
 ) -> dict[str, Identified]:
     """Return the identification of each parameter, from samples of its posterior."""
     groups = collinear_groups(sensitivities.reshape(-1, len(free)), [parameter.name for parameter in free])
-    found = {}
+    identified = {}
     for name, values in draws.items():
         low, high = np.quantile(values, [0.05, 0.95])
         ratio = (place_of(known[name], float(high)) - place_of(known[name], float(low))) / 0.9
         partners = sorted({other for group in groups if name in group for other in group} - {name})
-        found[name] = Identified(ratio, ratio < TELLS, tuple(partners))
-    return found
+        identified[name] = Identified(ratio, ratio < TELLS, tuple(partners))
+    return identified
 
 
 WHEELS = "record the wheels' encoders (observe = encoders)"

@@ -244,9 +244,9 @@ def _information(problem: LogProblem, point: Floats) -> tuple[Floats, Floats, Fl
         for index, wide in zip(own, np.minimum(known / 3, WIDE), strict=True):
             ends = []
             for sign in (1.0, -1.0):
-                there = point.copy()
-                there[index] += sign * wide
-                ends.append(problem.slopes(k, there, step)[1].sum(axis=0))
+                moved = point.copy()
+                moved[index] += sign * wide
+                ends.append(problem.slopes(k, moved, step)[1].sum(axis=0))
             curvature[own, index] -= (ends[0] - ends[1]) / (2 * wide)
         n = max(min(round(N_BLOCKS * len(log.time_s) / n_rows), len(log.time_s) // FEWEST_IN_BLOCK), 1)
         for part in np.array_split(slopes, n):
@@ -278,7 +278,7 @@ def _widened(information: Floats, blocks: Floats) -> tuple[Floats, Floats]:
     turned = directions[:, known] * root @ turned
     robust = (turned / np.maximum(factors, 1.0)) @ turned.T
     robust += (directions[:, ~known] * sizes[~known]) @ directions[:, ~known].T
-    before, after = (np.diag(np.linalg.inv(each + np.eye(q))) for each in (information, robust))
+    before, after = (np.diag(np.linalg.inv(matrix + np.eye(q))) for matrix in (information, robust))
     return np.asarray(robust), np.sqrt(after / before)
 
 

@@ -157,9 +157,9 @@ def encoder_likelihood(log: MotionLog, ways: Floats, numbers: Numbers) -> Floats
     """
     rows = np.flatnonzero(np.isfinite(log.encoders).all(axis=1))
     gains = np.stack([numbers["encoder.gain_left"], numbers["encoder.gain_right"]], axis=1)
-    told = np.diff(ways[:, rows], axis=1) * gains[:, None]
-    off = np.diff(log.encoders[rows], axis=0)[None] - told
-    variance = numbers["wheel_per_m"][:, None, None] ** 2 * np.abs(told)
+    predicted = np.diff(ways[:, rows], axis=1) * gains[:, None]
+    off = np.diff(log.encoders[rows], axis=0)[None] - predicted
+    variance = numbers["wheel_per_m"][:, None, None] ** 2 * np.abs(predicted)
     variance = variance + 2 * numbers["wheel"][:, None, None] ** 2
     logs = np.zeros(ways.shape[:2])
     density = np.log(variance) + (DEGREES + 1.0) * np.log1p(off**2 / (DEGREES * variance))

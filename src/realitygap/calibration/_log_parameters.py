@@ -154,8 +154,8 @@ class LogNumbers:
     def values(self, standard: Floats) -> dict[str, Floats]:
         """Return (m,) of everything at (m, p + c) points on the standard scales: the robot's, then one camera's."""
         values = {name: np.full(len(standard), value) for name, value in self.own.items()}
-        for k, one in enumerate((*self.free, *self.camera)):
-            values[one.name] = one.of(self.own[one.name], standard[:, k])
+        for k, parameter in enumerate((*self.free, *self.camera)):
+            values[parameter.name] = parameter.of(self.own[parameter.name], standard[:, k])
         for part in ("drive", "encoder"):
             gain, apart = values[f"{part}.gain"], values[f"{part}.asymmetry"]
             values[f"{part}.gain_left"], values[f"{part}.gain_right"] = gain + apart / 2, gain - apart / 2

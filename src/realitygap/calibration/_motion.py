@@ -11,9 +11,17 @@ import numpy as np
 from realitygap.records import Observe, TrialRecord
 from realitygap.world import Arena, Fitted, RobotModel
 
-from ._handles import MOTION, MOTION_NOISE, Known, own_values, parameters_of, robot_numbers, values_at
 from ._identify import Identified, advice_for, identify_from
-from ._prior import Parameter
+from ._prior import (
+    MOTION,
+    MOTION_NOISE,
+    Known,
+    Parameter,
+    own_values,
+    parameters_of,
+    robot_numbers,
+    values_at,
+)
 from ._scatter import JITTER, NoisePrior, Scatter, scatter_parameters
 from ._shooting import (
     FIRST_NOISE,

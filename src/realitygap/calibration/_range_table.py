@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from realitygap.errors import finite_numbers
-from realitygap.world import Fitted, RobotModel
+from realitygap.world import Distribution, Fitted, RobotModel
 
 from ._held_out import HeldOut, HeldOutFit
 from ._range_response import NAMES, Number, file_numbers, numbers_in_file, numbers_to_fit, wall_reading
@@ -516,9 +516,8 @@ def _floor(table: Readings) -> float | None:
     return _rms(np.nanmean(around[:, some], axis=0) - table.readings[~table.seen][some])
 
 
-def _center(value: Any) -> float:
-    """Return a number, or the center of its distribution."""
-    return float(getattr(value, "center", value))
+def _center(value: float | Distribution) -> float:
+    return value.center if isinstance(value, Distribution) else value
 
 
 def _rms(values: Floats) -> float:

@@ -9,8 +9,7 @@ import numpy as np
 
 from realitygap.world import Distribution
 
-from ._handles import MOTION_NOISE, Known
-from ._prior import Parameter
+from ._prior import MOTION_NOISE, Known, Parameter
 from ._simulate import Bools, Floats
 
 JITTER, TRAVEL_PER_M, HEADING_PER_M, HEADING_PER_S, ACROSS_PER_M, PLACE, ANGLE, WHEEL_PER_M, WHEEL = range(9)

@@ -14,13 +14,11 @@ import numpy as np
 
 from realitygap.world import RobotModel
 
-from ._handles import MOTION_NOISE, Known, own_values, place_of, values_at
 from ._posterior import BURN_IN, SWEEPS, draw_linear, walk
-from ._prior import Parameter
+from ._prior import MOTION_NOISE, Known, Parameter, own_values, place_of, values_at
 from ._scatter import NoisePrior, Scatter
 from ._simulate import Floats, Ints, Simulate
-from ._wheel_ways import wheel_ways
-from ._windows import Windows, differences, simulate_windows, wrapped
+from ._windows import Windows, differences, simulate_windows, wheel_ways, wrapped
 
 STEP = 0.02  # of a finite difference, in parts of what was thought possible
 PULL = 0.1  # towards the robot's own numbers, where nothing was learned

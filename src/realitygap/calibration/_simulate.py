@@ -21,12 +21,12 @@ class Rehearsed(Protocol):
     """Trials (k), simulated with each of m sets of numbers."""
 
     @property
-    def poses(self) -> NDArray[np.floating[Any]]:
+    def poses(self) -> NDArray[np.floating]:
         """Poses x [m], y [m], heading [rad], before the robot was put back, (m, k, t + 1, 3)."""
         ...
 
     @property
-    def wheels(self) -> NDArray[np.floating[Any]]:
+    def wheels(self) -> NDArray[np.floating]:
         """Distances of the left and the right wheel since the start [m], (m, k, t + 1, 2)."""
         ...
 
@@ -41,7 +41,7 @@ class Rehearsed(Protocol):
         ...
 
     @property
-    def readings(self) -> NDArray[np.floating[Any]]:
+    def readings(self) -> NDArray[np.floating]:
         """Readings of the range sensors, 0 to 1, (m, k, t + 1, s)."""
         ...
 
@@ -94,3 +94,39 @@ def padded_commands(trials: Sequence[TrialRecord]) -> Floats:
 def starts_of(trials: Sequence[TrialRecord]) -> Floats:
     """Return the starts of trials, (k, 3): observed poses, if there are any."""
     return np.array([trial.poses[0] if len(trial.poses) else trial.start for trial in trials], np.float64)
+
+
+ALIKE = 0.1
+"""Share by which commands of trials may differ in length and are taken for equally long: over a radio link none are."""
+
+
+def of_one_length(trials: Sequence[TrialRecord]) -> tuple[list[TrialRecord], str]:
+    """Return the largest group of trials with commands of about the same length, and a text on the others, or ""."""
+    lengths = sorted(trial.step_s for trial in trials)
+    if not lengths or lengths[-1] <= (1 + ALIKE) * lengths[0]:
+        return list(trials), ""
+    least = max(lengths, key=lambda length: sum(length <= each <= (1 + ALIKE) * length for each in lengths))
+    kept = [trial for trial in trials if least <= trial.step_s <= (1 + ALIKE) * least]
+    others = [length for length in lengths if not least <= length <= (1 + ALIKE) * least]
+    return kept, (
+        f"{len(others)} of {len(trials)} trials were left out: their commands lasted {others[0]:.3g} to "
+        f"{others[-1]:.3g} s. Those of the {len(kept)} that count lasted {least:.3g} to "
+        f"{max(trial.step_s for trial in kept):.3g} s."
+    )
+
+
+def step_of(trials: Sequence[TrialRecord]) -> float:
+    """Return the median duration of a command in these trials [s].
+
+    Raises:
+        ValueError: No trial, or such different lengths that they are no robot's with one step.
+    """
+    if not trials:
+        raise ValueError("There are no trials to fit to, expected at least one.")
+    lengths = [trial.step_s for trial in trials]
+    if max(lengths) > (1 + ALIKE) * min(lengths):
+        raise ValueError(
+            f"The trials' commands last {min(lengths):.3g} to {max(lengths):.3g} s, expected one length of time. Fit "
+            "them apart."
+        )
+    return float(np.median(lengths))

@@ -8,14 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from realitygap.calibration._level import level_ends
-from realitygap.calibration._tempering import sample_posterior
+from realitygap.calibration._tempering import level_ends, sample_posterior
 from realitygap.world import Fitted, RobotModel
 
 from .._posterior import N_DRAWS
 from ._checks import Independence, independence, predictive_check
-from ._lorentz import LorentzReadings
-from ._mixture import MixtureReadings
+from ._mixture import LorentzReadings, MixtureReadings
 from ._pulses import PulseReadings
 from ._readings import Array, Placement, refuse_response
 from ._scales import BATTERY, Scale

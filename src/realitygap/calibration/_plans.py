@@ -1,13 +1,15 @@
-"""Trials that excite a robot's drive away from walls, and return to the start."""
+"""Trials that show much of a robot: its motion, its contact with walls, and all at once."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from realitygap.evolution import Genome, NeatSettings, Population
 from realitygap.trials import TrialPlan
-from realitygap.world import Arena, Pose, RobotModel
+from realitygap.world import Arena, Pose, RobotModel, distance_to_segment
 
 from ._simulate import Floats
 
@@ -158,3 +160,122 @@ def _away(points: Floats, lines: Sequence[Sequence[float]] | Floats) -> Floats:
         at = np.clip(off @ way / max(float(way @ way), 1e-12), 0.0, 1.0)
         nearest = np.minimum(nearest, np.hypot(*(off - at[:, None] * way).T))
     return nearest
+
+
+N_CONTACT = 10
+PUSH = 6  # commands into a wall: some to reach it, the others to observe the motion along it
+AROUND = (0.35, 0.6, 0.9)  # turns between two walls, as commands
+
+
+def contact_plans(arena: Arena, robot: RobotModel, n: int = N_CONTACT) -> list[TrialPlan]:
+    """Return trials to fit contact to: pushes head on and slantwise, scrapes to both sides, with either end.
+
+    The result of an encounter is not known beforehand, so angles are random. Each trial begins at another heading, and
+    after each push the robot backs off and turns by another angle.
+
+    Args:
+        arena: Arena. Trials begin at the place with the most room.
+        robot: Robot with the numbers of its file.
+        n: Number of trials.
+
+    Raises:
+        ValueError: There is no room for the robot to turn in place.
+    """
+    middle, _ = roomiest_place(arena, robot)
+    plans = []
+    for k in range(n):
+        rng = np.random.default_rng(1000 + k)
+        start = Pose(
+            middle.x, middle.y, math.remainder(middle.heading + 2.399963 * k, math.tau)
+        )  # golden angle
+        commands: Commands = []
+        while len(commands) < STEPS:
+            commands += _encounter(rng)
+        given = np.array(commands[:STEPS])
+        plans.append(TrialPlan(start, commands=given, steps=STEPS, number=k, purpose="contact"))
+    return plans
+
+
+def _encounter(rng: np.random.Generator) -> Commands:
+    speed = float(rng.choice([1.0, 0.6])) * (1.0 if rng.random() < 0.7 else -1.0)
+    scrape = float(rng.choice([0.0, 0.0, 0.15, 0.3])) * (1.0 if rng.random() < 0.5 else -1.0)
+    turn = float(rng.choice(AROUND)) * (1.0 if rng.random() < 0.5 else -1.0)
+    push: Commands = [(speed, scrape)] * PUSH
+    back: Commands = [(-math.copysign(0.8, speed), 0.0)] * int(rng.integers(1, 3))
+    return [*push, *back, *([(0.0, turn)] * int(rng.integers(1, 4)))]
+
+
+CLEAR_M = 0.015  # between a robot at its start and what is nearest [m]
+LONGEST = 8  # steps of one command
+TRIES = 10_000
+
+
+def random_controllers(n: int, seed: int) -> list[Genome]:
+    """Return n unrelated networks with a constant input, as in NEAT's first generation with the paper's settings."""
+    settings = NeatSettings.named("rosenzweig-remy")
+    return [Population(3, 2, settings, seed=seed, replicate=k).ask()[0] for k in range(n)]
+
+
+def random_start(arena: Arena, radius: float, rng: np.random.Generator) -> Pose:
+    """Return a pose in which a robot of this radius touches nothing, in whole centimeters and twelfths of a turn.
+
+    Raises:
+        ValueError: There seems to be no room for it.
+    """
+    grid = arena.grid
+    for _ in range(TRIES):
+        x = round(grid.x + rng.uniform() * grid.columns * grid.cell, 2)
+        y = round(grid.y + rng.uniform() * grid.rows * grid.cell, 2)
+        if _clearance(arena, x, y) > radius + CLEAR_M:
+            return Pose(x, y, math.remainder(int(rng.integers(12)) * math.tau / 12, math.tau))
+    raise ValueError(
+        f"No place in arena {arena.name!r} where a robot of radius {radius:.3g} m touches nothing."
+    )
+
+
+def _clearance(arena: Arena, x: float, y: float) -> float:
+    gaps = [distance_to_segment(x, y, wall) for wall in arena.walls]
+    gaps += [obstacle.distance(x, y) for obstacle in arena.obstacles]
+    return min(gaps, default=math.inf)
+
+
+def excitation(arena: Arena, radius: float, n: int, steps: int, rng: np.random.Generator) -> list[TrialPlan]:
+    """Return n trials of straight, turning, slow, and arc commands, each for 1 to 8 steps, from anywhere.
+
+    Args:
+        arena: Arena of the trials.
+        radius: Distance of the robot's farthest point [m].
+        n: Number of trials.
+        steps: Commands in each.
+        rng: Random numbers.
+    """
+    return [
+        TrialPlan(
+            start=random_start(arena, radius, rng),
+            commands=_changing_commands(steps, rng),
+            steps=steps,
+            number=k,
+            purpose="excitation",
+        )
+        for k in range(n)
+    ]
+
+
+def _changing_commands(
+    steps: int, rng: np.random.Generator
+) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
+    commands = np.zeros((steps, 2))
+    at = 0
+    while at < steps:
+        length = int(rng.integers(1, LONGEST + 1))
+        side = float(rng.choice([-1.0, 1.0]))
+        kind = int(rng.integers(4))
+        command = (
+            (side, 0.0),
+            (0.0, side * rng.uniform(0.2, 1.0)),
+            (rng.uniform(-1, 1), rng.uniform(-1, 1)),
+            (side * rng.uniform(0.1, 1.0), rng.uniform(-0.3, 0.3)),
+        )[kind]
+        commands[at : at + length] = np.round(command, 2)
+        at += length
+    return commands

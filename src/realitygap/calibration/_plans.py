@@ -1,4 +1,4 @@
-"""Trials that show much of a robot: its motion, its contact with walls, and all at once."""
+"""Trials that show much of a robot: of its motion, of its contact with walls, and of both together."""
 
 from __future__ import annotations
 

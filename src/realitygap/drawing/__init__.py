@@ -7,12 +7,10 @@ and pictures.
 """
 
 from ._card import Bar, Card, Spark, Table
-from ._ink import PENS, Ink, line_pen
+from ._colors import PENS, Ink, hex_of, line_pen, rgb_of, theme_rules, themed, themed_color, themed_file
 from ._picture import FONT, Disc, Line, Picture, Point, Shape, Text
 from ._pixels import to_image, to_png
 from ._shown import ShownAsCard, card_of, picture_of, widget_of
-from ._theme import theme_rules, themed, themed_color, themed_file
-from ._x11 import hex_of, rgb_of
 
 __all__ = [
     "FONT",

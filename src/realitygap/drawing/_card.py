@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from realitygap._foreign_text import page_text
 
+from ._colors import theme_rules, themed
 from ._picture import Picture
-from ._theme import theme_rules, themed
 
 if TYPE_CHECKING:
     from jinja2 import Template

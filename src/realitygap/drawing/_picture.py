@@ -9,7 +9,7 @@ from typing import Literal
 
 from realitygap._foreign_text import page_text
 
-from ._ink import Ink
+from ._colors import Ink
 
 FONT = "'Helvetica Neue', Helvetica, Arial, 'Liberation Sans', 'DejaVu Sans', sans-serif"
 

@@ -8,9 +8,8 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
-from ._ink import Ink
+from ._colors import Ink, rgb_of
 from ._picture import Disc, Line, Picture, Point, Text
-from ._x11 import rgb_of
 
 if TYPE_CHECKING:
     from PIL.Image import Image

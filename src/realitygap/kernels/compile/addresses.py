@@ -117,7 +117,7 @@ def emit(library: Any) -> bytes:
             function.add_function_attribute("nonlazybind")
     module.link_in(llvmlite.binding.parse_assembly(_BY_TABLE))
     code: bytes = codegen._short_machine.emit_object(module)
-    return code if is_closed(code) else codegen._tm.emit_object(module)  # type: ignore[no-any-return]
+    return code if is_closed(code) else codegen._tm.emit_object(module)
 
 
 # Of the format ELF on x86-64.

@@ -261,10 +261,10 @@ def _import_without_blas() -> None:
 
 def _symbols_only(names: Iterable[str]) -> bytes:
     symbols = "".join(f'define void @"{name}"() {{ ret void }}\n' for name in names)
-    return llvmlite.binding.parse_assembly(symbols).as_bitcode()  # type: ignore[no-any-return]
+    return llvmlite.binding.parse_assembly(symbols).as_bitcode()
 
 
-class SealedCache(caching._Cache):  # type: ignore[misc]
+class SealedCache(caching._Cache):
     """Numba's cache of one function. A file that is missing, damaged or not writable means compiling again."""
 
     def __init__(self, function: Callable[..., Any], folder: Path, way: str = "") -> None:

@@ -15,7 +15,7 @@ from .cache import PLAIN_WAY, SealedCache, usable_folder
 try:
     from . import pipeline
 except (ImportError, AttributeError):  # a Numba whose parts have other names
-    pipeline = None  # type: ignore[assignment]
+    pipeline = None
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -50,7 +50,7 @@ def _forward(function: Callable[..., Any], target: Kernel) -> Callable[..., Any]
     names = ", ".join(code.co_varnames[: code.co_argcount])
     space = {"__name__": function.__module__, "_target": target}
     exec(f"def {function.__name__}({names}):\n    return _target({names})\n", space)
-    forward: Callable[..., Any] = space[function.__name__]  # type: ignore[assignment]
+    forward: Callable[..., Any] = space[function.__name__]
     forward.__qualname__ = function.__qualname__
     return forward
 
@@ -151,42 +151,42 @@ def maker(function: F) -> F:
     """
     if numba.config.DISABLE_JIT:
         return function
-    return Kernel(function, MAKER)  # type: ignore[return-value]
+    return Kernel(function, MAKER)
 
 
 def kernel(function: F) -> F:
     """Compile `function`, which makes no arrays, at its first call."""
     if numba.config.DISABLE_JIT:
         return function
-    return Kernel(function, KERNEL)  # type: ignore[return-value]
+    return Kernel(function, KERNEL)
 
 
 def shared(function: F) -> F:
     """Compile `function`, which makes no arrays, once for all kernels that call it: it becomes part of none."""
     if numba.config.DISABLE_JIT:
         return function
-    return Kernel(function, KERNEL, shared=True)  # type: ignore[return-value]
+    return Kernel(function, KERNEL, shared=True)
 
 
 def shared_lanes(function: F) -> F:
     """A `shared` kernel most of whose work is in loops over lanes, which are worth unrolling."""
     if numba.config.DISABLE_JIT:
         return function
-    return Kernel(function, KERNEL, shared=True, unroll=True)  # type: ignore[return-value]
+    return Kernel(function, KERNEL, shared=True, unroll=True)
 
 
 def shared_stage(function: F) -> F:
     """A `shared` kernel whose arrays must not overlap, as those of a `stage`."""
     if numba.config.DISABLE_JIT:
         return function
-    return Kernel(function, KERNEL, stage=True, shared=True, unroll=True)  # type: ignore[return-value]
+    return Kernel(function, KERNEL, stage=True, shared=True, unroll=True)
 
 
 def inlined(function: F) -> F:
     """A small kernel that becomes part of each of its callers, loops over lanes among them."""
     if numba.config.DISABLE_JIT:
         return function
-    return Kernel(function, INLINED)  # type: ignore[return-value]
+    return Kernel(function, INLINED)
 
 
 def stage(function: F) -> F:
@@ -197,4 +197,4 @@ def stage(function: F) -> F:
     """
     if numba.config.DISABLE_JIT:
         return function
-    return Kernel(function, INLINED, stage=True)  # type: ignore[return-value]
+    return Kernel(function, INLINED, stage=True)

@@ -54,7 +54,7 @@ def _count(aggregate: Any) -> int:
     return aggregate.count if isinstance(aggregate, ir.ArrayType) else len(aggregate.elements)
 
 
-class PartsBuilder(ir.IRBuilder):  # type: ignore[misc]
+class PartsBuilder(ir.IRBuilder):
     """Builds instructions from values some of which are `Parts`."""
 
     def extract_value(self, agg: Any, idx: Any, name: str = "") -> Any:
@@ -312,6 +312,6 @@ def caller_of(context: Any, fndesc: Any, leaves: list[Leaf], can_raise: bool, li
                 value = fix_returning_optional(context, builder, sig, status, value)
         return value
 
-    call.signature = fndesc.argtypes  # type: ignore[attr-defined]
-    call.libs = tuple(libraries)  # type: ignore[attr-defined]
+    call.signature = fndesc.argtypes
+    call.libs = tuple(libraries)
     return call

@@ -67,7 +67,7 @@ else:
             super().__init__(f"vector of {WIDTH} {dtype}")
 
     @register_model(Vector)
-    class _VectorModel(models.PrimitiveModel):  # type: ignore[misc]
+    class _VectorModel(models.PrimitiveModel):
         def __init__(self, manager: Any, kind: Any) -> None:
             number = {
                 types.float32: ir.FloatType(),
@@ -79,7 +79,7 @@ else:
     _MASK = Vector(types.boolean)
 
     def _operator(operation: Any, is_mask: bool, to_mask: bool, instruction: str, *options: str) -> None:
-        class Template(AbstractTemplate):  # type: ignore[misc]
+        class Template(AbstractTemplate):
             def generic(self, arguments: Any, named: Any) -> Any:
                 first = arguments[0]
                 masks = isinstance(first, Vector) and first == _MASK

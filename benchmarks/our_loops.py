@@ -8,10 +8,10 @@ from realitygap.kernels.compile.decorators import kernel
 from realitygap.kernels.jyro.trial import draw_lanes
 from realitygap.kernels.math.lanes import LANES
 from realitygap.kernels.math.philox import FIRST
-from realitygap.kernels.neat.evolve import next_generation
 from realitygap.kernels.neat.genome import first_genomes
 from realitygap.kernels.neat.mutation import clear_innovations
 from realitygap.kernels.neat.network import activate, decode
+from realitygap.kernels.neat.reproduction import next_generation
 from realitygap.kernels.neat.species import clear_species, speciate
 from realitygap.kernels.neat.wiring import think
 from realitygap.kernels.tasks.xor import try_xor

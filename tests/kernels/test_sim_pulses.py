@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from realitygap.kernels.math.lanes import LANES
-from realitygap.kernels.sim import pulses as pulses_kernels
+from realitygap.kernels.sim import noise as pulses_kernels
 from realitygap.kernels.sim import ranges
 from tests.kernels.sim_rows import PRECISIONS, random_words, row, rows
 from tests.reference import senses as reference

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from realitygap.errors import RecordError, check_told_once, finite_numbers, whole_number
-from realitygap.kernels.neat.evolve import next_generation
 from realitygap.kernels.neat.genome import Genomes, first_genomes, make_genomes
 from realitygap.kernels.neat.mutation import Innovations, make_innovations
+from realitygap.kernels.neat.reproduction import next_generation
 from realitygap.kernels.neat.species import SpeciesTable, make_species, speciate
 from realitygap.records import read_checkpoint, write_checkpoint
 

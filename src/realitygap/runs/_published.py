@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realitygap.evolution import Genome, NeatSettings, Population, decode_all, random_key
-from realitygap.kernels.neat.novelty import admit
-from realitygap.kernels.neat.points import point_novelty
+from realitygap.kernels.neat.novelty import admit, point_novelty
 from realitygap.kernels.tasks import maze, run
 from realitygap.tasks import ClassicalTask, MazeAgent, MazeTask
 from realitygap.trials import maze_exit, maze_rules, maze_scene

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from realitygap.kernels.math.draw import draw_units
-from realitygap.kernels.math.philox import PURPOSE_TEAM
+from realitygap.kernels.math.philox import PURPOSE_TEAM, draw_units
 
 
 def draw_teams(

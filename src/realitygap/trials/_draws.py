@@ -8,8 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from realitygap.kernels.math.draw import draw_units
-from realitygap.kernels.math.philox import PURPOSE_MODEL
+from realitygap.kernels.math.philox import PURPOSE_MODEL, draw_units
 from realitygap.world import Distribution
 
 

@@ -1,4 +1,4 @@
-"""The likelihood of readings that are counts of pulses, as kernels/sim/pulses.py draws them."""
+"""The likelihood of readings that are counts of pulses, as kernels/sim/noise.py draws them."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from realitygap.kernels.compile.decorators import inlined
+from realitygap.kernels.compile.decorators import inlined, kernel
 
 PURPOSE_NOISE = np.int64(1)  # sensor noise of a trial
 PURPOSE_GENOME = np.int64(2)  # the first genomes
@@ -88,3 +88,20 @@ def make_stream(key, replicate, generation, individual, repeat, purpose):
 def unit(word):
     """A float64 in (0, 1), centered: the mean over all words is exactly one half."""
     return (np.float64(word) + 0.5) * _TO_UNIT
+
+
+@kernel
+def draw_units(block, key, counters, units):
+    """One number for each counter.
+
+    Args:
+        block: uint32, which number of the robot or arena is meant.
+        key: uint64, of the random numbers.
+        counters: (n, 3) uint32, the other words of each counter.
+        units: (n,) float64, written: 0 < u < 1, each multiple of 2^-32 and a half as likely.
+    """
+    k0 = np.uint32(np.uint64(key) & np.uint64(0xFFFFFFFF))
+    k1 = np.uint32(np.uint64(key) >> np.uint64(32))
+    for row in range(units.size):
+        words = philox(np.uint32(block), counters[row, 0], counters[row, 1], counters[row, 2], k0, k1)
+        units[row] = unit(words[0])

@@ -12,11 +12,11 @@ from realitygap.kernels.compile.decorators import inlined, kernel, shared
 from realitygap.kernels.math.philox import FIRST, PURPOSE_NOISE, make_stream
 
 from .distances import Behaviors, Measure, describe, make_behaviors, make_measure
-from .evolve import next_generation
 from .genome import Genomes, first_genomes
 from .mutation import Innovations, clear_innovations
 from .network import decode
 from .novelty import Archive, NearestRoom, nearest_archive_step, paper_archive_step
+from .reproduction import next_generation
 from .species import SpeciesTable, clear_species, speciate
 
 COVERAGE = 0

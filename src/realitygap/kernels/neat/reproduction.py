@@ -1,16 +1,16 @@
-"""Fitness sharing, offspring, survival, stagnation and the next generation (EC02, sections 3.3 and 4.1)."""
+"""Fitness sharing, offspring, survival, stagnation and the next generation in its species (EC02, 3.3 and 4.1)."""
 
 from __future__ import annotations
 
 import math
 
-from realitygap.kernels.compile.decorators import inlined
+from realitygap.kernels.compile.decorators import inlined, shared
 from realitygap.kernels.math.philox import FIRST, PURPOSE_CHILD, make_stream
 
 from .crossover import crossover
 from .genome import copy_genome, next_below, next_uniform
 from .mutation import mutate, start_generation
-from .species import BEST_EVER, N_SPECIES
+from .species import BEST_EVER, N_SPECIES, speciate
 
 
 @inlined
@@ -231,3 +231,18 @@ def reproduce(
             parents[child, 0] = first
             parents[child, 1] = second
             child += 1
+
+
+@shared
+def next_generation(
+    old, fitness, species_of, species, rules, innovations, key, replicate, generation, children, parents
+):
+    """Breed `children` from `old` and place them in species; arguments as in `reproduce` and `speciate`.
+
+    Where `children.full` is set, a gene found no room and everything written is worth nothing.
+    """
+    reproduce(
+        old, fitness, species_of, species, rules, innovations, key, replicate, generation, children, parents
+    )
+    if not children.full[0]:
+        speciate(children, old, fitness, species_of, species, rules, key, replicate, generation + 1)

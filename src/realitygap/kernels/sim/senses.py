@@ -21,8 +21,7 @@ from realitygap.kernels.math.philox import (
 from .encoders import read_encoder, reckon
 from .floor import answer_line, lay_tape, place_point, sample_image
 from .light import add_light, answer_light, look_to, prepare_light
-from .noise import PER_BLOCK, gain_noise, mixture, second_word, uniform_noise
-from .pulses import count_pulses, pulse_words
+from .noise import PER_BLOCK, count_pulses, gain_noise, mixture, pulse_words, second_word, uniform_noise
 from .ranges import (
     add_edges,
     compress,

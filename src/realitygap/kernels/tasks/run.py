@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from realitygap.kernels.compile.decorators import kernel
 from realitygap.kernels.math.philox import FIRST
-from realitygap.kernels.neat.evolve import next_generation
 from realitygap.kernels.neat.genome import Genomes, first_genomes, make_genomes
 from realitygap.kernels.neat.mutation import Innovations, make_innovations
 from realitygap.kernels.neat.network import Networks, decode, make_networks
+from realitygap.kernels.neat.reproduction import next_generation
 from realitygap.kernels.neat.species import N_SPECIES, SpeciesTable, make_species, speciate
 
 from .double_pole import (

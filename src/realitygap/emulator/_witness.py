@@ -11,7 +11,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from realitygap._closing import ClosedOnExit
+from realitygap._closed_on_exit import ClosedOnExit
 from realitygap._limits import parse_json
 from realitygap.errors import RobotError
 from realitygap.world import Arena, Grid, Pose

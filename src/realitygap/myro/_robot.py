@@ -9,7 +9,7 @@ import inspect
 from collections.abc import Callable
 from typing import Any, Concatenate, ParamSpec, TypeVar
 
-from realitygap._closing import ClosedOnExit
+from realitygap._closed_on_exit import ClosedOnExit
 from realitygap._foreign_text import printable
 from realitygap.errors import RobotError
 from realitygap.robots import SystemClock

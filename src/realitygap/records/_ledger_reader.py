@@ -9,7 +9,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from realitygap._closing import ClosedOnExit
+from realitygap._closed_on_exit import ClosedOnExit
 from realitygap._limits import parse_json
 from realitygap.drawing import ShownAsCard
 from realitygap.errors import LedgerError

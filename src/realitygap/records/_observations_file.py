@@ -19,7 +19,7 @@ from typing import Any, TypedDict
 import numpy as np
 from numpy.typing import NDArray
 
-from realitygap._closing import ClosedOnExit
+from realitygap._closed_on_exit import ClosedOnExit
 from realitygap._limits import MOST_LINES_BYTES, LimitError, parse_json, read_file
 from realitygap._version import __version__
 from realitygap.errors import RecordError

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from realitygap._closing import ClosedOnExit
+from realitygap._closed_on_exit import ClosedOnExit
 from realitygap.errors import RobotError
 
 

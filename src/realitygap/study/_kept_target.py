@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from realitygap._closing import ClosedOnExit
+from realitygap._closed_on_exit import ClosedOnExit
 from realitygap.calibration import ruled
 from realitygap.errors import RecordError, RobotError, StudyError
 from realitygap.records import ObservationsFile, Observe, TrialRecord, sees

@@ -10,7 +10,7 @@ from typing import Protocol, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from realitygap._closing import ClosedOnExit
+from realitygap._closed_on_exit import ClosedOnExit
 from realitygap.errors import did_you_mean, whole_number
 from realitygap.evolution import Genome
 from realitygap.records import OBSERVATIONS, Observe, TrialRecord, sees

@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from realitygap._closing import ClosedOnExit
+from realitygap._closed_on_exit import ClosedOnExit
 from realitygap.errors import RobotError
 from realitygap.evolution import inputs_of_robot
 from realitygap.records import Observe, TrialRecord

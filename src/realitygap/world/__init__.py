@@ -10,6 +10,7 @@ from ._arena import (
 from ._arena_file import ArenaFile
 from ._calibration import Calibration, Fitted
 from ._case import Case, CaseBody, CaseDevice
+from ._described import INCH, in_si
 from ._distribution import Distribution
 from ._floor import BARE_FLOOR, Floor, FloorImage
 from ._grid import Grid, VisitedCells, cells_along
@@ -22,7 +23,6 @@ from ._library import (
     read_toml,
     robot_names,
 )
-from ._numbers import INCH, in_si
 from ._obstacle import Goal, Light, Obstacle, Segment, distance_to_segment
 from ._part import MOST_CORNERS, Part, rounded, why_no_part
 from ._pictures import (

@@ -11,10 +11,10 @@ from realitygap.drawing import picture_of
 from realitygap.errors import check_finite
 
 from ._arena_file import ArenaFile
+from ._described import INCH
 from ._distribution import Distribution
 from ._floor import BARE_FLOOR, Floor
 from ._grid import Grid
-from ._numbers import INCH
 from ._obstacle import Goal, Light, Obstacle, Segment
 
 MOST_ROBOTS = 16

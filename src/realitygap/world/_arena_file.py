@@ -11,9 +11,9 @@ from pydantic import Field, model_validator
 from realitygap._toml import toml_table, toml_value
 from realitygap.settings import Settings, shown
 
+from ._described import INCH, Described, NotNegative, Number, Positive, in_si
 from ._distribution import Distribution
 from ._floor import MOST_PIXELS, Floor, FloorImage
-from ._numbers import INCH, Described, NotNegative, Number, Positive, in_si
 from ._obstacle import TAPE_WIDTH, Obstacle
 from ._part import Corner, box_as_corners, why_no_part
 

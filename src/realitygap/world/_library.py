@@ -21,8 +21,8 @@ from realitygap.robot_families import RobotFamily, own_families, robot_families
 from ._arena import NAMED_STARTS, Arena, paper_arena
 from ._arena_file import ArenaFile, in_meters
 from ._calibration import Calibration, is_calibration
+from ._described import in_si
 from ._floor import MOST_PIXELS, FloorImage
-from ._numbers import in_si
 from ._robot_model import RobotModel
 from ._svg import svg_values
 

@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 
 from realitygap.settings import Settings, shown
 
-from ._numbers import NotNegative, Number
+from ._described import NotNegative, Number
 
 Points = tuple[tuple[float, float], ...]
 

@@ -9,8 +9,8 @@ from realitygap._numbers import fixed
 from realitygap.drawing import Disc, Ink, Line, Picture, Shape, Text, picture_of
 
 from ._arena import Arena, Pose
+from ._described import INCH
 from ._floor import BARE_FLOOR, Floor, FloorImage
-from ._numbers import INCH
 from ._obstacle import Goal, Light, Obstacle
 from ._robot import Body, RangeSensors
 from ._robot_model import RobotModel

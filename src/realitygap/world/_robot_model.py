@@ -11,7 +11,7 @@ from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, mod
 from realitygap.drawing import Ink, picture_of
 from realitygap.settings import Settings
 
-from ._numbers import Described, NotNegative, Number, Positive, Share
+from ._described import Described, NotNegative, Number, Positive, Share
 from ._part import Part
 
 MOST_SENSORS = 64  # of one kind

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from realitygap._closing import ClosedOnExit
+from realitygap._closed_on_exit import ClosedOnExit
 from realitygap.errors import RobotError, from_extra
 from realitygap.world import Arena, Pose
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from realitygap._closing import ClosedOnExit
+from realitygap._closed_on_exit import ClosedOnExit
 from realitygap.errors import VisionError, check_finite
 from realitygap.vision._tags import CORNER_SIZE_M, RobotTag, corner_tags
 from realitygap.world import Arena

@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from realitygap._closing import ClosedOnExit
+from realitygap._closed_on_exit import ClosedOnExit
 from realitygap.emulator import cells_at_times
 from realitygap.errors import RobotError
 from realitygap.world import Arena, Pose, cells_along, paper_arena

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import selectors
 
-from realitygap._closing import ClosedOnExit
+from realitygap._closed_on_exit import ClosedOnExit
 from realitygap.emulator import WitnessDoor
 
 from ._playground import Playground

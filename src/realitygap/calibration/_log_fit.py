@@ -98,10 +98,12 @@ class LogProblem:
 
     def prior(self, point: Floats) -> tuple[float, Floats]:
         """Return the log density of the prior at a point, and its slope."""
-        logs = sum(float(one.log_prior(value)) for one, value in zip(self.every, point, strict=True))
+        logs = sum(
+            float(parameter.log_prior(value)) for parameter, value in zip(self.every, point, strict=True)
+        )
         slopes = [
-            -value if one.kind == "noise" else -2 * value / (1 + value**2)
-            for one, value in zip(self.every, point, strict=True)
+            -value if parameter.kind == "noise" else -2 * value / (1 + value**2)
+            for parameter, value in zip(self.every, point, strict=True)
         ]
         return logs, np.array(slopes)
 
@@ -149,8 +151,12 @@ class LogProblem:
         """Return a point with the robot's own numbers, and the delays and the noise that suit them best."""
         free, p = self.numbers.free, len(self.numbers.free)
         point = np.zeros(len(self.every))
-        point[:p][[one.kind == "size" for one in free]] = 0.1
-        own_noise = [k for k, one in enumerate(free) if one.kind == "noise" and one.name.startswith("drive.")]
+        point[:p][[parameter.kind == "size" for parameter in free]] = 0.1
+        own_noise = [
+            k
+            for k, parameter in enumerate(free)
+            if parameter.kind == "noise" and parameter.name.startswith("drive.")
+        ]
         if not self.numbers.camera:
             return point
         delay = self.numbers.camera[0]
@@ -285,7 +291,7 @@ def _widened(information: Floats, blocks: Floats) -> tuple[Floats, Floats]:
 def _inseparable(problem: LogProblem, information: Floats) -> tuple[str, ...]:
     """Return the names of the robot's parameters that the logs show only together."""
     free = problem.numbers.free[: problem.numbers.n_steady]
-    mine = [k for k, one in enumerate(free) if one.name.startswith("drive.")]
+    mine = [k for k, parameter in enumerate(free) if parameter.name.startswith("drive.")]
     if not mine:
         return ()
     others = [k for k in range(len(information)) if k not in mine]
@@ -303,9 +309,11 @@ def _inseparable(problem: LogProblem, information: Floats) -> tuple[str, ...]:
 def _spread(problem: LogProblem, draws: Floats, against: Contradictions, rng: np.random.Generator) -> None:
     """Spread the draws (d, q) of gains and of the track by as much as thirds of the logs contradict the fit."""
     shares = {"drive.gain": against.drives, "encoder.gain": against.drives, "drive.track": against.turns}
-    for k, one in enumerate(problem.numbers.free):
-        if shares.get(one.name):
-            draws[:, k] += shares[one.name] / one.spread / np.sqrt(3.0) * rng.standard_normal(len(draws))
+    for k, parameter in enumerate(problem.numbers.free):
+        if shares.get(parameter.name):
+            draws[:, k] += (
+                shares[parameter.name] / parameter.spread / np.sqrt(3.0) * rng.standard_normal(len(draws))
+            )
 
 
 def _vague(problem: LogProblem, draws: Floats) -> tuple[str, ...]:
@@ -313,9 +321,12 @@ def _vague(problem: LogProblem, draws: Floats) -> tuple[str, ...]:
     low, middle, high = np.quantile(draws, (0.05, 0.5, 0.95), axis=0)
     spread = (high - low) / 3.29
     return tuple(
-        one.name
-        for one, at, wide in zip(problem.numbers.free, middle, spread, strict=False)
-        if one.name.startswith("drive.") and one.kind != "noise" and wide > VAGUE and abs(at) < CLEAR * wide
+        parameter.name
+        for parameter, at, wide in zip(problem.numbers.free, middle, spread, strict=False)
+        if parameter.name.startswith("drive.")
+        and parameter.kind != "noise"
+        and wide > VAGUE
+        and abs(at) < CLEAR * wide
     )
 
 
@@ -327,9 +338,11 @@ def _draw(
     Differs: the peak of the posterior stands for that of the likelihood, so that a direction of which the logs show
     nothing has no slope.
     """
-    is_noise = np.array([one.kind == "noise" for one in problem.every])
+    is_noise = np.array([parameter.kind == "noise" for parameter in problem.every])
     least = np.full(len(point), -np.inf)
-    least[: len(problem.numbers.free)] = [problem.numbers.least(one) for one in problem.numbers.free]
+    least[: len(problem.numbers.free)] = [
+        problem.numbers.least(parameter) for parameter in problem.numbers.free
+    ]
     linear = information @ point + pull
     at, draws = point.copy(), []
     for sweep in range(SWEEPS + BURN_IN):

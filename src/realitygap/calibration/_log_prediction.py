@@ -244,18 +244,18 @@ def look_up_motion(time_s: ArrayLike, commands: ArrayLike, poses: ArrayLike, spl
     Returns:
         The motion of what the camera sees; None if no motion was seen in the fitted part.
     """
-    time, asked, seen = (np.asarray(values, np.float64) for values in (time_s, commands, poses))
+    time, commanded, seen = (np.asarray(values, np.float64) for values in (time_s, commands, poses))
     lasts = np.diff(time)
-    ahead, turn = _motion(asked, seen)
+    ahead, turn = _motion(commanded, seen)
     # a wheel nears its command, so the one before counts as well
-    told = np.concatenate([asked[:-1], np.concatenate([asked[:1], asked[:-2]])], 1)
+    recent = np.concatenate([commanded[:-1], np.concatenate([commanded[:1], commanded[:-2]])], 1)
     known = np.flatnonzero(np.isfinite(ahead[: split - 1]) & np.isfinite(turn[: split - 1]))
     if not len(known):
         return None
     rate = np.stack([ahead, turn], 1)[known] / lasts[known, None]
     speeds = np.empty((len(lasts), 2))
-    for k, row in enumerate(told):
-        near = np.argsort(((told[known] - row) ** 2).sum(1), kind="stable")[:NEIGHBORS]
+    for k, row in enumerate(recent):
+        near = np.argsort(((recent[known] - row) ** 2).sum(1), kind="stable")[:NEIGHBORS]
         speeds[k] = rate[near].mean(0)
     return Steps(speeds[:, 0] * lasts, speeds[:, 1] * lasts)
 

@@ -178,13 +178,13 @@ def _solve(problem: Problem) -> tuple[Problem, Floats, DeadBand, Floats]:
 
 def _first_place(problem: Problem, scatter: Scatter, noise: Floats) -> Floats:
     names = [parameter.name for parameter in problem.free]
-    found = []
+    candidates = []
     for delay in DELAYS if "drive.delay" in names else DELAYS[:1]:
         first = problem.own.copy()
         if "drive.delay" in names:
             first[names.index("drive.delay")] = delay
-        found.append(best_place(problem, scatter, noise, first))
-    return min(found, key=lambda pair: pair[1])[0]
+        candidates.append(best_place(problem, scatter, noise, first))
+    return min(candidates, key=lambda pair: pair[1])[0]
 
 
 def _dead_band(problem: Problem, scatter: Scatter, noise: Floats, place: Floats) -> DeadBand:
@@ -274,7 +274,7 @@ def _rms(off: Floats, seen: Bools) -> list[float]:
 
 
 def fitted_parameter(
-    parameter: Parameter, estimate: float, draws: Floats, found: Identified, observe: Observe
+    parameter: Parameter, estimate: float, draws: Floats, identified: Identified, observe: Observe
 ) -> Fitted:
     """Return a parameter with its 90 % interval, and with advice if it is not identified.
 
@@ -288,20 +288,20 @@ def fitted_parameter(
         high=max(float(high), estimate),
         prior_low=parameter.prior.lowest,
         prior_high=parameter.prior.highest,
-        identified=found.identified,
+        identified=identified.identified,
         unit=parameter.unit,
-        advice="" if found.identified else advice_for(parameter.name, observe, found.partners),
+        advice="" if identified.identified else advice_for(parameter.name, observe, identified.partners),
     )
 
 
 def _notes(problem: Problem, noises: Sequence[Parameter], scatters: Floats) -> tuple[str, ...]:
-    said = {parameter.name: float(np.median(scatters[:, k])) for k, parameter in enumerate(noises)}
+    scatter = {parameter.name: float(np.median(scatters[:, k])) for k, parameter in enumerate(noises)}
     notes = [
         f"{len(problem.windows.trial)} windows of {problem.windows.step_s:g} s in {len(problem.windows.trials)} trials"
     ]
     if problem.windows.trials[0].observe == "track":
         notes.append(
-            f"camera: about {1000 * said['camera.place']:.1f} mm and {said['camera.angle']:.4f} rad; "
-            f"skid sideways: {1000 * said['skid.per_m']:.1f} mm after a meter"
+            f"camera: about {1000 * scatter['camera.place']:.1f} mm and {scatter['camera.angle']:.4f} rad; "
+            f"skid sideways: {1000 * scatter['skid.per_m']:.1f} mm after a meter"
         )
     return tuple(notes)

@@ -195,52 +195,52 @@ def _fitted(posterior: LogPosterior, best: Floats) -> tuple[Fitted, ...]:
     """Return the parameters of the robot, of its encoders, and of the camera, with intervals."""
     numbers = posterior.numbers
     rows = []
-    for k, one in enumerate(numbers.free):
-        own = numbers.own[one.name]
-        if one.name in (*posterior.together, *posterior.vague):
-            rows.append(_unknown(one, own))
-        elif "." in one.name:  # others are noise of what was seen
-            rows.append(_row(one, own, float(best[k]), posterior.draws[:, k]))
+    for k, parameter in enumerate(numbers.free):
+        own = numbers.own[parameter.name]
+        if parameter.name in (*posterior.together, *posterior.vague):
+            rows.append(_unknown(parameter, own))
+        elif "." in parameter.name:  # others are noise of what was seen
+            rows.append(_row(parameter, own, float(best[k]), posterior.draws[:, k]))
     seen = list(numbers.camera) * (posterior.n_cameras if numbers.camera else 0)
-    for k, one in enumerate(seen, len(numbers.free)):
-        row = _row(one, 0.0, float(best[k]), posterior.draws[:, k])
+    for k, parameter in enumerate(seen, len(numbers.free)):
+        row = _row(parameter, 0.0, float(best[k]), posterior.draws[:, k])
         if posterior.n_cameras > 1:
             number = (k - len(numbers.free)) // len(numbers.camera) + 1
-            row = row.model_copy(update={"name": one.name.replace("camera.", f"camera.{number}.")})
+            row = row.model_copy(update={"name": parameter.name.replace("camera.", f"camera.{number}.")})
         rows.append(row)
     return tuple(rows)
 
 
-def _unknown(one: LogParameter, own: float) -> Fitted:
+def _unknown(parameter: LogParameter, own: float) -> Fitted:
     """Return a parameter that keeps the robot's own number, with the interval of its prior."""
-    low, high = _ends(one, own)
+    low, high = _ends(parameter, own)
     return Fitted(
-        name=one.name, estimate=own, low=low, high=high, prior_low=low, prior_high=high, identified=False,
-        unit=one.unit, advice=one.advice,
+        name=parameter.name, estimate=own, low=low, high=high, prior_low=low, prior_high=high, identified=False,
+        unit=parameter.unit, advice=parameter.advice,
     )  # fmt: skip
 
 
-def _ends(one: LogParameter, own: float) -> tuple[float, float]:
+def _ends(parameter: LogParameter, own: float) -> tuple[float, float]:
     """Return the 90 % interval of a parameter's prior."""
-    low, high = one.of(own, np.array([-one.most, one.most])).tolist()
-    return max(low, 0.0) if one.kind == "size" else low, high
+    low, high = parameter.of(own, np.array([-parameter.most, parameter.most])).tolist()
+    return max(low, 0.0) if parameter.kind == "size" else low, high
 
 
-def _row(one: LogParameter, own: float, best: float, draws: Floats) -> Fitted:
-    prior_low, prior_high = _ends(one, own)
-    low, high = np.quantile(one.of(own, draws), ENDS)
-    estimate = float(one.of(own, np.array([best]))[0])
+def _row(parameter: LogParameter, own: float, best: float, draws: Floats) -> Fitted:
+    prior_low, prior_high = _ends(parameter, own)
+    low, high = np.quantile(parameter.of(own, draws), ENDS)
+    estimate = float(parameter.of(own, np.array([best]))[0])
     identified = bool(np.std(draws) < IDENTIFIED) and prior_low <= estimate <= prior_high
     return Fitted(
-        name=one.name,
+        name=parameter.name,
         estimate=estimate,
         low=float(low),
         high=float(high),
         prior_low=prior_low,
         prior_high=prior_high,
         identified=identified,
-        unit=one.unit,
-        advice="" if identified else one.advice,
+        unit=parameter.unit,
+        advice="" if identified else parameter.advice,
     )
 
 

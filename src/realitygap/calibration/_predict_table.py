@@ -69,7 +69,7 @@ def look_up_readings(
     at = which, row + FARTHEST, column + FARTHEST
     np.add.at(total, tuple(part[seen] for part in at), values[seen])
     np.add.at(count, tuple(part[seen] for part in at), 1.0)
-    found = np.full(len(which), np.nan)
+    means = np.full(len(which), np.nan)
     for reach in range(1, FARTHEST + 1):
         steps = [
             (i, j)
@@ -82,8 +82,8 @@ def look_up_readings(
         mean = np.divide(
             np.sum([total[place] for place in near], axis=0), n, out=np.full(len(n), np.nan), where=n > 0
         )
-        found = np.where(np.isnan(found), mean, found)
-    return found
+        means = np.where(np.isnan(means), mean, means)
+    return means
 
 
 def place_ranks(distance_m: ArrayLike, bearing_rad: ArrayLike) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

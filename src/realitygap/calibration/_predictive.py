@@ -94,15 +94,15 @@ def misfits(
                 ]
             )
             sums[str(kind)] = sums.get(str(kind), np.zeros(3 + len(made))) + row
-    found = []
+    rows = []
     for kind, (off_sum, expected_sum, total, *own_sums) in sums.items():
         if kind in TOLERATED:
             share = (
                 (off_sum - expected_sum) / total if total else 0.0
             )  # what never varied has none to predict
             p = float(np.mean(np.array(own_sums) >= off_sum))
-            found.append(Misfit(kind, float(share), TOLERATED[kind], p))
-    return found
+            rows.append(Misfit(kind, float(share), TOLERATED[kind], p))
+    return rows
 
 
 def prediction_errors(

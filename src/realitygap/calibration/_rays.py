@@ -51,5 +51,5 @@ def _segments(arena: Arena) -> list[tuple[float, float, float, float]]:
     sides = list(arena.walls)
     for obstacle in arena.obstacles:
         points = obstacle.outline()
-        sides += [(*one, *other) for one, other in pairwise((*points, points[0]))]
+        sides += [(*first, *second) for first, second in pairwise((*points, points[0]))]
     return sides

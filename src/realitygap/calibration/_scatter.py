@@ -101,13 +101,13 @@ def _cholesky(matrices: Floats) -> Floats:
 
 def _solved(root: Floats, rows: Floats) -> Floats:
     """Return the solution x of root (n, n, w) times x = `rows`, (n, ..., w)."""
-    found = np.empty_like(rows)
+    solution = np.empty_like(rows)
     for k in range(len(root)):
-        found[k] = rows[k]
+        solution[k] = rows[k]
         for j in range(k):
-            found[k] -= root[k, j] * found[j]
-        found[k] /= root[k, k]
-    return found
+            solution[k] -= root[k, j] * solution[j]
+        solution[k] /= root[k, k]
+    return solution
 
 
 def scatter_parameters(known: Known) -> list[Parameter]:

@@ -45,8 +45,8 @@ class Shots:
     def blocks(self, length: int) -> tuple[NDArray[np.int64], int]:
         """Return the block of each command, (k, t), and the number of blocks."""
         k, t = self.known.shape
-        each = -(-t // length)
-        return np.arange(k)[:, None] * each + np.arange(t) // length, k * each
+        n_blocks = -(-t // length)
+        return np.arange(k)[:, None] * n_blocks + np.arange(t) // length, k * n_blocks
 
 
 def shots_of(trials: Sequence[TrialRecord], robot: RobotModel, arena: Arena) -> Shots:
@@ -62,7 +62,7 @@ def shots_of(trials: Sequence[TrialRecord], robot: RobotModel, arena: Arena) -> 
             wheels[row, : n + 1] = trial.wheels[: n + 1]
         stalled[row, :n], readings[row, :n] = trial.stalled[:n], trial.readings[:n]
     outline = outline_of(robot)
-    near = np.array([is_near(each, outline, arena) for each in poses])
+    near = np.array([is_near(path, outline, arena) for path in poses])
     near[:, :-1] |= stalled
     near[:, 1:] |= stalled
     return Shots(

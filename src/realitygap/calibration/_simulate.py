@@ -105,7 +105,7 @@ def of_one_length(trials: Sequence[TrialRecord]) -> tuple[list[TrialRecord], str
     lengths = sorted(trial.step_s for trial in trials)
     if not lengths or lengths[-1] <= (1 + ALIKE) * lengths[0]:
         return list(trials), ""
-    least = max(lengths, key=lambda length: sum(length <= each <= (1 + ALIKE) * length for each in lengths))
+    least = max(lengths, key=lambda length: sum(length <= other <= (1 + ALIKE) * length for other in lengths))
     kept = [trial for trial in trials if least <= trial.step_s <= (1 + ALIKE) * least]
     others = [length for length in lengths if not least <= length <= (1 + ALIKE) * least]
     return kept, (

@@ -198,8 +198,8 @@ def aseba_error(network: Network, interface: ControllerInterface) -> tuple[float
 
 
 def _check_inputs(sensed: Sequence[str]) -> None:
-    there = _OTHERS | {f"range.{k}" for k in range(_N_RANGE)} | {f"line.{k}" for k in range(_N_LINE)}
-    missing = [name for name in sensed if name not in there]
+    existing = _OTHERS | {f"range.{k}" for k in range(_N_RANGE)} | {f"line.{k}" for k in range(_N_LINE)}
+    missing = [name for name in sensed if name not in existing]
     if missing:
         raise ControllerError(
             f"A Thymio has no {', '.join(missing)}. Expected range.0 to range.{_N_RANGE - 1}, line.0, line.1, "

@@ -228,13 +228,13 @@ class Condition(Settings):
     @model_validator(mode="after")
     def _several_robots_can_be_scored(self) -> Self:
         robots, population = self.arena.robots, self.neat.population
-        starts, each = len(self.arena.other_starts), self.arena.networks == "each"
+        starts, is_team = len(self.arena.other_starts), self.arena.networks == "each"
         if starts not in (0, robots - 1):
             raise ValueError(
                 f"arena.other_starts has {starts} starts, expected {robots - 1} with arena.robots = {robots}"
             )
         if robots == 1:
-            if each:
+            if is_team:
                 raise ValueError(
                     "arena.networks is 'each', which is only for several robots. Set arena.robots"
                 )
@@ -244,11 +244,11 @@ class Condition(Settings):
                 f"novelty.distance is {self.novelty.distance!r}, which compares where one robot ends, expected one "
                 f"that compares cells with arena.robots = {robots}"
             )
-        if each and self.selection == "novelty":
+        if is_team and self.selection == "novelty":
             raise ValueError(
                 "arena.networks is 'each', expected 'one' with selection 'novelty': cells are those of all robots"
             )
-        if not (robots if each else 1) <= population <= MOST_TEAMS:
+        if not (robots if is_team else 1) <= population <= MOST_TEAMS:
             raise ValueError(
                 f"neat.population is {population:,}, expected {robots} to {MOST_TEAMS:,} with arena.robots = {robots}"
             )
@@ -428,12 +428,12 @@ def _lines(error: ValidationError, within: tuple[str, ...]) -> list[InitErrorDet
     """Return the mistakes of an error, with the name of their table in front of their places."""
     return [
         {
-            "type": each["type"],
-            "loc": (*within, *each["loc"]),
-            "input": each["input"],
-            "ctx": each.get("ctx", {}),
+            "type": detail["type"],
+            "loc": (*within, *detail["loc"]),
+            "input": detail["input"],
+            "ctx": detail.get("ctx", {}),
         }
-        for each in error.errors()
+        for detail in error.errors()
     ]
 
 

@@ -166,23 +166,23 @@ class PythonTask(Settings):
         function, n = self.function(), len(trajectories)
         try:
             if hasattr(function, "py_func"):
-                told = np.full(n, np.nan)
-                function(trajectories.arrays, trajectories.step_s, told)
+                scores = np.full(n, np.nan)
+                function(trajectories.arrays, trajectories.step_s, scores)
             else:
-                told = np.asarray(function(trajectories), np.float64)
+                scores = np.asarray(function(trajectories), np.float64)
         except Exception as error:  # a user's function may raise anything
             raise TaskError(_failed(self, error)) from error
-        if told.shape != (n,):
+        if scores.shape != (n,):
             raise TaskError(
-                f"{self.function_name} of {self.file} returned an array of shape {told.shape}, expected ({n},): one "
+                f"{self.function_name} of {self.file} returned an array of shape {scores.shape}, expected ({n},): one "
                 "number for each trial."
             )
-        if not np.isfinite(told).all():
-            k = int(np.flatnonzero(~np.isfinite(told))[0])
+        if not np.isfinite(scores).all():
+            k = int(np.flatnonzero(~np.isfinite(scores))[0])
             raise TaskError(
-                f"{self.function_name} of {self.file} returned {told[k]} for trial {k}, expected finite numbers."
+                f"{self.function_name} of {self.file} returned {scores[k]} for trial {k}, expected finite numbers."
             )
-        return told
+        return scores
 
 
 def read_task_file(kind: str, folder: Path) -> tuple[str, str]:

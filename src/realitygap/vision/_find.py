@@ -62,11 +62,11 @@ def find_sheet(image: NDArray[np.uint8], layout: SheetLayout) -> Sheet:
     height, width = image.shape[:2]
     gray = _gray(image)
     corners = _tag_corners(gray)
-    there = np.concatenate([corners[number] for number in CORNER_IDS])
-    here = layout.tag_corners().reshape(-1, 2)
-    view = _first_view(here, there, width, height)
-    view = _fitted(view, here, there, None)
-    tag_error = _rms(_in_meters(view, here, view(here) - there))
+    tags_px = np.concatenate([corners[number] for number in CORNER_IDS])
+    tags_m = layout.tag_corners().reshape(-1, 2)
+    view = _first_view(tags_m, tags_px, width, height)
+    view = _fitted(view, tags_m, tags_px, None)
+    tag_error = _rms(_in_meters(view, tags_m, view(tags_m) - tags_px))
     if tag_error > TAG_LIMIT:
         raise VisionError(
             f"The four tags were found, but not where this sheet has them: they are off by {1000 * tag_error:.0f} mm. "
@@ -75,12 +75,12 @@ def find_sheet(image: NDArray[np.uint8], layout: SheetLayout) -> Sheet:
     grid_error = float("nan")
     offsets = None
     for nearness in range(ROUNDS):
-        found = grid_offsets(gray, view, layout, nearness)
-        if found is None:
+        lines = grid_offsets(gray, view, layout, nearness)
+        if lines is None:
             break
-        view = _fitted(view, here, there, found)
-        grid_error = float(np.sqrt(np.mean(np.square(found.residuals(view)))))
-        offsets = found
+        view = _fitted(view, tags_m, tags_px, lines)
+        grid_error = float(np.sqrt(np.mean(np.square(lines.residuals(view)))))
+        offsets = lines
     if offsets is not None:
         last = grid_offsets(gray, view, layout, ROUNDS)
         offsets = last or offsets
@@ -148,32 +148,32 @@ def _tag_corners(gray: NDArray[np.uint8]) -> dict[int, Floats]:
     settings.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
     settings.cornerRefinementWinSize = 5
     detector = cv2.aruco.ArucoDetector(dictionary(CORNER_FAMILY), settings)
-    found: dict[int, Floats] = {}
+    tags: dict[int, Floats] = {}
     for blur in (0.0, 1.5, 3.0):
         seen = gray if blur == 0 else cv2.GaussianBlur(gray, (0, 0), blur)
         corners, numbers, _ = detector.detectMarkers(seen)
         for number, four in zip([] if numbers is None else numbers.ravel().tolist(), corners, strict=True):
             if number in CORNER_IDS:
-                found.setdefault(number, np.asarray(four, np.float64).reshape(4, 2))
-        if len(found) == len(CORNER_IDS):
-            return found
+                tags.setdefault(number, np.asarray(four, np.float64).reshape(4, 2))
+        if len(tags) == len(CORNER_IDS):
+            return tags
     names = ("lower left", "lower right", "upper right", "upper left")
-    missing = ", ".join(names[number] for number in CORNER_IDS if number not in found)
+    missing = ", ".join(names[number] for number in CORNER_IDS if number not in tags)
     raise VisionError(
-        f"Of the sheet's four tags {len(found)} were found; missing: {missing}. Take the photo again with all four "
+        f"Of the sheet's four tags {len(tags)} were found; missing: {missing}. Take the photo again with all four "
         "corners in it, sharp and without glare; `realitygap print-sheet` prints such a sheet."
     )
 
 
-def _first_view(here: Floats, there: Floats, width: int, height: int) -> View:
+def _first_view(here: Floats, observed: Floats, width: int, height: int) -> View:
     cv2 = from_extra("cv2", "vision")
-    homography, _ = cv2.findHomography(here, there)
+    homography, _ = cv2.findHomography(here, observed)
     if homography is None:
         raise VisionError("The sheet's tags lie on one line of the photograph. Take it from further above.")
     return View(np.asarray(homography, np.float64), 0.0, 0.0, width, height)
 
 
-def _fitted(view: View, here: Floats, there: Floats, lines: GridOffsets | None) -> View:
+def _fitted(view: View, here: Floats, observed: Floats, lines: GridOffsets | None) -> View:
     """Return the view that fits the observed tags and grid best."""
     from scipy.optimize import least_squares
 
@@ -183,7 +183,7 @@ def _fitted(view: View, here: Floats, there: Floats, lines: GridOffsets | None) 
     def off(numbers: Floats) -> Floats:
         tried = View.from_numbers(numbers, width, height)
         bent = np.array([2 * numbers[8], 4 * numbers[9]])  # a weak pull towards a straight lens
-        parts = [TAG_WEIGHT * 1000 * px * (tried(here) - there).ravel(), bent]
+        parts = [TAG_WEIGHT * 1000 * px * (tried(here) - observed).ravel(), bent]
         if lines is not None:
             parts.append(1000 * lines.residuals(tried))
         return np.concatenate(parts)

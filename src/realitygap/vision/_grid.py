@@ -86,22 +86,22 @@ def grid_offsets(
     level = np.stack(np.meshgrid(u, np.arange(grid.rows + 1.0)), axis=-1)
     corner = np.array([grid.x, grid.y])
     middles = [corner + grid.cell * upright, corner + grid.cell * level]
-    found = [
+    all_offsets = [
         _offsets(image, view, places, axis, reach, grid.cell / STRETCHES)
         for axis, places in enumerate(middles)
     ]
-    is_seen = [np.isfinite(part) & ~_is_outlier(part) for part in found]
+    is_seen = [np.isfinite(part) & ~_is_outlier(part) for part in all_offsets]
     if sum(part.sum() for part in is_seen) < FEWEST * sum(part.size for part in is_seen):
         return None
     points, seen, normals = [], [], []
-    for axis, (places, offsets, good) in enumerate(zip(middles, found, is_seen, strict=True)):
+    for axis, (places, offsets, good) in enumerate(zip(middles, all_offsets, is_seen, strict=True)):
         way = np.eye(2)[axis]
         nominal = places[good]
         points.append(nominal)
         seen.append(view(nominal + offsets[good][:, None] * way))
         normals.append(_normals(view, nominal, 1 - axis))
     upright_ones, level_ones = (
-        _smooth(np.where(good, part, np.nan)) for part, good in zip(found, is_seen, strict=True)
+        _smooth(np.where(good, part, np.nan)) for part, good in zip(all_offsets, is_seen, strict=True)
     )
     return GridOffsets(
         np.concatenate(points), np.concatenate(seen), np.concatenate(normals), upright_ones, level_ones,

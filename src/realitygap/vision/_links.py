@@ -206,13 +206,13 @@ def _closing(
     labels[ends[:, 0], ends[:, 1]] = np.arange(1, len(ends) + 1)
     raised = np.where(own, np.maximum(costs, CROSSING), costs)
     search = _search(labels, raised)
-    one, other = search.region[search.rows], search.region[search.columns]
-    fits = np.flatnonzero((one != other) & (search.total < CLOSING[-1][0]))
+    first, second = search.region[search.rows], search.region[search.columns]
+    fits = np.flatnonzero((first != second) & (search.total < CLOSING[-1][0]))
     ways: list[NDArray[np.int64]] = []
     used: set[int] = set()
     tried: set[tuple[int, int]] = set()
     for edge in fits[np.argsort(search.total[fits])].tolist():
-        pair = (int(one[edge]), int(other[edge]))
+        pair = (int(first[edge]), int(second[edge]))
         if pair in tried or pair[::-1] in tried or used & set(pair):
             continue
         tried.add(pair)
@@ -249,8 +249,8 @@ def _ends(trace: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.float
     offset = np.where(trace, np.hypot(across, down) / END_RADIUS, 0)
     near = ndimage.binary_dilation(offset > END_OFFSET, np.ones((3, 3), np.bool_))
     labels, n = ndimage.label(near, np.ones((3, 3), np.bool_))
-    found = ndimage.maximum_position(offset, labels, range(1, n + 1))
-    ends = np.array([end for end in found if _times_met(trace, end) == 1], np.int64).reshape(-1, 2)
+    peaks = ndimage.maximum_position(offset, labels, range(1, n + 1))
+    ends = np.array([end for end in peaks if _times_met(trace, end) == 1], np.int64).reshape(-1, 2)
     at = ends[:, 0], ends[:, 1]
     outward = -np.column_stack([down[at], across[at]]).astype(np.float64)
     return ends, outward / np.maximum(np.hypot(*outward.T), 1e-9)[:, None]
@@ -284,7 +284,9 @@ def _graph(costs: Floats) -> tuple[Any, NDArray[np.int64]]:
         both = (a >= 0) & (b >= 0)
         length = np.hypot(down, right) * 1000 * STEP
         parts.append((a[both], b[both], (cost_a[both] + cost_b[both]) * (length / 2)))
-    rows, columns, values = (np.concatenate(each) for each in zip(*parts, strict=True))
+    rows, columns, values = (
+        np.concatenate(columns_of_parts) for columns_of_parts in zip(*parts, strict=True)
+    )
     graph = coo_matrix(
         (np.tile(values, 2), (np.concatenate([rows, columns]), np.concatenate([columns, rows]))),
         (len(nodes), len(nodes)),

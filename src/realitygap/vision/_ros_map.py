@@ -270,7 +270,7 @@ def _walls(cv2: Any, grid: OccupancyMap, space: NDArray[np.bool_], tolerance: fl
         places = np.rint((corners + 0.5) / n_parts) - 1.0  # the corners of pixels
         points = grid.to_map(places[:, 0] + left, places[:, 1] + top).round(4).tolist()
         ends = [*points[1:], points[0]] if len(points) > 2 else points[1:]
-        walls += [[*one, *other] for one, other in zip(points, ends, strict=False) if one != other]
+        walls += [[*first, *second] for first, second in zip(points, ends, strict=False) if first != second]
     return walls
 
 
@@ -391,8 +391,8 @@ def _values(path: Path) -> dict[str, Any]:
                 )
         values = yaml.load(text, _loader(yaml))
     except (yaml.YAMLError, RecursionError, ValueError) as error:
-        said = str(error).split("\n")[0]
-        raise DescriptionError(f"{path}: not YAML ({said}).") from None
+        message = str(error).split("\n")[0]
+        raise DescriptionError(f"{path}: not YAML ({message}).") from None
     missing = [key for key in _KEYS if not (isinstance(values, dict) and key in values)]
     if missing:
         raise DescriptionError(

@@ -63,9 +63,9 @@ class Affine:
     @property
     def scale(self) -> float:
         """Factor by which the map enlarges everything; nan if it differs between directions."""
-        one, other = math.hypot(self.a, self.b), math.hypot(self.c, self.d)
-        is_square = abs(self.a * self.c + self.b * self.d) <= 1e-6 * one * other
-        return one if is_square and abs(one - other) <= 1e-6 * one else math.nan
+        first, second = math.hypot(self.a, self.b), math.hypot(self.c, self.d)
+        is_square = abs(self.a * self.c + self.b * self.d) <= 1e-6 * first * second
+        return first if is_square and abs(first - second) <= 1e-6 * first else math.nan
 
 
 @dataclass(frozen=True)
@@ -253,21 +253,21 @@ def _transform(element: ElementTree.Element) -> Affine:
     for name, inside in re.findall(r"(\w+)\s*\(([^)]*)\)", element.get("transform", "")):
         n = _numbers(inside)
         if name == "matrix" and len(n) == 6:
-            one = Affine(*n)
+            step = Affine(*n)
         elif name == "translate" and len(n) in (1, 2):
-            one = Affine(e=n[0], f=n[1] if len(n) == 2 else 0.0)
+            step = Affine(e=n[0], f=n[1] if len(n) == 2 else 0.0)
         elif name == "scale" and len(n) in (1, 2):
-            one = Affine(a=n[0], d=n[-1])
+            step = Affine(a=n[0], d=n[-1])
         elif name == "rotate" and len(n) in (1, 3):
             cos, sin = math.cos(math.radians(n[0])), math.sin(math.radians(n[0]))
             x, y = (n[1], n[2]) if len(n) == 3 else (0.0, 0.0)
-            one = Affine(cos, sin, -sin, cos, x - cos * x + sin * y, y - sin * x - cos * y)
+            step = Affine(cos, sin, -sin, cos, x - cos * x + sin * y, y - sin * x - cos * y)
         else:
             raise ValueError(
                 f"{_name(element)}: transform {name}({inside}) cannot be used. Expected translate, scale, rotate or "
                 "matrix"
             )
-        whole = whole.after(one)
+        whole = whole.after(step)
     return whole
 
 

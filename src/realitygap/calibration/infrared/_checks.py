@@ -59,8 +59,8 @@ def independence(placements: list[Placement], rng: np.random.Generator) -> Indep
     r, r_p = _consecutive(rows, rng)
     share, share_p = _between(placements, rng)
     kept = (1 - r) / (1 + r) if r_p < CERTAIN and 0 < r < 1 else 1.0
-    each = kept * n / max(len(rows), 1)
-    spread = 1 + max(each - 1, 0) * share if share_p < CERTAIN else 1.0
+    n_effective = kept * n / max(len(rows), 1)
+    spread = 1 + max(n_effective - 1, 0) * share if share_p < CERTAIN else 1.0
     return Independence(len(rows), r, r_p, share, share_p, n, n * kept / spread)
 
 
@@ -74,11 +74,11 @@ def _consecutive(rows: list[Array], rng: np.random.Generator) -> tuple[float, fl
     def correlation(rows: list[Array]) -> float:
         return sum(float(row[1:] @ row[:-1]) for row in rows) / power
 
-    found = correlation(centered)
+    observed = correlation(centered)
     shuffled = [correlation([rng.permutation(row) for row in centered]) for _ in range(SHUFFLES)]
-    p = (1 + sum(value >= found for value in shuffled)) / (1 + SHUFFLES)
+    p = (1 + sum(value >= observed for value in shuffled)) / (1 + SHUFFLES)
     n = sum(map(len, centered))
-    return min(found + len(centered) / n, 1.0), p  # a mean taken from the same readings lowers it by 1 / n
+    return min(observed + len(centered) / n, 1.0), p  # a mean taken from the same readings lowers it by 1 / n
 
 
 def _between(placements: list[Placement], rng: np.random.Generator) -> tuple[float, float]:
@@ -97,10 +97,10 @@ def _between(placements: list[Placement], rng: np.random.Generator) -> tuple[flo
         mixed = rng.permutation(np.concatenate(rows))
         return np.split(mixed, np.cumsum([len(row) for row in rows])[:-1])
 
-    found = ratio(several)
+    observed = ratio(several)
     others = [ratio([shuffled(rows) for rows in several]) for _ in range(SHUFFLES)]
-    p = (1 + sum(value >= found for value in others)) / (1 + SHUFFLES)
-    return max(found, 0.0), p
+    p = (1 + sum(value >= observed for value in others)) / (1 + SHUFFLES)
+    return max(observed, 0.0), p
 
 
 def _intraclass(rows: list[Array]) -> float:

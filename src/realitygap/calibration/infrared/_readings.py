@@ -184,7 +184,7 @@ class Readings:
         self, values: Array, distances: Array, cosines: Array, shares: Array
     ) -> tuple[Array, Array]:
         """Return means (q,) and quantiles (s, q) of readings at distances (q, rays) [m], over parameters (m, d)."""
-        blank = [Placement(each, np.empty(0), cosines=c) for each, c in zip(distances, cosines, strict=True)]
+        blank = [Placement(row, np.empty(0), cosines=c) for row, c in zip(distances, cosines, strict=True)]
         chances = self._at(Places.of(blank, self.places.reach), values).mean(axis=0)
         summed = np.cumsum(chances, axis=1)
         place = np.array([(summed < share).sum(axis=1) for share in shares])

@@ -112,5 +112,5 @@ def scaled(scale: Scale, sensor: RangeSensor) -> Scale:
 
 def column(scales: tuple[Scale, ...], values: Array, scale: Scale, own: float = 0.0) -> Array:
     """Return the values of one parameter, (m,), among those of all, (m, d), or the sensor's own number."""
-    names = [each.name for each in scales]
+    names = [candidate.name for candidate in scales]
     return values[:, names.index(scale.name)] if scale.name in names else np.full(len(values), own)

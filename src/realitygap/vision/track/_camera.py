@@ -91,9 +91,9 @@ def fit_camera(
     """
     both = sorted(set(seen) & set(layout))
     if len(both) < LEAST_TAGS:
-        found = ", ".join(map(str, both)) or "none"
+        numbers = ", ".join(map(str, both)) or "none"
         raise VisionError(
-            f"Of the tags at the arena's corners ({', '.join(map(str, sorted(layout)))}) these were found: {found}. "
+            f"Of the tags at the arena's corners ({', '.join(map(str, sorted(layout)))}) these were found: {numbers}. "
             f"Expected at least {LEAST_TAGS}. Move the camera until it sees all corners, sharp and without glare."
         )
     points = np.concatenate([layout[number] for number in both])
@@ -147,11 +147,11 @@ def _spread(robot: Floats) -> Floats:
 
 def _with_lens(size: tuple[int, int], points: Floats, pixels: Floats, views: Floats, tag: RobotTag) -> Camera:
     """Return a camera with the lens that fits best."""
-    found = [
+    fits = [
         _fit_from(_lens(size, guess * size[0], 0.0, 0.0), points, pixels, views, tag)
         for guess in FOCAL_GUESSES
     ]
-    return min(found, key=lambda one: one[0])[1]
+    return min(fits, key=lambda fit: fit[0])[1]
 
 
 def _lens(size: tuple[int, int], focal: float, k1: float, k2: float, rms: float = float("nan")) -> Lens:

@@ -165,8 +165,8 @@ def fit_lens(images: Iterable[NDArray[np.uint8]], columns: int, rows: int, squar
     for image in images:
         n += 1
         height, width = image.shape
-        found, corners = cv2.findChessboardCornersSB(image, (columns, rows))
-        if not found:
+        is_seen, corners = cv2.findChessboardCornersSB(image, (columns, rows))
+        if not is_seen:
             continue
         view = np.asarray(corners, np.float64).reshape(-1, 2)
         if not views or np.abs(views[-1] - view).mean() > LEAST_APART * width:

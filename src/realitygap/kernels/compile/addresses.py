@@ -18,12 +18,15 @@ import functools
 import platform
 import struct
 import sys
-from typing import Any
+from typing import TYPE_CHECKING
 
 import llvmlite.binding
 from numba.core import codegen as numba_codegen
 from numba.core import config
 from numba.core.compiler_lock import global_compiler_lock
+
+if TYPE_CHECKING:
+    from numba.core.cpu import CPUContext
 
 # What LLVM itself inserts, such as calls of memset, is called by the table of addresses, too.
 _BY_TABLE = """
@@ -32,7 +35,7 @@ _BY_TABLE = """
 """
 
 
-def codegen_for(numbas: Any) -> Any:
+def codegen_for(numbas: numba_codegen.JITCPUCodegen) -> numba_codegen.JITCPUCodegen:
     """Return what makes and loads machine code of kernels: one for all kernels, as they call one another.
 
     Args:
@@ -43,7 +46,7 @@ def codegen_for(numbas: Any) -> Any:
 
 
 @functools.cache
-def _codegen_for(numbas: Any) -> Any:
+def _codegen_for(numbas: numba_codegen.JITCPUCodegen) -> numba_codegen.JITCPUCodegen:
     if sys.platform != "linux" or platform.machine() != "x86_64" or not config.OPT:
         return numbas
     try:
@@ -60,19 +63,19 @@ def marks_functions() -> bool:
     return b"nonlazybind" in list(function.attributes)
 
 
-def is_short(codegen: Any) -> bool:
+def is_short(codegen: numba_codegen.JITCPUCodegen) -> bool:
     """Whether machine code of this `codegen` has short addresses."""
     return hasattr(codegen, "_short_machine")
 
 
-def context_of(target_context: Any) -> Any:
+def context_of(target_context: CPUContext) -> CPUContext:
     """Return Numba's context of the target, but with the engine of kernels."""
     numbas = target_context.codegen()
     own = codegen_for(numbas)
     return target_context if own is numbas else target_context.subtarget(_internal_codegen=own)
 
 
-def _with_own_engine(numbas: Any) -> Any:
+def _with_own_engine(numbas: numba_codegen.JITCPUCodegen) -> numba_codegen.JITCPUCodegen:
     codegen = copy.copy(numbas)
     codegen._short_machine = _machine(codegen)
     codegen._rtlinker = numba_codegen.RuntimeLinker()
@@ -87,7 +90,7 @@ def _with_own_engine(numbas: Any) -> Any:
     return codegen
 
 
-def _machine(codegen: Any) -> Any:
+def _machine(codegen: numba_codegen.JITCPUCodegen) -> llvmlite.binding.TargetMachine:
     """Return LLVM's description of this machine as Numba has it, with short addresses."""
     options = {"opt": int(config.OPT)}
     codegen._customize_tm_options(options)
@@ -96,7 +99,7 @@ def _machine(codegen: Any) -> Any:
     return target.create_target_machine(**options)
 
 
-def finish(library: Any) -> None:
+def finish(library: numba_codegen.JITCodeLibrary) -> None:
     """Make the machine code of a library of Numba, whose functions are optimized, and load it."""
     code = emit(library)
     library._set_compiled_object(code)  # as Numba does with what comes from disk
@@ -105,7 +108,7 @@ def finish(library: Any) -> None:
     library._disable_inspection = False
 
 
-def emit(library: Any) -> bytes:
+def emit(library: numba_codegen.JITCodeLibrary) -> bytes:
     """Return the machine code of a library of Numba, whose functions are optimized."""
     module, codegen = library._final_module, library._codegen
     for function in module.functions:

@@ -15,7 +15,7 @@ import time
 import warnings
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import llvmlite.binding
 import numba
@@ -25,6 +25,11 @@ from numba.core.runtime import rtsys
 
 from . import addresses
 from .progress import begin_compiling, end_compiling
+
+if TYPE_CHECKING:
+    from numba.core import types
+    from numba.core.codegen import JITCodeLibrary, JITCPUCodegen
+    from numba.core.cpu import CPUContext
 
 _PACKAGE = __name__.rsplit(".", 2)[0]
 _FOLDER = Path(__file__).parent.parent
@@ -181,7 +186,7 @@ def write_sealed(path: Path, value: Any) -> None:
         raise
 
 
-def _without_bitcode(compiled: Any) -> Any:
+def _without_bitcode(compiled: CompileResult) -> tuple[Any, ...]:
     """Return what Numba would store, less what callers would link: a kernel's callers compile it for themselves.
 
     That was nine tenths of a file, and LLVM parsed it at each start. The names are what Numba looks for.
@@ -204,13 +209,13 @@ PLAIN_WAY = "plain"
 _loaded: dict[str, Any] = {}
 
 
-def shared_symbols(library: Any) -> list[str]:
+def shared_symbols(library: JITCodeLibrary) -> list[str]:
     """Return the symbols of shared kernels that a finished library calls."""
     functions = library._final_module.functions
     return [one.name for one in functions if one.is_declaration and one.name.startswith(SHARED)]
 
 
-def load_shared(symbol: str, folder: Path, target_context: Any) -> Any:
+def load_shared(symbol: str, folder: Path, target_context: CPUContext) -> Any:
     """Return what is stored of a shared kernel, after loading it and those that it calls.
 
     Raises:
@@ -283,7 +288,7 @@ class SealedCache(caching._Cache):
     def _sources(self) -> str:
         return sources_hash(self._module)
 
-    def _key(self, signature: Any, codegen: Any) -> tuple[Any, ...]:
+    def _key(self, signature: tuple[types.Type, ...], codegen: JITCPUCodegen) -> tuple[Any, ...]:
         is_short = self._way != PLAIN_WAY and addresses.is_short(addresses.codegen_for(codegen))
         machine = (*codegen.magic_tuple(), "short" if is_short else "")
         return (self._name, self._sources, self._code, self._way, signature, machine)
@@ -294,7 +299,7 @@ class SealedCache(caching._Cache):
     def _path(self, key: tuple[Any, ...]) -> Path:
         return self._folder / f"{self._stem(key)}.kernel"
 
-    def load_overload(self, signature: Any, target_context: Any) -> Any:
+    def load_overload(self, signature: tuple[types.Type, ...], target_context: CPUContext) -> Any:
         """Return the compiled function, or None if it has to be compiled."""
         rtsys.initialize(target_context)  # all that machine code needs: the rest of Numba is for compiling
         key = self._key(signature, target_context.codegen())
@@ -310,7 +315,7 @@ class SealedCache(caching._Cache):
         context = target_context if self._way == PLAIN_WAY else addresses.context_of(target_context)
         return CompileResult._rebuild(context, *reduced) if stored == key else None
 
-    def save_overload(self, signature: Any, compiled: Any) -> None:
+    def save_overload(self, signature: tuple[types.Type, ...], compiled: CompileResult) -> None:
         """Save the compiled function, unless that fails: the function works without its file."""
         end_compiling(self._name)
         key = self._key(signature, compiled.codegen)
@@ -320,11 +325,13 @@ class SealedCache(caching._Cache):
         except OSError:
             pass
 
-    def symbol(self, signature: Any, target_context: Any) -> str:
+    def symbol(self, signature: tuple[types.Type, ...], target_context: CPUContext) -> str:
         """The symbol of a shared kernel: the same in each process that has these sources."""
         return SHARED + self._stem(self._key(signature, target_context.codegen()))
 
-    def load_shared(self, signature: Any, target_context: Any) -> dict[str, Any] | None:
+    def load_shared(
+        self, signature: tuple[types.Type, ...], target_context: CPUContext
+    ) -> dict[str, Any] | None:
         """Return what is stored of a shared kernel, or None if it has to be compiled."""
         rtsys.initialize(target_context)
         try:
@@ -335,7 +342,13 @@ class SealedCache(caching._Cache):
             return None
         return stored if key == self._key(signature, target_context.codegen()) else None
 
-    def save_shared(self, signature: Any, target_context: Any, library: Any, stored: dict[str, Any]) -> None:
+    def save_shared(
+        self,
+        signature: tuple[types.Type, ...],
+        target_context: CPUContext,
+        library: JITCodeLibrary,
+        stored: dict[str, Any],
+    ) -> None:
         """Save a shared kernel, unless that fails: it works without its file."""
         end_compiling(self._name)
         key = self._key(signature, target_context.codegen())

@@ -5,7 +5,8 @@ from __future__ import annotations
 import functools
 import operator
 from collections import Counter
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
 
 import llvmlite.binding
 from llvmlite import ir as llvm
@@ -16,7 +17,13 @@ from numba.core.typed_passes import NativeLowering
 from numba.np import arrayobj
 
 from . import addresses, parts
-from .parts import PartsBuilder
+from .parts import Lowered, PartsBuilder
+
+if TYPE_CHECKING:
+    from numba.core.codegen import JITCodeLibrary
+    from numba.core.compiler import StateDict
+    from numba.core.cpu import CPUContext
+    from numba.core.funcdesc import PythonFunctionDescriptor
 
 # Of the symbol of a function that unpacks what Python calls with.
 PYTHON_WRAPPER = "_ZN7cpython"
@@ -37,7 +44,7 @@ OPERATORS = {
 }
 
 
-def is_number(kind: Any) -> bool:
+def is_number(kind: types.Type) -> bool:
     """Whether a type is that of a number or a truth value."""
     return isinstance(types.unliteral(kind), (types.Number, types.Boolean))
 
@@ -50,7 +57,7 @@ _RESOLVED: dict[Any, tuple[Any, Any]] = {}
 _COMPARED_BY = {min: operator.lt, max: operator.gt}
 
 
-def is_min_or_max(function: Any, kinds: Any) -> bool:
+def is_min_or_max(function: types.Type, kinds: Sequence[types.Type]) -> bool:
     """Whether a call is that of `min` or `max` with two numbers, for which Numba would compile a function."""
     numbers = (types.Integer, types.Float)
     return (
@@ -61,7 +68,7 @@ def is_min_or_max(function: Any, kinds: Any) -> bool:
     )
 
 
-def _assigned_once(blocks: dict[int, Any]) -> set[str]:
+def _assigned_once(blocks: dict[int, ir.Block]) -> set[str]:
     """Variables with one assignment, which comes before all their uses on every way through `blocks`."""
     assigned: Counter[str] = Counter()
     home = {}
@@ -88,7 +95,7 @@ class _Lower(lowering.Lower):
         super()._find_singly_assigned_variable()
         self._singly_assigned_vars |= _assigned_once(self.blocks)
 
-    def storevar(self, value: Any, name: str, argidx: int | None = None) -> None:
+    def storevar(self, value: Lowered, name: str, argidx: int | None = None) -> None:
         if name in self._singly_assigned_vars:
             super().storevar(value, name, argidx)
         else:
@@ -98,11 +105,13 @@ class _Lower(lowering.Lower):
     def delvar(self, name: str) -> None:
         pass
 
-    def setup_function(self, fndesc: Any) -> None:
+    def setup_function(self, fndesc: PythonFunctionDescriptor) -> None:
         super().setup_function(fndesc)
         self.builder = PartsBuilder(self.entry_block)
 
-    def lower_getitem(self, resty: Any, expr: Any, value: Any, index: Any, signature: Any) -> Any:
+    def lower_getitem(
+        self, resty: types.Type, expr: ir.Expr, value: ir.Var, index: ir.Var, signature: typing.Signature
+    ) -> Lowered:
         array, indices = self.typeof(value.name), self._whole_numbers(index)
         if indices and parts.is_plain(array) and len(indices[0]) <= array.ndim:
             if len(indices[0]) == array.ndim or parts.is_plain(resty):
@@ -111,7 +120,9 @@ class _Lower(lowering.Lower):
                 )
         return super().lower_getitem(resty, expr, value, index, signature)
 
-    def lower_setitem(self, target: Any, index: Any, value: Any, signature: Any) -> Any:
+    def lower_setitem(
+        self, target: ir.Var, index: ir.Var, value: ir.Var, signature: typing.Signature
+    ) -> None:
         array, indices = self.typeof(target.name), self._whole_numbers(index)
         if indices and parts.is_plain(array) and len(indices[0]) == array.ndim:
             place = parts.locate(self.context, self.builder, array, self.loadvar(target.name), *indices)
@@ -121,7 +132,7 @@ class _Lower(lowering.Lower):
             return arrayobj.store_item(self.context, self.builder, array, number, place)
         return super().lower_setitem(target, index, value, signature)
 
-    def _whole_numbers(self, index: Any) -> tuple[Any, Any] | None:
+    def _whole_numbers(self, index: ir.Var) -> tuple[tuple[types.Type, ...], list[llvm.Value]] | None:
         """Types and values of an index or of a tuple of them, if these are whole numbers."""
         kind, value = self.typeof(index.name), self.loadvar(index.name)
         if isinstance(kind, types.BaseTuple):
@@ -132,7 +143,7 @@ class _Lower(lowering.Lower):
         is_whole = kinds and all(isinstance(kind, types.Integer) for kind in kinds)
         return (kinds, values) if is_whole else None
 
-    def lower_expr(self, resty: Any, expr: Any) -> Any:
+    def lower_expr(self, resty: types.Type, expr: ir.Expr) -> Lowered:
         if expr.op == "getattr" and expr.attr in _MEMBERS and parts.is_plain(self.typeof(expr.value.name)):
             return self.builder.extract_value(self.loadvar(expr.value.name), _MEMBERS[expr.attr])
         if expr.op == "call" and isinstance(resty, types.RangeType) and not expr.kws and not expr.vararg:
@@ -154,7 +165,7 @@ class _Lower(lowering.Lower):
             return parts.next_of_loop(self.context, self.builder, resty, loop)
         return super().lower_expr(resty, expr)
 
-    def lower_binop(self, resty: Any, expr: Any, op: Any) -> Any:
+    def lower_binop(self, resty: types.Type, expr: ir.Expr, op: Callable[..., object]) -> llvm.Value:
         inferred = self.fndesc.calltypes[expr]
         if op not in OPERATORS or not all(map(is_number, inferred.args)):
             return super().lower_binop(resty, expr, op)
@@ -172,7 +183,9 @@ class _Lower(lowering.Lower):
         result = self.context.get_function(*_RESOLVED[op, inferred.args])(self.builder, operands)
         return self.context.cast(self.builder, result, inferred.return_type, resty)
 
-    def _lower_min_or_max(self, kind: Any, expr: Any, compared_by: Any, kinds: Any) -> Any:
+    def _lower_min_or_max(
+        self, kind: types.Type, expr: ir.Expr, compared_by: Callable[..., object], kinds: Sequence[types.Type]
+    ) -> llvm.Value:
         first, second = (
             self.context.cast(self.builder, self.loadvar(one.name), one_kind, kind)
             for one, one_kind in zip(expr.args, kinds, strict=True)
@@ -180,7 +193,7 @@ class _Lower(lowering.Lower):
         compare = self.context.get_function(compared_by, typing.signature(types.boolean, kind, kind))
         return self.builder.select(compare(self.builder, (second, first)), second, first)
 
-    def lower_assign(self, ty: Any, inst: Any) -> Any:
+    def lower_assign(self, ty: types.Type, inst: ir.Assign) -> Lowered:
         if isinstance(ty, types.Dispatcher):
             return self.context.get_dummy_value()
         return super().lower_assign(ty, inst)
@@ -189,7 +202,7 @@ class _Lower(lowering.Lower):
 class _LowerInner(_Lower):
     """For calls from other kernels: with an argument for each number that the function uses."""
 
-    def setup_function(self, fndesc: Any) -> None:
+    def setup_function(self, fndesc: PythonFunctionDescriptor) -> None:
         convention = self.call_conv
         fndesc.mangled_name = getattr(self.library, "_symbol", fndesc.mangled_name)
         kind = convention.get_function_type(fndesc.restype, ())
@@ -204,17 +217,17 @@ class _LowerInner(_Lower):
         unshared = self.function.args[0].attributes if fndesc.noalias else ()
         self._arguments = parts.Arguments(self.context, self.function, fndesc.argtypes, unshared)
 
-    def extract_function_arguments(self) -> Any:
+    def extract_function_arguments(self) -> list[Lowered]:
         self.fnargs = self._arguments.values
         return self.fnargs
 
-    def lower_normal_function(self, fndesc: Any) -> None:
+    def lower_normal_function(self, fndesc: PythonFunctionDescriptor) -> None:
         super().lower_normal_function(fndesc)
         self.library._leaves = self._arguments.finish()
         self.library._raises = parts.raises(self.function)
 
 
-def _lowering(inner: bool, context: Any, *arguments: Any, **named: Any) -> lowering.Lower:
+def _lowering(inner: bool, context: CPUContext, *arguments: Any, **named: Any) -> lowering.Lower:
     if context.enable_nrt:
         return lowering.Lower(context, *arguments, **named)
     return (_LowerInner if inner else _Lower)(context, *arguments, **named)
@@ -227,18 +240,18 @@ class LowerKernel(NativeLowering):
     _name = "lower_kernel"
 
     @property
-    def lowering_class(self) -> Any:
+    def lowering_class(self) -> Callable[..., lowering.Lower]:
         """Return the class that lowers the instructions."""
         return functools.partial(_lowering, isinstance(self, LowerForCallers))
 
-    def run_pass(self, state: Any) -> bool:
+    def run_pass(self, state: StateDict) -> bool:
         """Lower a function; return whether anything changed."""
         if state.library is None:
             state.library = _make_library(state)
         return super().run_pass(state)
 
 
-def _make_library(state: Any) -> Any:
+def _make_library(state: StateDict) -> JITCodeLibrary:
     """Return an empty library for a function."""
     codegen = addresses.codegen_for(state.targetctx.codegen())
     library = codegen.create_library(state.func_id.func_qualname)
@@ -250,7 +263,7 @@ def _make_library(state: Any) -> Any:
     return library
 
 
-def _add_module(library: Any, module: Any) -> None:
+def _add_module(library: JITCodeLibrary, module: llvm.Module) -> None:
     """Add what was lowered to a library.
 
     A wrapper takes a hundred arguments apart once a call. Optimized, it took a quarter of the time of all.
@@ -261,7 +274,7 @@ def _add_module(library: Any, module: Any) -> None:
     type(library).add_ir_module(library, module)
 
 
-def _tidy(library: Any, module: Any) -> None:
+def _tidy(library: JITCodeLibrary, module: llvmlite.binding.ModuleRef) -> None:
     """Make functions small for the whole that they become part of, where LLVM spends its effort."""
     codegen = library._codegen
     module.data_layout = codegen._data_layout
@@ -272,7 +285,7 @@ def _tidy(library: Any, module: Any) -> None:
         passes.run(function, builder)
 
 
-def _optimize(library: Any, unroll: bool) -> None:
+def _optimize(library: JITCodeLibrary, unroll: bool) -> None:
     """Optimize a whole library, once; Numba's first round is for what counts who holds arrays."""
     options = llvmlite.binding.create_pipeline_tuning_options(speed_level=3 if unroll else 2)
     options.loop_vectorization = True
@@ -290,7 +303,7 @@ class LowerForCallers(LowerKernel):
 
     _name = "lower_for_callers"
 
-    def run_pass(self, state: Any) -> bool:
+    def run_pass(self, state: StateDict) -> bool:
         """Lower a function to a library that callers link; return that it changed."""
         library = state.library = self._library(state)
         state.flags.no_compile = True
@@ -312,13 +325,13 @@ class LowerForCallers(LowerKernel):
         state["cr"] = lowered._replace(cfunc=function)
         return True
 
-    def _library(self, state: Any) -> Any:
+    def _library(self, state: StateDict) -> JITCodeLibrary:
         library = _make_library(state)
         library._optimize_final_module = lambda: None
         library._finalize_final_module = functools.partial(_finish_without_code, library)
         return library
 
-    def _linked(self, library: Any) -> list[Any]:
+    def _linked(self, library: JITCodeLibrary) -> list[JITCodeLibrary]:
         """Return the libraries that become part of callers."""
         return [library]
 
@@ -329,25 +342,30 @@ class LowerShared(LowerForCallers):
 
     _name = "lower_shared"
 
-    def _library(self, state: Any) -> Any:
+    def _library(self, state: StateDict) -> JITCodeLibrary:
         library = _make_library(state)
         library._symbol = state.symbol
         library._optimize_final_module = functools.partial(_optimize, library, state.unroll)
         return library
 
-    def _linked(self, library: Any) -> list[Any]:
+    def _linked(self, library: JITCodeLibrary) -> list[JITCodeLibrary]:
         library.finalize()
         return []
 
 
 def register_call(
-    context: Any, function: Any, fndesc: Any, leaves: Any, can_raise: bool, libraries: Any
+    context: CPUContext,
+    function: Callable[..., object],
+    fndesc: PythonFunctionDescriptor,
+    leaves: list[parts.Leaf],
+    can_raise: bool,
+    libraries: list[JITCodeLibrary],
 ) -> None:
     """Have kernels call a function with what it uses of its arguments."""
     call = parts.caller_of(context, fndesc, leaves, can_raise, libraries)
     context._defns[function].append(call, call.signature)
 
 
-def _finish_without_code(library: Any) -> None:
+def _finish_without_code(library: JITCodeLibrary) -> None:
     library._finalize_dynamic_globals()
     library._finalized = True

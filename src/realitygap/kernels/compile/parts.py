@@ -7,16 +7,25 @@ that needs it whole, and a function has an argument for each number that it uses
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from typing import Any, NamedTuple
+from collections.abc import Callable, Iterator, Sequence
+from typing import TYPE_CHECKING, NamedTuple
 
 from llvmlite import ir
 from numba.core import cgutils, types
 from numba.core.imputils import fix_returning_optional
 from numba.np import arrayobj
 
+if TYPE_CHECKING:
+    from numba.core import typing
+    from numba.core.codegen import JITCodeLibrary
+    from numba.core.cpu import CPUContext
+    from numba.core.funcdesc import PythonFunctionDescriptor
+
 # Members of Numba's struct of an array.
 MEMINFO, PARENT, N_ITEMS, ITEM_SIZE, DATA, SHAPE, STRIDES = range(7)
+
+Made = Callable[[ir.IRBuilder], ir.Value]
+"""A function that makes a member in the current block."""
 
 # What a function returns that raised nothing.
 _SUCCESS = {0, -2}
@@ -27,16 +36,16 @@ class Parts:
 
     __slots__ = ("members", "type")
 
-    def __init__(self, llvm_type: Any, members: list[Any]) -> None:
+    def __init__(self, llvm_type: ir.Type, members: list[Lowered | Made]) -> None:
         self.type = llvm_type
         self.members = members
 
-    def member(self, builder: Any, index: int) -> Any:
+    def member(self, builder: ir.IRBuilder, index: int) -> Lowered:
         """Return a member, made by the current block if it must be made."""
         value = self.members[index]
         return value(builder) if callable(value) else value
 
-    def whole(self, builder: Any) -> Any:
+    def whole(self, builder: ir.IRBuilder) -> ir.Value:
         """Put the value together."""
         value = ir.Constant(self.type, ir.Undefined)
         for index in range(len(self.members)):
@@ -46,25 +55,29 @@ class Parts:
         return value
 
 
-def _whole(builder: Any, value: Any) -> Any:
+Lowered = ir.Value | Parts
+"""A value while a kernel is lowered."""
+
+
+def _whole(builder: ir.IRBuilder, value: Lowered) -> ir.Value:
     return value.whole(builder) if isinstance(value, Parts) else value
 
 
-def _count(aggregate: Any) -> int:
+def _count(aggregate: ir.Aggregate) -> int:
     return aggregate.count if isinstance(aggregate, ir.ArrayType) else len(aggregate.elements)
 
 
 class PartsBuilder(ir.IRBuilder):
     """Builds instructions from values some of which are `Parts`."""
 
-    def extract_value(self, agg: Any, idx: Any, name: str = "") -> Any:
+    def extract_value(self, agg: Lowered, idx: int | Sequence[int], name: str = "") -> Lowered:
         """Return a member; an instruction is needed only where the value is no `Parts`."""
         path = list(idx) if isinstance(idx, (tuple, list)) else [idx]
         while path and isinstance(agg, Parts):
             agg = agg.member(self, path.pop(0))
         return super().extract_value(agg, path, name) if path else agg
 
-    def insert_value(self, agg: Any, value: Any, idx: Any, name: str = "") -> Any:
+    def insert_value(self, agg: Lowered, value: Lowered, idx: int | Sequence[int], name: str = "") -> Lowered:
         """Return `agg` with another member."""
         index = idx[0] if isinstance(idx, (tuple, list)) and len(idx) == 1 else idx
         if isinstance(index, int):
@@ -79,7 +92,7 @@ class PartsBuilder(ir.IRBuilder):
             return Parts(agg.type, members)
         return super().insert_value(_whole(self, agg), _whole(self, value), idx, name)
 
-    def _insert(self, instr: Any) -> None:
+    def _insert(self, instr: ir.Instruction) -> None:
         if any(isinstance(operand, Parts) for operand in instr.operands):
             instr.operands = [_whole(self, operand) for operand in instr.operands]
         super()._insert(instr)
@@ -88,7 +101,7 @@ class PartsBuilder(ir.IRBuilder):
 # arrays
 
 
-def is_plain(array: Any) -> bool:
+def is_plain(array: types.Type) -> bool:
     """Whether a type is an array of numbers in C order or with any strides."""
     return (
         type(array) is types.Array
@@ -97,7 +110,13 @@ def is_plain(array: Any) -> bool:
     )
 
 
-def array_parts(context: Any, array: Any, data: Any, shape: list[Any], strides: list[Any] | None) -> Parts:
+def array_parts(
+    context: CPUContext,
+    array: types.Type,
+    data: ir.Value | Made,
+    shape: list[ir.Value | Made],
+    strides: list[ir.Value | Made] | None,
+) -> Parts:
     """Return an array of these parts, which holds nothing alive.
 
     Args:
@@ -110,8 +129,8 @@ def array_parts(context: Any, array: Any, data: Any, shape: list[Any], strides: 
     # Numba asks LLVM, which parses a module for it.
     item_size = 1 if array.dtype == types.boolean else array.dtype.bitwidth // 8
 
-    def product(first: int, start: int) -> Callable[[Any], Any]:
-        def make(builder: Any) -> Any:
+    def product(first: int, start: int) -> Made:
+        def make(builder: ir.IRBuilder) -> ir.Value:
             value = kinds[N_ITEMS](start)
             for length in shape[first:]:
                 value = builder.mul(value, length(builder) if callable(length) else length)
@@ -135,7 +154,14 @@ def array_parts(context: Any, array: Any, data: Any, shape: list[Any], strides: 
     )
 
 
-def locate(context: Any, builder: Any, array: Any, value: Any, kinds: Any, indices: Any) -> Any:
+def locate(
+    context: CPUContext,
+    builder: ir.IRBuilder,
+    array: types.Type,
+    value: Lowered,
+    kinds: Sequence[types.Type],
+    indices: list[ir.Value],
+) -> ir.Value:
     """Return the address of the item, or of the first item of the view, at whole numbers as indices."""
     data = builder.extract_value(value, DATA)
     if array.layout == "C":
@@ -161,7 +187,15 @@ def locate(context: Any, builder: Any, array: Any, value: Any, kinds: Any, indic
     return cgutils.pointer_add(builder, data, offset)
 
 
-def item(context: Any, builder: Any, result: Any, array: Any, value: Any, kinds: Any, indices: Any) -> Any:
+def item(
+    context: CPUContext,
+    builder: ir.IRBuilder,
+    result: types.Type,
+    array: types.Type,
+    value: Lowered,
+    kinds: Sequence[types.Type],
+    indices: list[ir.Value],
+) -> Lowered:
     """Return the item or the view of type `result` at whole numbers as indices."""
     address = locate(context, builder, array, value, kinds, indices)
     if not isinstance(result, types.Array):
@@ -181,7 +215,7 @@ class Loop(Parts):
     __slots__ = ()
 
 
-def make_range(context: Any, kind: Any, values: list[Any]) -> Parts:
+def make_range(context: CPUContext, kind: types.Type, values: list[ir.Value]) -> Parts:
     """Return the range of one, two or three numbers of its type."""
     first = context.get_constant(kind.dtype, 0)
     step = context.get_constant(kind.dtype, 1)
@@ -189,7 +223,7 @@ def make_range(context: Any, kind: Any, values: list[Any]) -> Parts:
     return Parts(context.get_value_type(kind), values)
 
 
-def begin_loop(context: Any, builder: Any, kind: Any, value: Any) -> Loop | None:
+def begin_loop(context: CPUContext, builder: ir.IRBuilder, kind: types.Type, value: Lowered) -> Loop | None:
     """Return the iterator over a range, or None if it needs the checks that Numba makes."""
     if not (isinstance(kind, types.RangeType) and kind.dtype.signed and isinstance(value, Parts)):
         return None
@@ -202,7 +236,7 @@ def begin_loop(context: Any, builder: Any, kind: Any, value: Any) -> Loop | None
     return Loop(context.get_value_type(kind.iterator_type), [counter, stop, step])
 
 
-def next_of_loop(context: Any, builder: Any, kind: Any, loop: Loop) -> Parts:
+def next_of_loop(context: CPUContext, builder: ir.IRBuilder, kind: types.Type, loop: Loop) -> Parts:
     """Return the next number, and whether the range has one; Numba asks no more after the last."""
     counter, stop, step = loop.members
     number = builder.load(counter)
@@ -224,16 +258,22 @@ class Leaf(NamedTuple):
 class Arguments:
     """The arguments of a function that is being lowered, added as they are used."""
 
-    def __init__(self, context: Any, function: Any, kinds: Any, pointer_attributes: Any) -> None:
+    def __init__(
+        self,
+        context: CPUContext,
+        function: ir.Function,
+        kinds: Sequence[types.Type],
+        pointer_attributes: ir.ArgumentAttributes,
+    ) -> None:
         self._context = context
         self._function = function
         self._pointer_attributes = pointer_attributes
-        self._added: dict[Leaf, Any] = {}
+        self._added: dict[Leaf, ir.Argument] = {}
         self.values = [self._value(kind, k, ()) for k, kind in enumerate(kinds)]
         self.values = [value(None) if callable(value) else value for value in self.values]
 
-    def _value(self, kind: Any, argument: int, path: tuple[int, ...]) -> Any:
-        def leaf(llvm_type: Any, *more: int) -> Callable[[Any], Any]:
+    def _value(self, kind: types.Type, argument: int, path: tuple[int, ...]) -> Parts | Made | None:
+        def leaf(llvm_type: ir.Type, *more: int) -> Made:
             return lambda _: self._add(Leaf(argument, (*path, *more)), llvm_type)
 
         if isinstance(kind, types.Omitted):
@@ -250,7 +290,7 @@ class Arguments:
             return array_parts(self._context, kind, leaf(parts[DATA], DATA), shape, strides)
         return leaf(whole)
 
-    def _add(self, leaf: Leaf, llvm_type: Any) -> Any:
+    def _add(self, leaf: Leaf, llvm_type: ir.Type) -> ir.Argument:
         if leaf not in self._added:
             argument = self._added[leaf] = ir.Argument(self._function, llvm_type)
             if isinstance(llvm_type, ir.PointerType):
@@ -266,21 +306,27 @@ class Arguments:
         return list(self._added)
 
 
-def raises(function: Any) -> bool:
+def raises(function: ir.Function) -> bool:
     """Whether a function can return anything but success or None."""
-    ends: Iterator[Any] = (block.terminator for block in function.blocks)
+    ends: Iterator[ir.Instruction | None] = (block.terminator for block in function.blocks)
     codes = [end.operands[0] for end in ends if end is not None and end.opname == "ret"]
     return not all(isinstance(code, ir.Constant) and code.constant in _SUCCESS for code in codes)
 
 
-def _type_of(context: Any, kind: Any, path: tuple[int, ...]) -> Any:
+def _type_of(context: CPUContext, kind: types.Type, path: tuple[int, ...]) -> ir.Type:
     llvm_type = context.get_value_type(kind)
     for index in path:
         llvm_type = llvm_type.gep(ir.IntType(32)(index))
     return llvm_type
 
 
-def caller_of(context: Any, fndesc: Any, leaves: list[Leaf], can_raise: bool, libraries: Any) -> Any:
+def caller_of(
+    context: CPUContext,
+    fndesc: PythonFunctionDescriptor,
+    leaves: list[Leaf],
+    can_raise: bool,
+    libraries: list[JITCodeLibrary],
+) -> Callable[..., Lowered]:
     """Return what inserts a call of a function with arguments for `leaves` alone."""
     convention = context.call_conv.get_function_type(fndesc.restype, ())
     kinds = [_type_of(context, fndesc.argtypes[k], path) for k, path in leaves]
@@ -288,7 +334,9 @@ def caller_of(context: Any, fndesc: Any, leaves: list[Leaf], can_raise: bool, li
     can_raise = can_raise or isinstance(fndesc.restype, types.Optional)
     llvm_type = ir.FunctionType(convention.return_type, [*convention.args, *kinds])
 
-    def call(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    def call(
+        context: CPUContext, builder: ir.IRBuilder, sig: typing.Signature, args: Sequence[Lowered]
+    ) -> Lowered:
         function = cgutils.get_or_insert_function(builder.module, llvm_type, fndesc.mangled_name)
         if fndesc.inline:
             function.attributes.add("alwaysinline")

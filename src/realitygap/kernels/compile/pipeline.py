@@ -8,7 +8,8 @@ from __future__ import annotations
 import functools
 import gc
 import hashlib
-from typing import Any
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 from numba import _dynfunc
 from numba.core import itanium_mangler, lowering, types, typing
@@ -44,6 +45,13 @@ from .lower import (
     register_call,
 )
 
+if TYPE_CHECKING:
+    from numba.core.compiler import CompileResult, StateDict
+    from numba.core.cpu import CPUContext
+    from numba.core.registry import CPUDispatcher
+
+    from .cache import SealedCache
+
 
 class _Flags(Flags):
     """Options that compare by those that were set; type inference compares them ten thousands of times."""
@@ -64,7 +72,7 @@ class _RememberedTyping:
         is_lowered_here: Whether `_Lower` lowers the function. Numba's lowering has its own way for `min` and `max`.
     """
 
-    def __init__(self, context: Any, known: dict[Any, Any], *, is_lowered_here: bool) -> None:
+    def __init__(self, context: typing.Context, known: dict[Any, Any], *, is_lowered_here: bool) -> None:
         self._context = context
         self._known = known
         self._is_lowered_here = is_lowered_here
@@ -72,7 +80,9 @@ class _RememberedTyping:
     def __getattr__(self, name: str) -> Any:
         return getattr(self._context, name)
 
-    def resolve_function_type(self, function: Any, arguments: Any, named: Any) -> Any:
+    def resolve_function_type(
+        self, function: Any, arguments: tuple[types.Type, ...], named: dict[str, types.Type]
+    ) -> typing.Signature | None:
         if type(function) is not types.Function or named:
             return self._context.resolve_function_type(function, arguments, named)
         if self._is_lowered_here and is_min_or_max(function, arguments):
@@ -102,7 +112,7 @@ class InferTypes(NopythonTypeInference):
 
     _name = "infer_types"
 
-    def run_pass(self, state: Any) -> bool:
+    def run_pass(self, state: StateDict) -> bool:
         """Infer the types of a function; return whether anything changed."""
         context = state.typingctx
         # An operation that Numba writes in Python is compiled with the options of its first caller.
@@ -120,7 +130,7 @@ class SplitVariables(ReconstructSSA):
 
     _name = "split_variables"
 
-    def run_pass(self, state: Any) -> bool:
+    def run_pass(self, state: StateDict) -> bool:
         """Give each assignment its own variable; return that the function changed."""
         state.func_ir = reconstruct_ssa(state.func_ir)
         state.func_ir._definitions = build_definitions(state.func_ir.blocks)
@@ -133,7 +143,7 @@ class StripPhis(PreLowerStripPhis):
 
     _name = "strip_phis_of_kernel"
 
-    def run_pass(self, state: Any) -> bool:
+    def run_pass(self, state: StateDict) -> bool:
         """Replace what chooses between the variables of several blocks; return that the function changed."""
         state.func_ir = self._strip_phi_nodes(state.func_ir)
         state.func_ir._definitions = build_definitions(state.func_ir.blocks)
@@ -153,16 +163,16 @@ BEFORE_LOWERING = (
 
 
 @functools.cache
-def _digest(arguments: tuple[Any, ...]) -> str:
+def _digest(arguments: tuple[types.Type, ...]) -> str:
     return hashlib.sha256(repr(arguments).encode()).hexdigest()[:24]
 
 
-def _short_name(name: str, arguments: Any, **options: Any) -> str:
+def _short_name(name: str, arguments: tuple[types.Type, ...], **options: Any) -> str:
     """A symbol for a function and the types of its arguments, whose names can take 10 kB."""
     return str(itanium_mangler.mangle(name, (_digest(tuple(arguments)),), **options))
 
 
-def _install_new(context: Any) -> None:
+def _install_new(context: CPUContext) -> None:
     for registry in list(context._registries):
         context.install_registry(registry)
 
@@ -180,7 +190,7 @@ class _Entry(CompilerBase):
     lowering = LowerKernel
     may_alias = True
 
-    def define_pipelines(self) -> Any:
+    def define_pipelines(self) -> list[PassManager]:
         self.state.flags = _Flags(self.state.flags)
         self.state.flags.noalias = not self.may_alias
         context = self.state.targetctx
@@ -196,7 +206,7 @@ class _Entry(CompilerBase):
         return [manager]
 
     @on_wide_stack
-    def compile_extra(self, function: Any) -> Any:
+    def compile_extra(self, function: Callable[..., object]) -> CompileResult:
         # Of the million objects that a compilation makes, nearly all live until it is done.
         collecting = gc.isenabled()
         gc.disable()
@@ -218,16 +228,16 @@ class _Shared(_Entry):
     """For calls from other kernels, by symbol."""
 
     lowering = LowerShared
-    cache: Any
+    cache: SealedCache
     unroll: bool
 
-    def define_pipelines(self) -> Any:
+    def define_pipelines(self) -> list[PassManager]:
         self.state.unroll = self.unroll
         self.state.symbol = self.cache.symbol(tuple(self.state.args), self.state.targetctx)
         return super().define_pipelines()
 
 
-def share(dispatcher: Any, cache: Any, *, stage: bool, unroll: bool) -> None:
+def share(dispatcher: CPUDispatcher, cache: SealedCache, *, stage: bool, unroll: bool) -> None:
     """Have a dispatcher of Numba compile for calls from other kernels, once for all of them.
 
     Args:
@@ -241,7 +251,9 @@ def share(dispatcher: Any, cache: Any, *, stage: bool, unroll: bool) -> None:
     dispatcher.compile = functools.partial(_compile_shared, dispatcher, cache)
 
 
-def _compile_shared(dispatcher: Any, cache: Any, signature: Any) -> Any:
+def _compile_shared(
+    dispatcher: CPUDispatcher, cache: SealedCache, signature: tuple[types.Type, ...]
+) -> Callable[..., object]:
     arguments = tuple(signature)
     with global_compiler_lock:
         if arguments not in dispatcher.overloads:
@@ -259,7 +271,7 @@ def _compile_shared(dispatcher: Any, cache: Any, signature: Any) -> Any:
     return dispatcher.overloads[arguments].entry_point
 
 
-def _stored_result(dispatcher: Any, stored: dict[str, Any]) -> Any:
+def _stored_result(dispatcher: CPUDispatcher, stored: dict[str, Any]) -> CompileResult:
     context, fndesc = dispatcher.targetctx, stored["fndesc"]
     environment = lowering.Environment.from_fndesc(fndesc)
     function = _dynfunc.make_function(fndesc.lookup_module(), fndesc.qualname, "", 0, environment, ())
@@ -275,7 +287,7 @@ def _stored_result(dispatcher: Any, stored: dict[str, Any]) -> Any:
     )
 
 
-def shorten(dispatcher: Any, *, inner: bool, stage: bool) -> None:
+def shorten(dispatcher: CPUDispatcher, *, inner: bool, stage: bool) -> None:
     """Have a dispatcher of Numba compile this way.
 
     Args:
@@ -288,12 +300,12 @@ def shorten(dispatcher: Any, *, inner: bool, stage: bool) -> None:
         dispatcher.compile = functools.partial(_compile_inner, dispatcher)
 
 
-def _set_pipeline(dispatcher: Any, pipeline: Any) -> None:
+def _set_pipeline(dispatcher: CPUDispatcher, pipeline: type[CompilerBase]) -> None:
     dispatcher._compiler.pipeline_class = pipeline
     dispatcher._compiler._customize_flags = _Flags
 
 
-def _compile_inner(dispatcher: Any, signature: Any) -> Any:
+def _compile_inner(dispatcher: CPUDispatcher, signature: tuple[types.Type, ...]) -> Callable[..., object]:
     """Compile for calls from other kernels, without the clocks that Numba reads at each call of LLVM."""
     arguments = tuple(signature)
     with global_compiler_lock:

@@ -344,16 +344,16 @@ def motion_log(
             f"time_s is {time[k]:g} s in row {k} and {time[k + 1]:g} s in row {k + 1}, expected ascending times. Sort "
             "the log, and leave out repeated rows."
         )
-    asked = _asked(commands, n)
+    commanded = _commands(commands, n)
     seen = np.full((n, 3), np.nan)
     if poses is not None:
         given = _rows("poses", poses, n, (2, 3))
         seen[:, : given.shape[1]] = given
         seen[~np.isfinite(seen[:, :2]).all(axis=1)] = np.nan
     wheels = np.full((n, 2), np.nan) if encoders is None else _rows("encoders", encoders, n, (2,))
-    if not len(asked):
+    if not len(commanded):
         wheels = _without_gaps(time, wheels)
-    log = MotionLog(time, asked, seen, wheels)
+    log = MotionLog(time, commanded, seen, wheels)
     if seen_rows(log).sum() < LEAST_ROWS:
         raise ValueError(
             f"Poses or encoders were recorded at {seen_rows(log).sum()} times, expected at least {LEAST_ROWS}."
@@ -361,14 +361,14 @@ def motion_log(
     return log
 
 
-def _asked(commands: ArrayLike | None, n: int) -> Floats:
-    """Return the commands, (n, 2), or none."""
+def _commands(commands: ArrayLike | None, n: int) -> Floats:
+    """Return checked commands, (n, 2); no rows if there are none."""
     if commands is None:
         return np.empty((0, 2))
-    asked = finite_numbers("commands", _rows("commands", commands, n, (2,)))
-    if not np.any(asked):
+    checked = finite_numbers("commands", _rows("commands", commands, n, (2,)))
+    if not np.any(checked):
         raise ValueError("All commands are 0, expected a robot that drives.")
-    return asked
+    return checked
 
 
 def _without_gaps(time: Floats, wheels: Floats) -> Floats:

@@ -260,7 +260,6 @@ def maze_robots(n: int, maze: str, dtype: RealType) -> Robots:
 
 
 def _task(kind: str, settings: Mapping[str, Any]) -> Any:
-    """Return the task of a kind."""
     if isinstance(kind, str) and kind.startswith(PYTHON):
         raise ValueError(
             f"kind is {kind!r}, expected one of {', '.join(TASKS)}: a Python task scores whole trials. Use it in a "

@@ -146,11 +146,6 @@ class _ManyRobots(VectorEnv[Array, Array, NDArray[Any]]):
 
 
 def _autoreset_mode(given: AutoresetMode | str) -> AutoresetMode:
-    """Return the mode.
-
-    Raises:
-        ValueError: There is no such mode.
-    """
     try:
         return AutoresetMode(given)
     except ValueError:

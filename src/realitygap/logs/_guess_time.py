@@ -67,7 +67,7 @@ def _is_part(name: str, names: Sequence[str]) -> bool:
 
 
 def _order(name: str) -> tuple[bool, int, int]:
-    """Return what sorts columns: those of a message's header last, and the shortest of those with one word first."""
+    """Return a key to sort columns: those of a message's header last, and the shortest of those with one word first."""
     tokens = tokens_of(name)
     return "header" in tokens, min((WORDS.index(t) for t in tokens if t in WORDS), default=0), len(tokens)
 

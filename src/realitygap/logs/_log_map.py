@@ -259,11 +259,11 @@ def load_log_map(path: str | Path) -> LogMap:
     for key in ("robot", "arena", "controller"):
         name = values.get(key)
         if isinstance(name, str) and name:
-            values[key] = _found(path, key, name)
+            values[key] = _path_of(path, key, name)
     return checked_map(LogMap, values, path)
 
 
-def _found(path: Path, key: str, name: str) -> str:
+def _path_of(path: Path, key: str, name: str) -> str:
     """Return the path of a file that a mapping names; a name of realitygap's own as it is."""
     try:
         return str(named_file(path.parent, name))

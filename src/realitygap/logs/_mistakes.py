@@ -149,7 +149,7 @@ def _clock(offset: ClockOffset, wheels: str) -> Mistake:
 
 
 def _shifted(ways: Floats, shift: int) -> Floats:
-    """Return the ways of the wheels as much later."""
+    """Return the distances of the wheels, `shift` steps later."""
     if not shift:
         return ways
     moved = np.zeros_like(ways)

@@ -103,7 +103,7 @@ def read_range_table(path: str | Path, table_map: TableMap | None = None) -> Ran
 
 
 def _scaled(path: Path, raw: Floats, table_map: TableMap) -> tuple[Floats, list[str]]:
-    """Return readings from 0 to 1, and which full scale that took."""
+    """Return readings from 0 to 1, and notes on the full scale."""
     notes = []
     full = table_map.full
     if not full:

@@ -139,7 +139,7 @@ def _is_whole(condition: Condition) -> bool:
 def _run_whole(
     condition: Condition, rules: RunRules, first_replicate: int, rows: RunRows, room: int, hidden_room: int
 ) -> bool:
-    """Return all runs in one call of the platform; as `run_staged`."""
+    """Run all in one call of the platform; arguments and result as of `run_staged`."""
     return condition.on.run_whole(
         condition.arena.arena(),
         condition.neat_rules,

@@ -113,7 +113,7 @@ class _Staged:
         self.teams = np.empty((0, rules.population, self.arena.n_robots), np.int32)
 
     def carry_out(self, first_replicate: int, n_runs: int, rows: RunRows, first_row: int) -> bool:
-        """Return a block of runs from the first generation to the last; whether all genomes found room."""
+        """Run a block from the first generation to the last. Return whether all genomes found room."""
         neat, rules, block = self.neat, self.rules, self.block
         key, first = np.uint64(self.condition.key), np.int64(first_replicate)
         runs, genomes, children = block.runs, block.genomes, block.children

@@ -59,7 +59,7 @@ def print_tags(
 
 
 def _with_border(size: float) -> float:
-    """Return the tag with white all around, an eighth of the square and more on each side."""
+    """Return the side of a tag with its white border, a sixth of the black square on each side [m]."""
     return size * 4 / 3
 
 

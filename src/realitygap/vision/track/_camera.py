@@ -119,7 +119,7 @@ def fit_camera(
 
 
 def _placed(lens: Lens, points: Floats, pixels: Floats) -> Camera:
-    """Return a camera whose lens is known."""
+    """Return a camera with this lens where the tags show it."""
     cv2 = from_extra("cv2", "vision")
     distortion = np.array(lens.distortion)
     _, turn, shift = cv2.solvePnP(points, pixels, lens.matrix, distortion, flags=cv2.SOLVEPNP_ITERATIVE)

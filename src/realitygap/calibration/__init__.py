@@ -5,14 +5,14 @@ from ._all_from_commands import fit_from_commands
 from ._all_from_poses import fit_from_poses
 from ._contact import fit_contact
 from ._evidence import LEAST_STEPS, Evidence, Vectors, evidence_of
-from ._held_out import DECISIVE, HeldOut, is_better
+from ._held_out import DECISIVE, is_better
 from ._log_model import MotionLog
 from ._log_prediction import PathErrors, Steps, look_up_motion, path_errors, summary_of
 from ._marker import Marker, fit_marker
 from ._motion import MotionFit, fit_motion
 from ._motion_log import LogPrediction, MotionLogFit, fit_motion_log, fit_motion_logs, motion_log
 from ._next_trial import information_of, next_trials
-from ._path import PathFit, fit_path, path_plans
+from ._path import fit_path, path_plans
 from ._plans import contact_plans, excitation, motion_plans, random_controllers
 from ._predict_table import look_up_readings, place_ranks, predict_range_table
 from ._predictive import PREDICTED, Misfit, misfits, prediction_errors
@@ -28,11 +28,11 @@ from ._prior import (
     standard_of,
     values_of,
 )
-from ._range_table import BearingFrom, MeasuredFrom, RangeTableFit, bearings_from_heading, fit_range_table
+from ._range_table import BearingFrom, MeasuredFrom, bearings_from_heading, fit_range_table
 from ._ruler import Moved, end_pose_of, moved_in, ruled
 from ._simulate import Simulate, of_one_length, step_of
 from ._table_frame import TableFrame, choose_frame
-from .infrared._checks import Independence, independence
+from .infrared._checks import independence
 from .infrared._fit import LEAST_PLACEMENTS, SensorFit, fit_sensor
 from .infrared._plans import distance_of, placements_of, sensor_plans
 from .infrared._readings import Placement
@@ -49,8 +49,6 @@ __all__ = [
     "Effort",
     "Evidence",
     "Floats",
-    "HeldOut",
-    "Independence",
     "LogPrediction",
     "Marker",
     "MeasuredFrom",
@@ -61,10 +59,8 @@ __all__ = [
     "Moved",
     "Parameter",
     "PathErrors",
-    "PathFit",
     "Placement",
     "Posterior",
-    "RangeTableFit",
     "SensorFit",
     "Simulate",
     "Steps",

@@ -1,4 +1,4 @@
-"""The time by which the poses of a robot follow its commands, by cross-correlation."""
+"""Correlations of signals, and the time by which the poses of a robot follow its commands."""
 
 from __future__ import annotations
 
@@ -111,3 +111,10 @@ def _peak(lags: np.ndarray, score: Floats) -> float:
     before, at, after = score[k - 1 : k + 2]
     bend = before - 2 * at + after
     return float(lags[k] + (0.5 * (before - after) / bend if bend < 0 else 0.0))
+
+
+def correlation(first: Floats, second: Floats) -> float:
+    """Return the correlation of two signals, 0 if one of them is constant."""
+    if not (np.ptp(first) and np.ptp(second)):
+        return 0.0
+    return float(np.corrcoef(first, second)[0, 1])

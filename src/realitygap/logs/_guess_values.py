@@ -9,6 +9,7 @@ import numpy as np
 
 from realitygap.errors import LogError
 
+from ._clock_offset import correlation
 from ._guess_time import time_unit
 from ._log_map import Commands, LogMap, Part, Poses
 from ._open import map_name
@@ -160,7 +161,7 @@ def _per(source: Source, log_map: LogMap, advice: str) -> str:
         return ""
     if has_poses:
         moved = np.hypot(*np.diff(rows[:, 2:4], axis=0).T)
-        counter, increment = _correlation(moved, np.abs(np.diff(way))), _correlation(moved, np.abs(way[1:]))
+        counter, increment = correlation(moved, np.abs(np.diff(way))), correlation(moved, np.abs(way[1:]))
         if max(counter, increment) > ALIKE and min(counter, increment) < max(counter, increment) * ALIKE:
             return "row" if increment > counter else ""
     change = float(np.quantile(np.abs(np.diff(way)), 0.95)) / float(np.ptp(way)) * len(way)
@@ -170,9 +171,3 @@ def _per(source: Source, log_map: LogMap, advice: str) -> str:
             f'(per = "row" in [wheels]). {advice}'
         )
     return "row" if change >= CLEAR else ""
-
-
-def _correlation(first: Floats, second: Floats) -> float:
-    if not (np.ptp(first) and np.ptp(second)):
-        return 0.0
-    return float(np.corrcoef(first, second)[0, 1])

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ._clock_offset import ClockOffset, clock_offset
+from ._clock_offset import ClockOffset, clock_offset, correlation
 from ._log import Log
 from ._source import Floats
 
@@ -114,14 +114,8 @@ def _are_increments(log: Log) -> bool:
         return False
     moved = np.hypot(*np.diff(log.poses[:, :2], axis=0).T)
     way = log.wheels.mean(1)
-    as_counter, as_increment = (_correlation(moved, distance) for distance in (np.abs(np.diff(way)), way[1:]))
+    as_counter, as_increment = (correlation(moved, distance) for distance in (np.abs(np.diff(way)), way[1:]))
     return as_increment > ALIKE and as_counter < ALIKE * as_increment
-
-
-def _correlation(first: Floats, second: Floats) -> float:
-    if not (np.ptp(first) and np.ptp(second)):
-        return 0.0
-    return float(np.corrcoef(first, second)[0, 1])
 
 
 def _begin(log: Log) -> Log:

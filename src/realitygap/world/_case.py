@@ -51,7 +51,7 @@ from pydantic import (
 
 from .._limits import MOST_JSON_BYTES, parse_json, read_file
 from ..errors import CaseError, did_you_mean
-from ._case_mistakes import contradictions, explained, listed, objects, place_of, shown
+from ._case_mistakes import contradictions, explained, json_text, list_of_mistakes, objects, place_of
 from .jyro_stock import (
     CONTROLLERS,
     DEVICES,
@@ -78,7 +78,7 @@ def _one_of(what: str, names: Collection[str]) -> AfterValidator:
 
     def check(name: str) -> str:
         if name not in names:
-            raise ValueError(f"unknown {what} {shown(name)}. {did_you_mean(name, names)}")
+            raise ValueError(f"unknown {what} {json_text(name)}. {did_you_mean(name, names)}")
         return name
 
     return AfterValidator(check)
@@ -181,7 +181,7 @@ class CaseController(_Part):
     def _inputs_are_known(cls, inputs: list[str]) -> list[str]:
         unknown = [name for name in inputs if name not in INPUTS]
         if unknown:
-            hints = (f"{shown(name)} ({did_you_mean(name, INPUTS)})" for name in unknown)
+            hints = (f"{json_text(name)} ({did_you_mean(name, INPUTS)})" for name in unknown)
             raise ValueError(f"unknown input {', '.join(hints)}")
         return inputs
 
@@ -254,7 +254,7 @@ class Case(_Part):
         """
         if not isinstance(data, Mapping):
             raise CaseError(
-                f"{source}: expected a JSON object with steps, world and robots, got {shown(data)}."
+                f"{source}: expected a JSON object with steps, world and robots, got {json_text(data)}."
             )
         mistakes = dict(_misspelt(data))
         suspected = set(mistakes)
@@ -270,7 +270,7 @@ class Case(_Part):
                 if path not in suspected:
                     mistakes.setdefault(path, explained(item))
         if mistakes or case is None:
-            raise CaseError(listed(source, mistakes))
+            raise CaseError(list_of_mistakes(source, mistakes))
         return case
 
     @classmethod
@@ -318,7 +318,7 @@ def _without_doubles(pairs: list[tuple[str, object]]) -> dict[str, object]:
     values: dict[str, object] = {}
     for key, value in pairs:
         if key in values:
-            raise _DoubleKeyError(shown(key))
+            raise _DoubleKeyError(json_text(key))
         values[key] = value
     return values
 
@@ -335,7 +335,7 @@ def _misspelt(data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
             if near:
                 yield (
                     f"{path}.{near[0]}" if path else near[0],
-                    f"not given, but there is an unknown key {shown(key)}. {did_you_mean(key, known)}",
+                    f"not given, but there is an unknown key {json_text(key)}. {did_you_mean(key, known)}",
                 )
 
 

@@ -48,7 +48,7 @@ EXPECTED: dict[str, tuple[str, str]] = {
 }
 
 
-def shown(value: object) -> str:
+def json_text(value: object) -> str:
     """Return a value in JSON, short enough for a message."""
     if isinstance(value, list) and len(value) > 8:
         return f"a list of {len(value)}"
@@ -81,11 +81,11 @@ def explained(error: ErrorDetails) -> str:
     if error["type"] == "missing":
         return f"missing. Give {whole}."
     if error["type"] in ("float_type", "finite_number") and depth:
-        return f"expected a finite number, got {shown(error['input'])}."
-    return f"expected {entry if depth else whole}, got {shown(error['input'])}."
+        return f"expected a finite number, got {json_text(error['input'])}."
+    return f"expected {entry if depth else whole}, got {json_text(error['input'])}."
 
 
-def listed(source: str, mistakes: Mapping[str, str]) -> str:
+def list_of_mistakes(source: str, mistakes: Mapping[str, str]) -> str:
     """Return one message for all mistakes."""
     in_order = sorted(mistakes, key=lambda path: [part.zfill(9) for part in re.split(r"(\d+)", path)])
     lines = [f"  {path}: {mistakes[path]}" for path in in_order]
@@ -122,7 +122,7 @@ def contradictions(data: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     if n_steps is not None and n_steps * n_columns > MAX_VALUES:
         yield (
             "steps",
-            f"{shown(n_steps)} steps of {n_columns} numbers are too many, {MAX_VALUES} in all is the limit. "
+            f"{json_text(n_steps)} steps of {n_columns} numbers are too many, {MAX_VALUES} in all is the limit. "
             "Take fewer steps, or cut the case in parts.",
         )
 
@@ -160,7 +160,7 @@ def _device_contradictions(here: str, device: Mapping[str, Any]) -> Iterator[tup
     if stock is not None and given != stock and {given, stock} & {"bumper", "light"}:
         yield (
             f"{here}.type",
-            f"a device of kind {device['kind']} is of type {shown(stock)}, got {shown(given)}. Leave the type "
+            f"a device of kind {device['kind']} is of type {json_text(stock)}, got {json_text(given)}. Leave the type "
             "out, or change the kind.",
         )
     elif stock is None and device["kind"] in ("range", "RangeSensor") and given == "light":
@@ -184,7 +184,7 @@ def _controller_contradictions(
         if reads and controller.get("sensor_max_range") is None and len(ranges) > 1:
             yield (
                 f"{here}.sensor_max_range",
-                f"missing, and the devices of this robot have different ranges ({shown(ranges)}). "
+                f"missing, and the devices of this robot have different ranges ({json_text(ranges)}). "
                 "Give the range that readings are divided by.",
             )
     if isinstance(layers, list):

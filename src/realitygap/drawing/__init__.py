@@ -6,11 +6,10 @@ the same shapes into its figures, and only the report imports matplotlib. Notebo
 and pictures.
 """
 
-from ._card import Bar, Card, Spark, Table
+from ._card import Bar, Card, ShownAsCard, Spark, Table, card_of, picture_of, widget_of
 from ._colors import PENS, Ink, hex_of, line_pen, rgb_of, theme_rules, themed, themed_color, themed_file
 from ._picture import FONT, Disc, Line, Picture, Point, Shape, Text
 from ._pixels import to_image, to_png
-from ._shown import ShownAsCard, card_of, picture_of, widget_of
 
 __all__ = [
     "FONT",

@@ -16,6 +16,7 @@ from ._picture import Picture
 if TYPE_CHECKING:
     from jinja2 import Template
 
+
 MOST_BYTES = 200_000
 """Size of a card at most."""
 
@@ -143,3 +144,36 @@ def _printable(value: Any) -> Any:
         return value
     text = page_text(value)
     return text if len(text) <= MOST_LETTERS else text[: MOST_LETTERS - 1] + "…"
+
+
+@functools.singledispatch
+def picture_of(shown: Any, **options: Any) -> Picture:
+    """Return the picture of an object. A module that draws a type registers its function here.
+
+    Raises:
+        TypeError: Nothing draws this type.
+    """
+    raise TypeError(f"Nothing draws {type(shown).__name__}.")
+
+
+@functools.singledispatch
+def card_of(shown: Any) -> Card:
+    """Return the card of an object. A module that describes a type registers its function here.
+
+    Raises:
+        TypeError: Nothing describes this type.
+    """
+    raise TypeError(f"Nothing describes {type(shown).__name__}.")
+
+
+class ShownAsCard:
+    """Something that notebooks show by its card."""
+
+    def _repr_html_(self) -> str:
+        return card_of(self).to_html()
+
+
+@functools.singledispatch
+def widget_of(shown: Any) -> Any:
+    """Return the widget of an object; None if it has none, or what shows it is not installed."""
+    return None

@@ -3,12 +3,11 @@
 from ._allowed import is_allowed, remember_allowed, source_hash
 from ._coverage import CoverageTask
 from ._inputs import ControllerSettings
-from ._kinds import TASKS, as_task, task_model
 from ._observed import observed_trajectories, score_observed
 from ._published import CLASSICAL_TASKS, MAZE_TASKS, ClassicalTask, MazeAgent, MazeTask
 from ._python import PYTHON, PythonTask, not_allowed, read_task_file
 from ._step_tasks import WALL_SIDES, AvoidTask, GoalTask, LightTask, WallTask, wall_outlines
-from ._task import Task
+from ._task import TASKS, Task, as_task, task_model
 from ._trajectories import TraceArrays, Trajectories
 
 __all__ = [

@@ -1,15 +1,21 @@
-"""The contract of a task: the inputs of the networks and the scores of their trials."""
+"""The contract of a task, and the tasks by the names that study files have for them."""
 
 from __future__ import annotations
 
-from typing import Protocol, runtime_checkable
+from collections.abc import Mapping
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
+from realitygap.errors import did_you_mean
 from realitygap.records import Observe
+from realitygap.settings import Settings
 from realitygap.world import Arena
 
+from ._coverage import CoverageTask
+from ._python import PYTHON, PythonTask
+from ._step_tasks import AvoidTask, GoalTask, LightTask, WallTask
 from ._trajectories import Trajectories
 
 
@@ -55,3 +61,40 @@ class Task(Protocol):
     def fitness(self, trajectories: Trajectories, arena: Arena) -> NDArray[np.float64]:
         """Return the finite score of each trial, (n,). A better trial has a higher score."""
         ...
+
+
+TASKS: dict[str, type[Settings]] = {
+    "coverage": CoverageTask,
+    "avoid": AvoidTask,
+    "light": LightTask,
+    "wall": WallTask,
+    "goal": GoalTask,
+}
+"""Kinds of `[task] kind`, except python:FILE.py:function. Each is a `Settings` and, except coverage, a `Task`."""
+
+
+def task_model(values: Mapping[str, Any]) -> type[Settings]:
+    """Return the settings that a table [task] has.
+
+    Raises:
+        ValueError: There is no task of this kind.
+    """
+    kind = values.get("kind", "coverage")
+    if isinstance(kind, str) and kind.startswith(PYTHON):
+        return PythonTask
+    if not isinstance(kind, str) or kind not in TASKS:
+        raise ValueError(
+            f"unknown kind {kind!r}. {did_you_mean(str(kind), TASKS)} A function of your own is "
+            "python:FILE.py:function"
+        )
+    return TASKS[kind]
+
+
+def as_task(value: Any) -> Any:
+    """Return the task of a table; any other value is returned unchanged."""
+    if not isinstance(value, Mapping):
+        return value
+    model = task_model(value)
+    if model is CoverageTask:
+        value = {key: part for key, part in value.items() if key != "kind"}
+    return model(**value)

@@ -24,7 +24,7 @@ from ._library import (
     robot_names,
 )
 from ._obstacle import Goal, Light, Obstacle, Segment, distance_to_segment
-from ._part import MOST_CORNERS, Part, rounded, why_no_part
+from ._part import JYRO_SCRIBBLER, MOST_CORNERS, Body, Part, RangeSensors, rounded, why_no_part
 from ._pictures import (
     arena_picture,
     dimension_line,
@@ -36,7 +36,6 @@ from ._pictures import (
     things_in,
 )
 from ._placing import check_drawn_starts, check_start
-from ._robot import JYRO_SCRIBBLER, Body, RangeSensors
 from ._robot_model import SENSORS, RangeSensor, RobotModel
 from ._robot_picture import model_picture
 from ._settings import ArenaSettings

@@ -1,13 +1,15 @@
-"""Convex outlines with rounded corners, of which bodies and obstacles are made."""
+"""Outlines with rounded corners, of which bodies and obstacles are made, and plain bodies and range sensors."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any, Self
 
 from pydantic import Field, model_validator
 
+from realitygap.errors import check_finite
 from realitygap.settings import Settings, shown
 
 from ._described import NotNegative, Number
@@ -146,3 +148,39 @@ def rounded(corners: Sequence[tuple[float, float]], radius: float, *, step: floa
             for j in range(pieces + (n > 1))
         ]  # fmt: skip
     return tuple(points)
+
+
+@dataclass(frozen=True)
+class Body:
+    """An outline that can collide.
+
+    Attributes:
+        corners: (b, 2) forward and left of the center [m], in order around the outline.
+    """
+
+    corners: tuple[tuple[float, float], ...]
+
+    def __post_init__(self) -> None:
+        """Raise a ValueError if a number is infinite or NaN."""
+        check_finite(vars(self))
+
+
+@dataclass(frozen=True)
+class RangeSensors:
+    """Thin rays that measure the distance to the nearest wall.
+
+    Attributes:
+        mounts: (s, 3) forward [m], left [m] of the center and direction [rad, positive to the left].
+        max_range: Reading if nothing is nearer [m].
+    """
+
+    mounts: tuple[tuple[float, float, float], ...]
+    max_range: float
+
+    def __post_init__(self) -> None:
+        """Raise a ValueError if a number is infinite or NaN."""
+        check_finite(vars(self))
+
+
+# Jyro's Scribbler: forward +-0.09 m, left +-0.08 m.
+JYRO_SCRIBBLER = Body(((0.09, 0.08), (0.09, -0.08), (-0.09, -0.08), (-0.09, 0.08)))

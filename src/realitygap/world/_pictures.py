@@ -12,7 +12,7 @@ from ._arena import Arena, Pose
 from ._described import INCH
 from ._floor import BARE_FLOOR, Floor, FloorImage
 from ._obstacle import Goal, Light, Obstacle
-from ._robot import Body, RangeSensors
+from ._part import Body, RangeSensors
 from ._robot_model import RobotModel
 
 _TICK = 0.012  # half the length of the strokes that end a dimension line [m]

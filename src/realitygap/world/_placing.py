@@ -12,7 +12,7 @@ from realitygap._numbers import fixed
 
 from ._arena import Arena, Pose
 from ._obstacle import distance_to_segment
-from ._robot import Body
+from ._part import Body
 from ._robot_model import RobotModel
 from ._walls import SAME_DIGITS, enclosing_walls, is_within
 

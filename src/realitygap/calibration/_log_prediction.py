@@ -186,7 +186,7 @@ def path_errors(log: MotionLog, predictions: Mapping[str, Steps], split: int) ->
 def summary_of(errors: Sequence[PathErrors], parts: str = "trials", seed: int = 0) -> PathSummary:
     """Return the errors of all parts of logs together; means are weighted by the observations."""
     names = list(errors[0].off)
-    weights = [len(each.off[names[0]]) for each in errors]
+    weights = [len(part.off[names[0]]) for part in errors]
 
     def mean(values: Sequence[float]) -> float:
         return float(np.average(values, weights=weights))
@@ -194,22 +194,22 @@ def summary_of(errors: Sequence[PathErrors], parts: str = "trials", seed: int = 
     more: dict[str, dict[str, float]] = {}
     intervals: dict[str, dict[str, tuple[float, float]]] = {}
     for seconds in HORIZONS_S:
-        found = [one for each in errors for one in each.horizons if one.seconds == seconds]
-        if not found:
+        alike = [horizon for part in errors for horizon in part.horizons if horizon.seconds == seconds]
+        if not alike:
             continue
         key = f"after {seconds:g} s"
-        joined = {name: np.concatenate([one.errors[name] for one in found]) for name in names}
+        joined = {name: np.concatenate([horizon.errors[name] for horizon in alike]) for name in names}
         more[key] = {name: float(values.mean()) for name, values in joined.items()}
-        n_apart = sum(one.n_apart for one in found)
+        n_apart = sum(horizon.n_apart for horizon in alike)
         if n_apart >= FEWEST_APART:
             intervals[key] = {name: _interval(values, n_apart, seed) for name, values in joined.items()}
-    more["at the end"] = {name: mean([float(each.off[name][-1]) for each in errors]) for name in names}
+    more["at the end"] = {name: mean([float(part.off[name][-1]) for part in errors]) for name in names}
     lasts = "" if len(errors) > 1 else f" over the last {fixed(errors[0].lasts_s, 1)} s"
     of = f", mean of {len(errors)} {parts}" if len(errors) > 1 else ""
     return PathSummary(
         f"mean distance between seen and predicted positions{lasts}{of}",
         sum(weights),
-        {name: mean([float(each.off[name].mean()) for each in errors]) for name in names},
+        {name: mean([float(part.off[name].mean()) for part in errors]) for name in names},
         more,
         intervals,
     )

@@ -185,8 +185,8 @@ def _best(posterior: LogPosterior) -> Floats:
     Numbers that the logs do not show are the robot's own.
     """
     best = np.median(posterior.draws, axis=0)
-    for k, one in enumerate(posterior.numbers.free):
-        if one.name in (*posterior.together, *posterior.vague):
+    for k, parameter in enumerate(posterior.numbers.free):
+        if parameter.name in (*posterior.together, *posterior.vague):
             best[k] = 0.0
     return np.asarray(best)
 

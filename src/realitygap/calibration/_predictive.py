@@ -128,14 +128,14 @@ def prediction_errors(
         key: Key of the random numbers.
     """
     sums: dict[str, NDArray[np.float64]] = {}
-    for k, one in enumerate(held_out):
-        off = (one.seen - simulate(one, numbers, key + k).mean(axis=0, dtype=np.float64)) ** 2
+    for k, part in enumerate(held_out):
+        off = (part.seen - simulate(part, numbers, key + k).mean(axis=0, dtype=np.float64)) ** 2
         for kind in kinds:
-            at = one.kinds == kind
+            at = part.kinds == kind
             sums[kind] = sums.get(kind, np.zeros(2)) + np.array([off[at].sum(), at.sum()])
     errors = {}
     for kind, (off_sum, n) in sums.items():
-        seen = np.concatenate([one.seen[one.kinds == kind] for one in every])
+        seen = np.concatenate([part.seen[part.kinds == kind] for part in every])
         variance = float(seen.var(dtype=np.float64)) if n else 0.0
         if variance:  # what never varied has none to predict
             errors[kind] = float(off_sum / n / variance)

@@ -96,11 +96,11 @@ NAMES = tuple(dict.fromkeys(number.name for numbers in OF_RESPONSE.values() for 
 
 def numbers_to_fit(sensor: RangeSensor) -> tuple[Number, ...]:
     """Return the numbers of a sensor that decide its mean readings. A sensor of one ray has no cone."""
-    numbers = [each for each in OF_RESPONSE[sensor.response] if each is not CONE or sensor.rays > 1]
+    numbers = [number for number in OF_RESPONSE[sensor.response] if number is not CONE or sensor.rays > 1]
     if sensor.response == "lorentz":
         peak = abs(float(getattr(sensor.peak, "center", sensor.peak)))
         limits = {CONE: (0.0, WIDEST_LORENTZ), HALF_WIDTH: (1.01 * peak, math.inf)}
-        numbers = [replace(each, limits=limits.get(each, each.limits)) for each in numbers]
+        numbers = [replace(number, limits=limits.get(number, number.limits)) for number in numbers]
     numbers += [
         Number(f"table.{k}.reading", "plus", 0.3, "", DISTANCES, limits=(0.0, 1.0))
         for k in range(len(sensor.table))

@@ -214,7 +214,7 @@ def bearings_from_heading(
         raise ValueError(f"bearing_from is {bearing_from!r}, expected 'body' or 'sensor'.")
     if bearing_from == "body":
         return bearing
-    return np.asarray(bearing + np.array([_center(each.direction) for each in robot.range])[sensor])
+    return np.asarray(bearing + np.array([_center(device.direction) for device in robot.range])[sensor])
 
 
 def gaps_to_wall(
@@ -232,7 +232,7 @@ def gaps_to_wall(
     bearing = bearings_from_heading(sensor, bearing, robot, bearing_from or ("sensor" if is_own else "body"))
     if is_own:
         return distance, bearing
-    mounts = np.array([[_center(each.x), _center(each.y)] for each in robot.range])[sensor]
+    mounts = np.array([[_center(device.x), _center(device.y)] for device in robot.range])[sensor]
     normal = np.stack([np.cos(bearing), np.sin(bearing)], axis=1)
     gap = distance - (normal * mounts).sum(axis=1)
     if measured_from == "body":

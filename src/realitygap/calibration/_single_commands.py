@@ -96,9 +96,8 @@ class MotionOfCommands:
                 tried[1:, k] = SCAN
                 off = self._off(tried)
                 scales = self._scales(off[0])
-                places = tried[
-                    int(np.argmin([_cost(each / scales, at) for each, at in zip(off, tried, strict=True)]))
-                ]
+                costs = [_cost(row / scales, at) for row, at in zip(off, tried, strict=True)]
+                places = tried[int(np.argmin(costs))]
         return places
 
     def _off(self, places: Floats, noise: Floats | None = None, key: int = 1) -> Floats:

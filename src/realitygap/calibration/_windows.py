@@ -226,8 +226,8 @@ def wheel_ways(
     moving = windows.step_s * (ways.mean(axis=-1, keepdims=True) > STANDS * windows.step_s)
     steps = np.concatenate([ways, moving], axis=-1).mean(axis=0)
     total = np.concatenate([np.zeros_like(steps[:, :1]), np.cumsum(steps, axis=1)], axis=1)
-    found = total[windows.trial, windows.first + 1] - total[windows.trial, windows.first]
-    return WheelWays(found[:, :2], found[:, 2])
+    driven = total[windows.trial, windows.first + 1] - total[windows.trial, windows.first]
+    return WheelWays(driven[:, :2], driven[:, 2])
 
 
 def _rolled(target: Floats, delay: float, lag: float, step_s: float) -> Floats:

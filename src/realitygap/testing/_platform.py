@@ -53,23 +53,23 @@ class _Check:
         self.genomes: list[Genome] = Population(3, 2, settings, seed=1, bias=False).ask()
 
     def problems(self) -> list[str]:
-        found: list[str] = []
+        problems: list[str] = []
         checks: list[Callable[[], list[str]]] = [self.settings, self.description]
         if not self.platform.is_physical:
             checks += [self.robot, self.target, self.batch, self.fleet]
         for check in checks:
             try:
-                found += check()
+                problems += check()
             except RobotContractError as error:
-                found.append(str(error))
+                problems.append(str(error))
             except RealityGapError as error:
-                found.append(f"{check.__name__}: {error}")
+                problems.append(f"{check.__name__}: {error}")
             except Exception as error:  # whatever an outside platform does
-                found.append(
+                problems.append(
                     f"{check.__name__}: {type(error).__name__} ({error}). Raise a RealityGapError or ValueError that "
                     "says what was expected."
                 )
-        return found
+        return problems
 
     def settings(self) -> list[str]:
         """Check that settings have a name and survive JSON."""
@@ -82,45 +82,45 @@ class _Check:
 
     def description(self) -> list[str]:
         """Check that figures and messages have what they need."""
-        platform, found = self.platform, []
+        platform, problems = self.platform, []
         if not platform.name.isidentifier():
-            found.append(f"Its name is {platform.name!r}, expected letters, digits and underscores.")
+            problems.append(f"Its name is {platform.name!r}, expected letters, digits and underscores.")
         if platform.label not in ("SIM", "TWIN", "EMULATED", "REAL", "not driven"):
-            found.append(f"Its label is {platform.label!r}, expected SIM, TWIN, EMULATED or REAL.")
+            problems.append(f"Its label is {platform.label!r}, expected SIM, TWIN, EMULATED or REAL.")
         if not platform.command_s > 0:
-            found.append(f"command_s is {platform.command_s!r}, expected the duration of a command [s].")
+            problems.append(f"command_s is {platform.command_s!r}, expected the duration of a command [s].")
         if not {"obstacle", "stall", "time"} <= set(platform.inputs(self.arena)):
-            found.append("`inputs` lacks obstacle, stall or time, which the paper's networks see.")
-        return found
+            problems.append("`inputs` lacks obstacle, stall or time, which the paper's networks see.")
+        return problems
 
     def robot(self) -> list[str]:
         """Return a robot that is driven step by step."""
         robot = self.platform.open_robot(self.arena)
-        found = [] if hasattr(robot, "pose") else ["Its robot has no `pose`, or the platform is physical."]
+        problems = [] if hasattr(robot, "pose") else ["Its robot has no `pose`, or the platform is physical."]
         if robot.label != self.platform.label:
-            found.append(
+            problems.append(
                 f"The label of its robot is {robot.label!r}, and its own is {self.platform.label!r}."
             )
         inputs = ControllerInterface(tuple(self.platform.inputs(self.arena)))
         missing = [name for name in inputs.channels if name not in channels_of(robot)]
         if missing:
-            found.append(
+            problems.append(
                 f"Its robot has no channel {listed(missing)}, and networks can see it. Give the robot `channels` and "
                 "`select`, or leave it out of the platform's inputs."
             )
         n_ranges = sum(name.startswith("range.") for name in inputs.inputs)
         if robot.n_sensors < n_ranges:
-            found.append(
+            problems.append(
                 f"Its robot has {robot.n_sensors} range sensors, and networks can see {n_ranges}. Give the platform "
                 "its `sensors`."
             )
         if robot.step_s != self.platform.command_s:
-            found.append(
+            problems.append(
                 f"Its robot's step_s is {robot.step_s:g}, and command_s is {self.platform.command_s:g}."
             )
         check_robot(robot)
         robot.close()
-        return found
+        return problems
 
     def target(self) -> list[str]:
         """Check trials one by one."""
@@ -130,18 +130,18 @@ class _Check:
             kept: list[int] = []
             first = target.carry_out(plans, "track", lambda k, trial: kept.append(k))
             second = target.carry_out(plans[::-1], "track")[::-1]
-            found = (
+            problems = (
                 []
                 if kept == list(range(len(plans)))
                 else ["`carry_out` does not call `tell` after each trial."]
             )
             target.close()
-            found += _sizes(target, first)
+            problems += _sizes(target, first)
         if not all(map(_same, first, second)):
-            found.append(
+            problems.append(
                 "A trial of the same number differs in another order. Let `number` alone choose the noise."
             )
-        return found
+        return problems
 
     def batch(self) -> list[str]:
         """Check that many trials in one call agree with trials one by one."""
@@ -177,13 +177,15 @@ class _Check:
 
 
 def _sizes(target: Target, trials: list[TrialRecord]) -> list[str]:
-    found = []
+    problems = []
     for trial in trials:
         if trial.readings.shape != (STEPS, target.n_sensors):
-            found.append(f"Readings have shape {trial.readings.shape}, expected {(STEPS, target.n_sensors)}.")
+            problems.append(
+                f"Readings have shape {trial.readings.shape}, expected {(STEPS, target.n_sensors)}."
+            )
         if trial.poses.shape != (STEPS + 1, 3):
-            found.append(f"Poses have shape {trial.poses.shape}, expected {(STEPS + 1, 3)}.")
-    return found[:1]
+            problems.append(f"Poses have shape {trial.poses.shape}, expected {(STEPS + 1, 3)}.")
+    return problems[:1]
 
 
 def _same(first: TrialRecord, second: TrialRecord) -> bool:

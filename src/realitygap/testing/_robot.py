@@ -170,14 +170,14 @@ class _Check:
             )
         low, high = 0.0 - self.noise, 1.0 + self.noise
         outside = [value for value in seen.readings if not low <= value <= high]
-        said = f"readings {when} has {outside}, expected {low:g} to {high:g}; scale and limit them."
-        self.once("range", not outside, said)
+        problem = f"readings {when} has {outside}, expected {low:g} to {high:g}; scale and limit them."
+        self.once("range", not outside, problem)
         channels = dict(seen.channels)
         expected = f"expected a number from -1 to 1 for each of {list(self.selected)}, those selected."
         is_so = set(channels) == set(self.selected) and all(-1 <= value <= 1 for value in channels.values())
         self.once("channels", is_so, f"channels {when} is {channels}, {expected}")
-        said = f"stalled {when} is {seen.stalled!r}, expected True or False."
-        self.once("stalled", isinstance(seen.stalled, bool), said)
+        problem = f"stalled {when} is {seen.stalled!r}, expected True or False."
+        self.once("stalled", isinstance(seen.stalled, bool), problem)
 
     def once(self, what: str, is_so: bool, problem: str) -> None:
         """Work like `expect`, but report only the first problem of each kind."""

@@ -188,8 +188,8 @@ def _fitted(view: View, here: Floats, observed: Floats, lines: GridOffsets | Non
             parts.append(1000 * lines.residuals(tried))
         return np.concatenate(parts)
 
-    found = least_squares(off, view.numbers(), loss="soft_l1", x_scale="jac", max_nfev=60)
-    return View.from_numbers(found.x, width, height)
+    solution = least_squares(off, view.numbers(), loss="soft_l1", x_scale="jac", max_nfev=60)
+    return View.from_numbers(solution.x, width, height)
 
 
 def _px_per_m(view: View, points: Floats) -> float:

@@ -106,8 +106,8 @@ def _pruned(
     """
     neighbors: dict[int, list[tuple[int, Edge]]] = {}
     for edge in edges:
-        for one, other in (edge[:2], edge[1::-1]):
-            neighbors.setdefault(one, []).append((other, edge))
+        for near, far in (edge[:2], edge[1::-1]):
+            neighbors.setdefault(near, []).append((far, edge))
     kept = lengths >= LONG
     kept[root] = True
     worth = np.where(lengths >= LONG, np.inf, 1000 * LINK_WORTH * lengths)

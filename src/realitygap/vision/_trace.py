@@ -155,8 +155,10 @@ def _pooled(maps: PenMaps, pen: int) -> tuple[Floats, Floats, Floats, Floats]:
 
     is_likeliest = (maps.presence[pen] >= maps.highest).astype(np.float32)
     means = (mean(maps.presence[pen]), mean(is_likeliest), mean(maps.hidden[pen]))
-    one, first, may_hide = (_highest(np.where(maps.smooth_strength > 0.5, part, 0), pool) for part in means)
-    return one, first, may_hide, _highest(maps.smooth_strength, pool)
+    likeliest, first, may_hide = (
+        _highest(np.where(maps.smooth_strength > 0.5, part, 0), pool) for part in means
+    )
+    return likeliest, first, may_hide, _highest(maps.smooth_strength, pool)
 
 
 def _highest(part: Floats, pool: int) -> Floats:

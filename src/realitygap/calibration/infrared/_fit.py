@@ -103,8 +103,8 @@ def fit_sensor(
     )
     # what a sensor that saw no wall does not tell stays as the robot's file has it, and not in the middle of its prior
     is_own = {
-        scale.name: scale.name != BATTERY.name and (one.identified or not advice)
-        for scale, one in zip(model.scales, fitted, strict=True)
+        scale.name: scale.name != BATTERY.name and (parameter.identified or not advice)
+        for scale, parameter in zip(model.scales, fitted, strict=True)
     }
     return SensorFit(
         name,

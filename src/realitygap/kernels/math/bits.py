@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numba
 import numpy as np
 from llvmlite import ir
@@ -14,38 +12,38 @@ SQRT_HALF = 0.70710678118654757  # rounded up in both precisions
 
 if numba.config.DISABLE_JIT:
 
-    def shift_left(word: Any, places: Any) -> Any:
+    def shift_left(word, places):
         """A uint32 shifted left by 0 to 31 places."""
         return np.uint32((int(word) << int(places)) & 0xFFFFFFFF)
 
-    def lowest_bit(word: Any) -> Any:
+    def lowest_bit(word):
         """The place, 0 to 31, of the lowest bit that is set in a uint32, at least one of which is."""
         return (int(word) & -int(word)).bit_length() - 1
 
-    def highest_bit(word: Any) -> Any:
+    def highest_bit(word):
         """The place of the highest bit, likewise."""
         return int(word).bit_length() - 1
 
-    def count_bits(word: Any) -> Any:
+    def count_bits(word):
         """Return the number of bits set in an int32 that is not below zero."""
         return int(word).bit_count()
 
-    def power_of_two(exponent: Any) -> Any:
+    def power_of_two(exponent):
         """2 to a whole number, -126 to 127 (in double precision -1022 to 1023), in the precision of that number."""
         return type(exponent)(2.0 ** int(exponent))
 
-    def is_single(number: Any) -> Any:
+    def is_single(number):
         """Whether a number is of single precision: known when compiled."""
         return isinstance(number, np.float32)
 
-    def split(number: Any) -> Any:
+    def split(number):
         """(m, k) with number = m * 2^k and sqrt(1/2) <= m < sqrt(2), of a normal number above zero, as numbers."""
         real = type(number)
         part, places = np.frexp(number)
         low = part < real(SQRT_HALF)
         return (part * real(2.0), real(places - 1)) if low else (part, real(places))
 
-    def unmasked(number: Any) -> Any:
+    def unmasked(number):
         """A number that a loop over lanes loads, and stores again in lanes where it does not change."""
         return number
 

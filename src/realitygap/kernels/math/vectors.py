@@ -8,7 +8,6 @@ functions here. They give the results of the loops over lanes to the last bit. W
 from __future__ import annotations
 
 import operator
-from typing import Any
 
 import numba
 import numpy as np
@@ -25,35 +24,35 @@ WIDTH = 16  # lanes of a vector: 512 bits in single precision; processors with s
 
 if numba.config.DISABLE_JIT:
 
-    def load(rows: Any, row: Any, lane: Any) -> Any:
+    def load(rows, row, lane):
         """The numbers of a row of (n, LANES) from a lane on."""
         return rows[row, lane : lane + WIDTH].copy()
 
-    def load_row(row: Any, lane: Any) -> Any:
+    def load_row(row, lane):
         """The numbers of a (LANES,) row from a lane on."""
         return row[lane : lane + WIDTH].copy()
 
-    def store(vector: Any, rows: Any, row: Any, lane: Any) -> None:
+    def store(vector, rows, row, lane):
         """Write the numbers of a vector to a row of (n, LANES)."""
         rows[row, lane : lane + WIDTH] = vector
 
-    def store_row(vector: Any, row: Any, lane: Any) -> None:
+    def store_row(vector, row, lane):
         """Write the numbers of a vector to a (LANES,) row."""
         row[lane : lane + WIDTH] = vector
 
-    def spread(number: Any) -> Any:
+    def spread(number):
         """The same number in each lane."""
         return np.full(WIDTH, number, type(number))
 
-    def pick(mask: Any, yes: Any, no: Any) -> Any:
+    def pick(mask, yes, no):
         """In each lane the number of `yes` or of `no`."""
         return np.where(mask, yes, no)
 
-    def root(vector: Any) -> Any:
+    def root(vector):
         """Square roots."""
         return np.sqrt(vector)
 
-    def any_of(mask: Any) -> Any:
+    def any_of(mask):
         """Whether a mask has any lane."""
         return bool(mask.any())
 
@@ -62,13 +61,13 @@ else:
     class Vector(types.Type):
         """`WIDTH` numbers of a precision, or truth values."""
 
-        def __init__(self, dtype: Any) -> None:
+        def __init__(self, dtype):
             self.dtype = dtype
             super().__init__(f"vector of {WIDTH} {dtype}")
 
     @register_model(Vector)
     class _VectorModel(models.PrimitiveModel):
-        def __init__(self, manager: Any, kind: Any) -> None:
+        def __init__(self, manager, kind):
             number = {
                 types.float32: ir.FloatType(),
                 types.float64: ir.DoubleType(),
@@ -78,9 +77,9 @@ else:
 
     _MASK = Vector(types.boolean)
 
-    def _operator(operation: Any, is_mask: bool, to_mask: bool, instruction: str, *options: str) -> None:
+    def _operator(operation, is_mask, to_mask, instruction, *options):
         class Template(AbstractTemplate):
-            def generic(self, arguments: Any, named: Any) -> Any:
+            def generic(self, arguments, named):
                 first = arguments[0]
                 masks = isinstance(first, Vector) and first == _MASK
                 if (
@@ -93,7 +92,7 @@ else:
 
         infer_global(operation)(Template)
 
-        def lower(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        def lower(context, builder, signature, arguments):
             return getattr(builder, instruction)(*options, *arguments)
 
         count = 1 if operation is operator.neg else 2
@@ -111,24 +110,24 @@ else:
     _operator(operator.and_, True, True, "and_")
     _operator(operator.or_, True, True, "or_")
 
-    def _pointer(context: Any, builder: Any, kind: Any, array: Any, index: Any) -> Any:
+    def _pointer(context, builder, kind, array, index):
         data = context.make_array(kind)(context, builder, array).data
         place = builder.gep(data, [index])
         return builder.bitcast(place, context.get_value_type(Vector(kind.dtype)).as_pointer())
 
-    def _in_row(builder: Any, row: Any, lane: Any) -> Any:
+    def _in_row(builder, row, lane):
         """The index of a lane of a row, without a check for one below zero."""
         return builder.add(builder.mul(row, row.type(LANES)), lane)
 
-    def _as_index(context: Any, builder: Any, value: Any, kind: Any) -> Any:
+    def _as_index(context, builder, value, kind):
         return context.cast(builder, value, kind, types.intp)
 
-    def _load(context: Any, builder: Any, kind: Any, array: Any, index: Any) -> Any:
+    def _load(context, builder, kind, array, index):
         value = builder.load(_pointer(context, builder, kind, array, index))
         value.align = kind.dtype.bitwidth // 8
         return value
 
-    def _store(context: Any, builder: Any, vector: Any, kind: Any, array: Any, index: Any) -> Any:
+    def _store(context, builder, vector, kind, array, index):
         stored = builder.store(vector, _pointer(context, builder, kind, array, index))
         stored.align = kind.dtype.bitwidth // 8
         return context.get_dummy_value()

@@ -15,9 +15,9 @@ from realitygap.kernels.math.lanes import LANES, any_above_zero, copy_row, fill,
 
 from .drive import AXLE, along_arc, arc_of
 from .near import TOUCHES, copy_poses, flag_near_shapes, sizes_asked, to_axles
+from .outline import FAR
 from .push import CLEAR, SATURATION, give_way, go, saturated, unsaturated
 from .shape import FREEZE, SLIDE, WHEELS
-from .support import FAR
 from .touch import count_touching, touch
 from .turn import sin_cos_of
 from .walls import choose_walls, clearance, face_nearest_wall

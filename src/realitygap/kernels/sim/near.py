@@ -7,8 +7,7 @@ from realitygap.kernels.math.bits import unmasked
 from realitygap.kernels.math.elementary import TWO_PI
 from realitygap.kernels.math.lanes import LANES, fill
 
-from .outline import PER_CORNER
-from .support import FAR
+from .outline import FAR, PER_CORNER
 
 IS_NEAR, TOUCHES = 1.0, 2.0  # flags of robots that may touch something in a step, or do so at its end
 

@@ -25,8 +25,7 @@ from realitygap.kernels.math.vectors import (
     store_row,
 )
 
-from .outline import PER_CORNER
-from .support import FAR, SURELY, low_height, lowest
+from .outline import FAR, PER_CORNER, SURELY, low_height, lowest
 from .walls import touch_walls
 
 # Of parallel faces each is met at corners that follow from the other's: their normals are turned by so much

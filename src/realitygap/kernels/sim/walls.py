@@ -11,7 +11,7 @@ from realitygap.kernels.math.bits import unmasked
 from realitygap.kernels.math.lanes import LANES, fill
 from realitygap.kernels.math.vectors import WIDTH, any_of, load, load_row, pick, spread, store, store_row
 
-from .support import FAR, SURELY, low_height, lowest_two
+from .outline import FAR, SURELY, low_height, lowest_two
 
 N_NEAREST = 2
 PER_WALL = 4  # rows of a wall that is near: normal x, y, offset, gap

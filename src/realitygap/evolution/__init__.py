@@ -13,7 +13,16 @@ from ._distances import (
     pack_behaviors,
 )
 from ._export import to_networkx, to_onnx
-from ._genome import ConnectionGene, Genome, Network, NodeGene, decode_all, genome_from_record, genome_record
+from ._genome import (
+    ConnectionGene,
+    Genome,
+    GenomeRecord,
+    Network,
+    NodeGene,
+    decode_all,
+    genome_from_record,
+    genome_record,
+)
 from ._interface import (
     OUTPUTS,
     PAPER_INPUTS,
@@ -50,6 +59,7 @@ __all__ = [
     "ConnectionGene",
     "ControllerInterface",
     "Genome",
+    "GenomeRecord",
     "Member",
     "NearestArchive",
     "NeatSettings",

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import graphlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, Literal, Self, TypeVar
+from typing import Any, Literal, Self, TypedDict, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -298,15 +298,8 @@ class Genome(_json.Written[_json.GenomeForm], ShownAsCard):
         _check_genome(form, where)
         kinds = [node.kind for node in form.nodes]
         n_inputs, n_outputs = kinds.count("input") + kinds.count("bias"), kinds.count("output")
-        genes = form.connections
-        record: dict[str, list[Any]] = {
-            "hidden": [node.id for node in form.nodes if node.kind == "hidden"],
-            "biases": [node.bias for node in form.nodes[n_inputs:]],
-            **{
-                name: [getattr(gene, name) for gene in genes]
-                for name in ("innovation", "source", "target", "weight", "enabled")
-            },
-        }
+        hidden = [node.id for node in form.nodes if node.kind == "hidden"]
+        record = _record(hidden, [node.bias for node in form.nodes[n_inputs:]], form.connections)
         rules = form.rules(n_inputs, n_outputs, constant="bias" in kinds, node_bias=form.node_bias)
         made = genome_from_record(record, rules, form.bias_value)
         genome = cls(made._genomes, 0, rules, form.bias_value)
@@ -365,13 +358,43 @@ def decode_all(genomes: Sequence[Genome]) -> Networks:
     return networks
 
 
-def genome_from_record(
-    record: Mapping[str, Sequence[Any]], rules: NeatRules, bias_value: float = 1.0
-) -> Genome:
+class GenomeRecord(TypedDict):
+    """A genome as a row of results has it.
+
+    Attributes:
+        hidden: Ids of the hidden nodes, ascending.
+        biases: Biases of the outputs, then of the hidden nodes; empty if nodes have none.
+        innovation, source, target, weight, enabled: An entry for each connection gene.
+    """
+
+    hidden: Sequence[int]
+    biases: Sequence[float]
+    innovation: Sequence[int]
+    source: Sequence[int]
+    target: Sequence[int]
+    weight: Sequence[float]
+    enabled: Sequence[bool]
+
+
+def _record(
+    hidden: Sequence[int], biases: Sequence[float], genes: Sequence[ConnectionGene | _json.ConnectionForm]
+) -> GenomeRecord:
+    return GenomeRecord(
+        hidden=hidden,
+        biases=biases,
+        innovation=[gene.innovation for gene in genes],
+        source=[gene.source for gene in genes],
+        target=[gene.target for gene in genes],
+        weight=[gene.weight for gene in genes],
+        enabled=[gene.enabled for gene in genes],
+    )
+
+
+def genome_from_record(record: GenomeRecord, rules: NeatRules, bias_value: float = 1.0) -> Genome:
     """Return the genome of a row of results.
 
     Args:
-        record: The row's `genome`: lists hidden, biases, innovation, source, target, weight, enabled.
+        record: The row's `genome`.
         rules: Sizes and activation, from the condition's settings.
         bias_value: Value of the constant input.
 
@@ -385,7 +408,7 @@ def genome_from_record(
     return Genome(genomes, 0, rules, bias_value)
 
 
-def _arrays_of(record: Mapping[str, Sequence[Any]], rules: NeatRules) -> Genomes:
+def _arrays_of(record: GenomeRecord, rules: NeatRules) -> Genomes:
     """Return the genome of a row of results in arrays.
 
     Raises:
@@ -416,18 +439,11 @@ def _arrays_of(record: Mapping[str, Sequence[Any]], rules: NeatRules) -> Genomes
     return genomes
 
 
-def genome_record(genome: Genome) -> dict[str, list[Any]]:
+def genome_record(genome: Genome) -> GenomeRecord:
     """Return the fields of a genome for a row of results; `genome_from_record` reads them."""
     nodes = [node for node in genome.nodes if node.kind in ("output", "hidden")]
-    genes = genome.connections
-    return {
-        "hidden": [node.id for node in nodes if node.kind == "hidden"],
-        "biases": [node.bias for node in nodes] if genome.rules.node_bias else [],
-        **{
-            name: [getattr(gene, name) for gene in genes]
-            for name in ("innovation", "source", "target", "weight", "enabled")
-        },
-    }
+    biases = [node.bias for node in nodes] if genome.rules.node_bias else []
+    return _record([node.id for node in nodes if node.kind == "hidden"], biases, genome.connections)
 
 
 def _check_genome(form: _json.GenomeForm, where: str) -> None:

@@ -4,12 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from realitygap.errors import check_told_once, finite_numbers
-from realitygap.evolution import ControllerInterface, Genome, NoveltyArchive, Population, genome_record
+from realitygap.evolution import (
+    ControllerInterface,
+    Genome,
+    GenomeRecord,
+    NoveltyArchive,
+    Population,
+    genome_record,
+)
 from realitygap.kernels.neat.genome import first_genomes, make_genomes
 
 from ._condition import Condition
@@ -18,8 +24,8 @@ N_OUTPUTS = 2
 
 
 @dataclass(frozen=True)
-class Individual:
-    """An individual that is to be tried.
+class Candidate:
+    """An individual to be tried.
 
     Attributes:
         genome: Genome of the individual.
@@ -32,7 +38,7 @@ class Individual:
     parents: tuple[int, ...]
 
     @property
-    def record(self) -> dict[str, Any]:
+    def record(self) -> GenomeRecord:
         """The genome as a row of results has it."""
         return genome_record(self.genome)
 
@@ -83,14 +89,14 @@ class Evolution:
             NoveltyArchive(condition.novelty, columns=grid.columns, rows=grid.rows) if is_novelty else None
         )
 
-    def ask(self) -> list[Individual]:
+    def ask(self) -> list[Candidate]:
         """Return this generation, in the order in which `tell` wants their scores."""
         self._asked = self.generation
         condition = self._condition
         if condition.selection == "random":
-            return [Individual(named(genome, condition), 0, ()) for genome in self._unrelated()]
+            return [Candidate(named(genome, condition), 0, ()) for genome in self._unrelated()]
         return [
-            Individual(
+            Candidate(
                 named(genome, condition),
                 int(species),
                 tuple(int(parent) for parent in parents if parent >= 0),

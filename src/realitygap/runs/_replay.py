@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from realitygap.errors import RecordError
-from realitygap.evolution import Genome, genome_from_record
+from realitygap.evolution import Genome, GenomeRecord, genome_from_record
 from realitygap.platforms import trace_genome
 from realitygap.trials import NoiseKey, Trajectory
 
@@ -30,7 +30,7 @@ def partners_of(condition: Condition, row: Mapping[str, Any]) -> list[Genome]:
     return [_genome_from(condition, partner) for partner in row.get("partners") or ()]
 
 
-def _genome_from(condition: Condition, record: Mapping[str, Any]) -> Genome:
+def _genome_from(condition: Condition, record: GenomeRecord) -> Genome:
     return named(genome_from_record(record, condition.neat_rules, condition.neat.bias_value), condition)
 
 

@@ -47,6 +47,7 @@ def takes_order(
 
         parameters = [_parameter(field) for field in fields.values()]
         parameters += [parameter for parameter in others if parameter.name not in fields]
+        del call.__wrapped__  # whose source has other defaults than the signature
         call.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
         call.__doc__ = _docstring(model, inspect.cleandoc(function.__doc__ or ""))
         return call
@@ -75,6 +76,7 @@ def _docstring(model: type[Order], own: str) -> str:
 
 
 def _help(field: OrderField) -> str:
-    """Return the help of a field with the names of fields in place of those of options."""
+    """Return the help of a field with the names of fields in place of those of options, and quotes as code."""
     default = f" Default: {field.face.default_is}." if field.face.default_is else ""
-    return re.sub(r"--([a-z-]+)", lambda match: f"`{match[1].replace('-', '_')}`", field.help) + default
+    text = re.sub(r"--([a-z-]+)", lambda match: f"`{match[1].replace('-', '_')}`", field.help)
+    return re.sub(r"'(\S+)'", r"`\1`", text) + default

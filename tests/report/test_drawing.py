@@ -7,9 +7,10 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 
+from realitygap.drawing import Ink
 from realitygap.report import NARROW, compare_choices, draw_choices, draw_coverage, draw_paths
-from realitygap.report._drawing import Ink, inline
 from realitygap.report._tally import read_tally
+from realitygap.report.charts.house import inline
 from tests.report.results import describe, random_runs, settings, write_results
 
 

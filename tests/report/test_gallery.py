@@ -26,13 +26,13 @@ from realitygap.report import (
     save_drawing,
     write_report,
 )
-from realitygap.report._drawing import inline
 from realitygap.report._export import tables_of
 from realitygap.report._individuals_figure import _moved_apart, draw_better
 from realitygap.report._latex import latex_table
 from realitygap.report._species_figure import count_species
 from realitygap.report._structures import _canonical, count_structures, structures_frame
 from realitygap.report._tally import read_tally
+from realitygap.report.charts.house import inline
 from realitygap.runs import Condition, genome_of, replay
 from realitygap.study import parse_study, run_study
 from realitygap.world import arena_picture, paper_arena

@@ -35,7 +35,6 @@ from realitygap.report._closing import (
 )
 from realitygap.report._closing_figures import draw_closing
 from realitygap.report._comparisons import Comparison, compare_champions, compare_conditions
-from realitygap.report._coverage_figure import draw_coverage
 from realitygap.report._distance_audit import (
     Confound,
     DistanceAudit,
@@ -44,14 +43,11 @@ from realitygap.report._distance_audit import (
 )
 from realitygap.report._distance_figure import draw_distance, save_distance
 from realitygap.report._divergence_figure import Side, compare_trials, draw_divergence, save_divergence
-from realitygap.report._drawing import NARROW, WIDE, Drawing
 from realitygap.report._formats import check_ending, save_drawing, save_picture
 from realitygap.report._frame_file import export_frame
-from realitygap.report._gap_maps_figure import draw_gap_maps
-from realitygap.report._gap_order_figure import draw_gap_pairs
+from realitygap.report._gap_figures import draw_gap_maps, draw_gap_pairs, draw_gap_replay, draw_gap_why
 from realitygap.report._gap_page import refuse_gap_page, write_gap_report
-from realitygap.report._gap_replay_figure import draw_gap_replay
-from realitygap.report._gap_why_figure import draw_gap_why
+from realitygap.report._generations_figure import draw_coverage, draw_scores
 from realitygap.report._individual_file import export_individual
 from realitygap.report._individuals_figure import draw_individuals
 from realitygap.report._lineage_figure import draw_lineage
@@ -61,7 +57,6 @@ from realitygap.report._page import write_report
 from realitygap.report._paper_audit import Finding, audit_paper
 from realitygap.report._path_figure import draw_paths
 from realitygap.report._questions import Variety, chance_of_best, measure_variety
-from realitygap.report._score_figure import draw_scores
 from realitygap.report._sensor_figure import save_sensor_figure
 from realitygap.report._show import Subject, save_arena, save_robot, save_twin, save_view
 from realitygap.report._species_figure import draw_species
@@ -69,6 +64,7 @@ from realitygap.report._summary import SUMMARY_SCHEMA, summarize
 from realitygap.report._tally import Tally, read_tally
 from realitygap.report._task_summary import TASK_SCHEMA, summarize_tasks
 from realitygap.report._trial_figure import ChosenTrial, choose_trial, draw_trial
+from realitygap.report.charts.house import NARROW, WIDE, Drawing
 from realitygap.stats import interval_ranks, runs_for_a_claim, sign_flip_p, smallest_p
 
 __all__ = [

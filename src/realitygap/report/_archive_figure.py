@@ -10,28 +10,16 @@ import numpy.typing as npt
 import polars as pl
 
 from realitygap._wording import counted
-from realitygap.drawing import Ink, line_pen
+from realitygap.drawing import Ink
 from realitygap.evolution import DISTANCES, Member, NoveltySettings, archive_members
-from realitygap.report._drawing import (
-    Drawing,
-    draw_points,
-    draw_wide,
-    head_axes,
-    new_figure,
-    place_axes,
-    shorten,
-)
-from realitygap.report._path_figure import (
-    TracedPath,
-    arena_extent,
-    draw_arena,
-    draw_visited,
-    say_origin,
-    trace_paths,
-    typical_replicate,
-)
+from realitygap.report._path_figure import TracedPath, say_origin, trace_paths, typical_replicate
 from realitygap.report._structures import selection_of
 from realitygap.report._tally import Results, Tally, label_of, read_tally, settings_of
+from realitygap.report.charts.arena import draw_arena, draw_start
+from realitygap.report.charts.cells import draw_shares
+from realitygap.report.charts.house import Drawing, draw_wide, shorten
+from realitygap.report.charts.lines import draw_line, head, pen_style
+from realitygap.report.charts.sheet import IS_WIDE, Sheet
 from realitygap.runs import Condition
 from realitygap.world import Arena, Body
 
@@ -42,7 +30,7 @@ _MOST_PATHS = 16
 """Maximum number of drawn paths of archived individuals, because more would hide each other."""
 
 _HEIGHT = 2.25
-"""Height of the curves [in]."""
+"""Height of the curves on a phone [in]."""
 
 
 def draw_archive(folder: Results, condition: str | None = None, replicate: int | None = None) -> Drawing:
@@ -86,9 +74,18 @@ def draw_archive(folder: Results, condition: str | None = None, replicate: int |
         + "."
     )
     arena, body, label = resolved.placed_arena, resolved.on.body, label_of(described)
-    return draw_wide(
-        lambda width: _draw(paths, novelty, arena, body, unit, label, width), "archive", caption, alt
-    )
+
+    def draw(width: float) -> Sheet:
+        if width >= IS_WIDE:
+            sheet = Sheet(width, [["field", "curves"]], [None], widths=[0.53, 0.47], gap=0.4)
+        else:
+            sheet = Sheet(width, [["field"], ["curves"]], [None, _HEIGHT])
+        _draw_field(sheet.panels["field"], paths, arena, body)
+        head(sheet.panels["field"], "archived", f"{label}, n = {len(paths)}")
+        _draw_curves(sheet.panels["curves"], novelty, unit)
+        return sheet
+
+    return draw_wide(draw, "archive", caption, alt)
 
 
 def _chosen(tally: Tally, condition: str | None) -> str:
@@ -154,81 +151,34 @@ def _measured(novelty: Mapping[str, Any]) -> tuple[str, str]:
     return str(novelty.get("kind", "paper")), str(novelty.get("distance", "paper"))
 
 
-def _n_runs(tally: Tally, novelty: dict[str, Any]) -> int:
+def _n_runs(tally: Tally, novelty: Mapping[str, object]) -> int:
     return tally.runs.filter(pl.col("condition").is_in(list(novelty))).height
 
 
 # drawing
 
 
-def _draw(
-    paths: Sequence[TracedPath],
-    novelty: dict[str, npt.NDArray[np.float64]],
-    arena: Arena,
-    body: Body,
-    unit: str,
-    label: str,
-    width: float,
-) -> Any:
-    is_wide = width >= 6
-    (left, right), (bottom, top) = arena_extent(arena)
-    across = 0.48 * width if is_wide else width - 0.04
-    up = across * (top - bottom) / (right - left)
-    height = max(up, _HEIGHT) + 0.75 if is_wide else up + 0.4 + _HEIGHT + 0.75
-    figure = new_figure(width, height)
-    field = place_axes(figure, 0.02, 0.3, across, up)
-    _draw_field(field, paths, arena, body)
-    head_axes(field, "archived", f"{label}, n = {len(paths)}")
-    curves = place_axes(
-        figure,
-        0.57 * width if is_wide else 0.5,
-        0.3 if is_wide else up + 0.8,
-        0.4 * width if is_wide else width - 0.6,
-        _HEIGHT,
-    )
-    _draw_curves(curves, novelty, unit)
-    return figure
-
-
 def _draw_field(axes: Axes, paths: Sequence[TracedPath], arena: Arena, body: Body) -> None:
     """Cells by how many of the archived visit them, and their paths."""
-    from matplotlib.patches import Rectangle
-
-    grid = arena.grid
-    draw_arena(axes, arena, *arena_extent(arena))
-    counts = np.zeros(grid.n_cells)
+    draw_arena(axes, arena)
+    counts = np.zeros(arena.grid.n_cells)
     for path in paths:
         counts[list(set(path.cells))] += 1
-    for cell in np.flatnonzero(counts).tolist():
-        row, column = divmod(cell, grid.columns)
-        corner = (grid.x + column * grid.cell, grid.y + row * grid.cell)
-        share = 0.06 + 0.44 * counts[cell] / len(paths)
-        axes.add_artist(
-            Rectangle(corner, grid.cell, grid.cell, facecolor=Ink.PEN1, alpha=share, linewidth=0, zorder=0)
-        )
-    draw_visited(axes, (), arena, body)
+    draw_shares(
+        axes, arena.grid, np.where(counts > 0, 0.06 + 0.44 * counts / max(len(paths), 1), 0.0), Ink.PEN1
+    )
+    draw_start(axes, arena, body)
     for k, path in enumerate(paths):
-        color, dashes = line_pen(k)
-        style: Any = (0, tuple(dashes)) if dashes else "solid"
         for poses, _ in path.tracks:
-            draw_points(axes, poses, color=color, linestyle=style, linewidth=1.0, zorder=5)
+            draw_line(axes, *poses.T[:2], **pen_style(k, 1.0))
 
 
-def _draw_curves(axes: Axes, novelty: dict[str, npt.NDArray[np.float64]], unit: str) -> None:
+def _draw_curves(axes: Axes, novelty: Mapping[str, npt.NDArray[np.float64]], unit: str) -> None:
     from matplotlib.ticker import MaxNLocator
 
     n = max(len(values) for values in novelty.values())
     for k, (name, values) in enumerate(novelty.items()):
-        color, dashes = line_pen(k)
-        style: Any = (0, tuple(dashes)) if dashes else "solid"
-        axes.plot(
-            np.arange(len(values)),
-            values,
-            color=color,
-            linestyle=style,
-            linewidth=1.4,
-            label=shorten(name, 24),
-        )
+        axes.plot(np.arange(len(values)), values, label=shorten(name, 24), **pen_style(k, 1.4))
     axes.set_ylim(0, None)
     axes.set_xlim(-0.2, max(n - 1, 1) + 0.2)
     axes.grid(axis="y", color=Ink.RULE, linewidth=0.5)
@@ -236,4 +186,4 @@ def _draw_curves(axes: Axes, novelty: dict[str, npt.NDArray[np.float64]], unit: 
     axes.set_xlabel("generation", labelpad=2)
     axes.set_ylabel(f"mean novelty [{unit}]")
     axes.legend(frameon=False, fontsize=7.5, loc="lower right")
-    head_axes(axes, "all runs", "")
+    head(axes, "all runs")

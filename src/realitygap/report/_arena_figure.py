@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from realitygap.report._drawing import Drawing, draw_wide, new_figure, place_axes
-from realitygap.report._shapes_drawing import draw_picture
 from realitygap.report._tally import Tally, label_of, settings_of
+from realitygap.report.charts.house import Drawing, draw_wide
+from realitygap.report.charts.shapes import draw_picture
+from realitygap.report.charts.sheet import IS_WIDE, Sheet
 from realitygap.runs import Condition
 from realitygap.world import arena_picture
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 def draw_arena_and_robot(tally: Tally, condition: str, *, name: str) -> Drawing:
@@ -34,20 +32,15 @@ def draw_arena_and_robot(tally: Tally, condition: str, *, name: str) -> Drawing:
     alt = f"{picture.description} {robot.description}"
     caption = _caption(tally, resolved, described)
 
-    def draw(width: float) -> Figure:
-        is_wide = width >= 6
-        heights = [
-            (picture.top - picture.bottom) / (picture.right - picture.left),
-            (robot.top - robot.bottom) / (robot.right - robot.left),
-        ]
-        across = [0.60 * width, 0.37 * width] if is_wide else [width, 0.86 * width]
-        up = [share * each for share, each in zip(heights, across, strict=True)]
-        figure = new_figure(width, max(up) if is_wide else sum(up) + 0.1)
-        scale = 1.0 if is_wide else 0.92
-        draw_picture(place_axes(figure, 0.0, 0.0, across[0], up[0]), picture, scale=scale)
-        place = (across[0] + 0.03 * width, up[0] - up[1]) if is_wide else (0.07 * width, up[0] + 0.1)
-        draw_picture(place_axes(figure, *place, across[1], up[1]), robot, scale=scale)
-        return figure
+    def draw(width: float) -> Sheet:
+        if width >= IS_WIDE:
+            sheet = Sheet(width, [["arena", "robot"]], [None], widths=[0.6, 0.37], gap=0.2, pad=0)
+        else:
+            sheet = Sheet(width, [["arena"], ["robot"]], [None, None], gap=0, pad=0.1)
+        for name, shown in (("arena", picture), ("robot", robot)):
+            draw_picture(sheet.panels[name], shown, scale=1.0 if sheet.is_wide else 0.92)
+        sheet.panels["robot"].set_anchor("S")
+        return sheet
 
     return draw_wide(draw, name, caption, alt)
 

@@ -2,32 +2,39 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import numpy.typing as npt
 
 from realitygap._wording import counted
 from realitygap.drawing import Ink
-from realitygap.report._drawing import (
-    Drawing,
-    draw_wide,
+from realitygap.report._tally import Results, Tally, label_of, read_tally, settings_of
+from realitygap.report.charts.house import Drawing, draw_wide, shorten, wrap
+from realitygap.report.charts.lines import (
+    Dash,
+    TextStyle,
+    area_key,
+    draw_line,
+    draw_rings,
+    head,
+    hollow,
+    line_key,
     mark_key,
-    new_figure,
-    place_axes,
-    shorten,
-    wrap,
     write,
 )
-from realitygap.report._marks import Panel, Series
-from realitygap.report._tally import Results, Tally, label_of, read_tally, settings_of
+from realitygap.report.charts.marks import Panel, Series
+from realitygap.report.charts.rows import Row, draw_row
+from realitygap.report.charts.sheet import IS_WIDE, Sheet
 from realitygap.stats import MEDIAN_SMALLEST_N, Ends, median_interval, quartiles
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True)
@@ -134,59 +141,56 @@ def draw_choices(folder: Results) -> Drawing:
 
 # drawing
 
+_BESIDE = ("axes fraction", "data")
+_LINE = 0.145  # height of a line of words [in]
+
 
 @dataclass(frozen=True)
-class _Layout:
-    """The positions of all parts in a figure of a given width [in]."""
+class _Group:
+    """The rows of a baseline and its variants in a figure of a width: words, and places from the top [in]."""
 
-    width: float
-
-    @property
-    def is_wide(self) -> bool:
-        return self.width >= 6
+    choices: list[Choice]
+    is_wide: bool
 
     @property
-    def letters(self) -> int:
-        return int(self.plot_left / 0.073) if self.is_wide else int(self.width / 0.076)
+    def words(self) -> list[str]:
+        return [
+            wrap(choice.change, 44 if self.is_wide else 48, 2 if self.is_wide else 3)
+            for choice in self.choices
+        ]
 
     @property
-    def plot_left(self) -> float:
-        return 0.34 * self.width if self.is_wide else 0.2
+    def edges(self) -> npt.NDArray[np.float64]:
+        """(n + 1,) upper and lower edges of the rows."""
+        above = 0.1 if self.is_wide else 0.29
+        return np.cumsum([0.0, *(above + _LINE * (words.count("\n") + 1) for words in self.words)])
 
     @property
-    def plot_right(self) -> float:
-        return self.width - (1.75 if self.is_wide else 0.62)
-
-    def row_height(self, n_lines: int) -> float:
-        return 0.1 + 0.145 * n_lines + (0.0 if self.is_wide else 0.19)
-
-    def texts(self, group: list[Choice]) -> list[str]:
-        return [wrap(choice.change, self.letters, 2 if self.is_wide else 3) for choice in group]
-
-    def heights(self, texts: list[str]) -> list[float]:
-        return [self.row_height(text.count("\n") + 1) for text in texts]
-
-    def y_of_marks(self, start: float, end: float) -> float:
-        return (start + end) / 2 if self.is_wide else end - 0.14
+    def places(self) -> list[float]:
+        """Heights of the marks: in the middle of a row, or under its words."""
+        return [
+            float((start + end) / 2 if self.is_wide else end - 0.14)
+            for start, end in itertools.pairwise(self.edges)
+        ]
 
 
 def _marks(groups: list[list[Choice]], width: float) -> tuple[Panel, ...]:
     """Return the values of each row, whose place depends on the lines of its words."""
-    layout = _Layout(width)
     return tuple(
-        Panel(f"choices-{k}", tuple(_marks_of_group(group, layout)), (3, 3)) for k, group in enumerate(groups)
+        Panel(f"choices-{k}", tuple(_marks_of_group(_Group(group, width >= IS_WIDE))), (3, 3))
+        for k, group in enumerate(groups)
     )
 
 
-def _marks_of_group(group: list[Choice], layout: _Layout) -> Iterator[Series]:
-    ends = np.concatenate([[0.0], np.cumsum(layout.heights(layout.texts(group)))])
-    for choice, start, end in zip(group, ends[:-1], ends[1:], strict=True):
+def _marks_of_group(group: _Group) -> Iterator[Series]:
+    for choice, y in zip(group.choices, group.places, strict=True):
         if math.isnan(choice.median):
             continue
-        y = layout.y_of_marks(start, end)
         interval = choice.interval
         within = "" if interval is None else f" [{interval[0]:.3f}, {interval[1]:.3f}]"
-        effect = "" if choice is group[0] else f", {choice.effect:+.3f} to the baseline".replace("-", "−")
+        effect = (
+            "" if choice is group.choices[0] else f", {choice.effect:+.3f} to the baseline".replace("-", "−")
+        )
         shown = [(choice.median, f"median {choice.median:.3f}{within}{effect}, n = {choice.n:,}")]
         if choice.other_median is not None:
             shown.append((choice.other_median, f"median as its selection counts {choice.other_median:.3f}"))
@@ -195,23 +199,22 @@ def _marks_of_group(group: list[Choice], layout: _Layout) -> Iterator[Series]:
         yield Series("{name}: {label}", points, choice.change, tuple(label for _, label in shown))
 
 
-def _draw(groups: list[list[Choice]], width: float) -> Figure:
-    layout = _Layout(width)
-    texts = [layout.texts(group) for group in groups]
-    heights = [layout.heights(words) for words in texts]
-    head, foot, legend = 0.42, 0.5, 0.3 if layout.is_wide else 0.52
-    total = sum(head + sum(rows) + foot for rows in heights) + legend
-    figure = new_figure(width, total)
-    low, high = _range_of(groups)
-    top = head
-    for k, (group, words, rows) in enumerate(zip(groups, texts, heights, strict=True)):
-        axes = place_axes(figure, layout.plot_left, top, layout.plot_right - layout.plot_left, sum(rows))
+def _draw(groups: list[list[Choice]], width: float) -> Sheet:
+    rows = [_Group(choices, width >= IS_WIDE) for choices in groups]
+    sheet = Sheet(
+        width, [[str(k)] for k in range(len(rows))], [float(each.edges[-1]) for each in rows], pad=0.24
+    )
+    ends = _range_of(groups)
+    for k, group in enumerate(rows):
+        axes = sheet.panels[str(k)]
         axes.set_gid(f"choices-{k}")
-        axes.set_xlim(low, high)
-        _draw_group(axes, group, words, rows, layout)
-        top += sum(rows) + foot + head
-    _draw_legend(figure, groups, total - legend, layout)
-    return figure
+        axes.set_xlim(*ends)
+        _draw_group(axes, group)
+    sheet.key(_key(groups))
+    sheet.settle()
+    for k, group in enumerate(rows):
+        _draw_rules(sheet.panels[str(k)], group)
+    return sheet
 
 
 def _range_of(groups: list[list[Choice]]) -> tuple[float, float]:
@@ -228,208 +231,94 @@ def _range_of(groups: list[list[Choice]]) -> tuple[float, float]:
     return max(0.0, math.floor(min(finite) * 20 - 0.2) / 20), min(1.0, math.ceil(max(finite) * 20 + 0.2) / 20)
 
 
-def _draw_group(
-    axes: Axes, group: list[Choice], words: list[str], rows: list[float], layout: _Layout
-) -> None:
-    reference = group[0]
-    below = np.concatenate([[0.0], np.cumsum(rows)])
-    axes.set_ylim(below[-1], 0.0)
-    axes.set_yticks([])
-    axes.spines["left"].set_visible(False)
-    _set_ticks(axes, layout)
-    axes.grid(axis="x", color=Ink.RULE, linewidth=0.5)
-    axes.set_xlabel("best coverage of a run", labelpad=2)
-    x_words = (0.02 - layout.plot_left) * 72
-    _head(axes, group, x_words, layout)
-    for index, (choice, text) in enumerate(zip(group, words, strict=True)):
-        start, end = below[index], below[index + 1]
-        y = layout.y_of_marks(start, end)
-        _draw_reference(
-            axes, reference, start if layout.is_wide else end - 0.23, end - (0.0 if layout.is_wide else 0.04)
-        )
-        _draw_choice(axes, choice, y, reference.median)
-        is_reference = index == 0
-        write(
-            axes,
-            text,
-            (0.0, y if layout.is_wide else start + 0.06),
-            (x_words, 0.0),
-            8.0,
-            xycoords=("axes fraction", "data"),
-            va="center" if layout.is_wide else "top",
-            weight="bold" if is_reference else "normal",
-            linespacing=1.15,
-        )
-        _write_numbers(axes, choice, y, layout, is_reference=is_reference)
-        if index:
-            _draw_rule(axes, start, layout)
-
-
-def _set_ticks(axes: Axes, layout: _Layout) -> None:
+def _draw_group(axes: Axes, group: _Group) -> None:
     from matplotlib.ticker import MultipleLocator
 
     low, high = axes.get_xlim()
-    room = high - low if layout.is_wide else 2 * (high - low)
+    room = (high - low) * (1 if group.is_wide else 2)
     step = 0.05 if room <= 0.45 else 0.1 if room <= 0.9 else 0.2
     axes.xaxis.set_major_locator(MultipleLocator(step))
     axes.xaxis.set_major_formatter(lambda value, _: f"{value:.{2 if step == 0.05 else 1}f}")
-
-
-def _head(axes: Axes, group: list[Choice], x_words: float, layout: _Layout) -> None:
-    counts = sorted({choice.n for choice in group})
+    axes.grid(axis="x", color=Ink.RULE, linewidth=0.5)
+    axes.set_ylim(group.edges[-1], 0.0)
+    axes.set_xlabel("best coverage of a run", labelpad=2)
+    axes.spines["left"].set_visible(False)
+    axes.set_yticks(group.places, group.words if group.is_wide else [""] * len(group.words))
+    axes.tick_params(axis="y", length=0, pad=4)
+    if group.is_wide:
+        axes.get_yticklabels()[0].set_fontweight("bold")
+    for k, (choice, y) in enumerate(zip(group.choices, group.places, strict=True)):
+        start, end = group.edges[k : k + 2]
+        reach = (start, end) if group.is_wide else (end - 0.23, end - 0.04)  # words stay clear of the band
+        _draw_choice(axes, choice, y, group.choices[0], reach)
+        for text, x, style in _numbers(choice, group):
+            write(axes, text, (1.0, y), (x, 0), 7.5, units=_BESIDE, **style)
+        if not group.is_wide:
+            words: TextStyle = {"va": "top", "linespacing": 1.15, "weight": "normal" if k else "bold"}
+            write(axes, group.words[k], (0, start + 0.06), (0, 0), 8, units=_BESIDE, **words)
+    counts = sorted({choice.n for choice in group.choices})
     n = f"n = {counts[0]}" if len(counts) == 1 else f"n = {counts[0]} to {counts[-1]}"
-    labels = ", ".join(sorted({choice.label for choice in group}))
-    title = f"Changes to “{shorten(group[0].condition, 30)}”"
-    write(axes, title, (0.0, 1.0), (x_words, 9.0), 9.0, va="bottom", weight="bold")
-    right = (layout.width - layout.plot_right) * 72
-    write(
-        axes,
-        f"{labels}, {n}" + (" runs each" if layout.is_wide else ""),
-        (1.0, 1.0),
-        (right - 2, 9.0),
-        7.5,
-        ha="right",
-        va="bottom",
-        color=Ink.MUTED,
-    )
+    labels = ", ".join(sorted({choice.label for choice in group.choices}))
+    title = f"Changes to “{shorten(group.choices[0].condition, 30)}”"
+    head(axes, title, f"{labels}, {n}" + (" runs each" if group.is_wide else ""))
 
 
-def _draw_reference(axes: Axes, reference: Choice, start: float, end: float) -> None:
-    """The baseline's interval and median, over the height of a row's marks; words stay clear of it."""
+def _draw_rules(axes: Axes, group: _Group) -> None:
+    """Draw the lines between rows, as wide as the figure."""
+    box = axes.get_position()
+    ends = [-box.x0 / box.width, (1 - box.x0) / box.width]
+    for y in group.edges[1:-1]:
+        axes.plot(
+            ends, [y, y], transform=axes.get_yaxis_transform(), color=Ink.RULE, linewidth=0.4, clip_on=False
+        )
+
+
+def _draw_choice(axes: Axes, choice: Choice, y: float, reference: Choice, reach: tuple[float, float]) -> None:
+    """Draw the marks of a row over the baseline's interval and median."""
     if reference.interval is not None:
-        band = list(reference.interval)
-        axes.fill_between(band, start, end, color=Ink.BAND, alpha=0.45, linewidth=0)
+        axes.fill_between(reference.interval, *reach, color=Ink.BAND, alpha=0.45, linewidth=0)
     if not math.isnan(reference.median):
-        axes.plot([reference.median] * 2, [start, end], color=Ink.OURS, linewidth=0.8, solid_capstyle="butt")
-
-
-def _draw_rule(axes: Axes, y: float, layout: _Layout) -> None:
-    plot_width = layout.plot_right - layout.plot_left
-    ends = [(0.02 - layout.plot_left) / plot_width, (layout.width - layout.plot_left) / plot_width]
-    axes.plot(
-        ends, [y, y], transform=axes.get_yaxis_transform(), color=Ink.RULE, linewidth=0.4, clip_on=False
-    )
-
-
-def _draw_choice(axes: Axes, choice: Choice, y: float, reference: float) -> None:
+        draw_line(axes, [reference.median] * 2, reach, color=Ink.OURS, linewidth=0.8, solid_capstyle="butt")
     if math.isnan(choice.median):
         return
-    axes.plot([reference, choice.median], [y, y], color=Ink.OURS, linewidth=0.8, linestyle=(0, (1.5, 1.5)))
-    if choice.interval is not None:
-        axes.plot(
-            list(choice.interval),
-            [y, y],
-            color=Ink.OURS,
-            linewidth=2.2,
-            solid_capstyle="butt",
-        )
-    axes.plot([choice.median], [y], "o", color=Ink.OURS, markersize=5.2)
+    dots: Dash = (0, (1.5, 1.5))
+    draw_line(axes, [reference.median, choice.median], [y, y], color=Ink.OURS, linewidth=0.8, linestyle=dots)
+    draw_row(axes, y, Row(choice.median, choice.interval))
     if choice.other_median is not None:
-        axes.plot(
-            [choice.other_median],
-            [y],
-            "s",
-            color=Ink.OURS,
-            markerfacecolor=Ink.GROUND,
-            markersize=4.4,
-            markeredgewidth=1.1,
-        )
+        draw_rings(axes, choice.other_median, y, 4.4, Ink.OURS, marker="s", zorder=5)
     if choice.published:
-        axes.plot(
-            choice.published,
-            [y] * len(choice.published),
-            "D",
-            color=Ink.PUBLISHED,
-            markerfacecolor=Ink.GROUND,
-            markersize=4.0,
-            markeredgewidth=1.1,
-        )
+        ys = [y] * len(choice.published)
+        draw_rings(axes, choice.published, ys, 4.0, Ink.PUBLISHED, marker="D", zorder=5)
 
 
-def _write_numbers(axes: Axes, choice: Choice, y: float, layout: _Layout, *, is_reference: bool) -> None:
-    far = (layout.width - layout.plot_right) * 72
-    if is_reference:
-        effect = "median" if not layout.is_wide else ""
-    elif math.isnan(choice.effect):
-        effect = "no runs"
-    else:
-        effect = f"{choice.effect:+.3f}".replace("-", "−")
-        effect = "±0.000" if effect in ("+0.000", "−0.000") else effect
-    middle = "" if math.isnan(choice.median) else f"{choice.median:.3f}"
-    if layout.is_wide and choice.interval is not None:
-        middle += f" [{choice.interval[0]:.3f}, {choice.interval[1]:.3f}]"
-    items = [(far - 2, effect, "bold")]
-    if layout.is_wide:
-        items.append((far - 44, middle, "normal"))
-    elif is_reference:
-        items = [(far - 2, middle, "normal")]
-    for x, text, weight in items:
-        write(
-            axes,
-            text,
-            (1.0, y),
-            (x, 0.0),
-            8.0 if weight == "bold" else 7.5,
-            xycoords=("axes fraction", "data"),
-            ha="right",
-            va="center",
-            weight=weight,
-            color=Ink.TEXT if weight == "bold" else Ink.MUTED,
-        )
-
-
-def _draw_legend(figure: Figure, groups: list[list[Choice]], top: float, layout: _Layout) -> None:
-    from matplotlib.lines import Line2D
-    from matplotlib.patches import Patch
-
-    choices = [choice for group in groups for choice in group]
-    handles: list[Any] = [
-        Line2D([], [], color=Ink.OURS, linewidth=0, marker="o", markersize=5.2, label="median")
-    ]
-    if any(choice.interval for choice in choices):
-        handles += [
-            Line2D([], [], color=Ink.OURS, linewidth=2.2, label="its 95 % interval"),
-            Patch(facecolor=Ink.BAND, alpha=0.45, label="the baseline’s interval"),
-        ]
-    if any(choice.other_median is not None for choice in choices):
-        handles.append(
-            mark_key(
-                "median as its selection counts",
-                "s",
-                4.4,
-                Ink.OURS,
-                markeredgewidth=1.1,
-                hollow=True,
-                linestyle="-",
-                linewidth=0,
-            )
-        )
-    if any(choice.published for choice in choices):
-        handles.append(
-            mark_key(
-                "the paper’s runs",
-                "D",
-                4.0,
-                Ink.PUBLISHED,
-                markeredgewidth=1.1,
-                hollow=True,
-                linestyle="-",
-                linewidth=0,
-            )
-        )
-    height = float(figure.get_size_inches()[1])
-    figure.legend(
-        handles=handles,
-        loc="upper left",
-        bbox_to_anchor=(0.02 / layout.width, 1.0 - top / height),
-        ncols=len(handles) if layout.is_wide else 2,
-        frameon=False,
-        fontsize=8.0 if layout.is_wide else 7.5,
-        borderaxespad=0.0,
-        borderpad=0.0,
-        handlelength=1.6,
-        columnspacing=1.4 if layout.is_wide else 1.0,
+def _numbers(choice: Choice, group: _Group) -> list[tuple[str, float, TextStyle]]:
+    """The numbers on the right of a row: each with its distance from the axes [points] and its style."""
+    effect = f"{choice.effect:+.3f}".replace("-", "−")
+    effect = (
+        "no runs" if math.isnan(choice.effect) else "±0.000" if effect in ("+0.000", "−0.000") else effect
     )
+    middle = "" if math.isnan(choice.median) else f"{choice.median:.3f}"
+    if group.is_wide and choice.interval is not None:
+        middle += f" [{choice.interval[0]:.3f}, {choice.interval[1]:.3f}]"
+    shown: list[tuple[str, float, TextStyle]] = []
+    if group.is_wide or choice is group.choices[0]:
+        shown.append((middle, 6.0, {"va": "center", "color": Ink.MUTED}))
+    if choice is not group.choices[0]:
+        shown.append((effect, 110.0 if group.is_wide else 6.0, {"va": "center", "weight": "bold"}))
+    return shown
+
+
+def _key(groups: list[list[Choice]]) -> list[Artist]:
+    choices = [choice for group in groups for choice in group]
+    handles = [mark_key("median", "o", 5.2, color=Ink.OURS)]
+    if any(choice.interval for choice in choices):
+        handles.append(line_key("its 95 % interval", color=Ink.OURS, linewidth=2.2))
+        handles.append(area_key("the baseline’s interval", Ink.BAND, 0.45))
+    if any(choice.other_median is not None for choice in choices):
+        handles.append(mark_key("median as its selection counts", "s", 4.4, **hollow(Ink.OURS)))
+    if any(choice.published for choice in choices):
+        handles.append(mark_key("the paper’s runs", "D", 4.0, **hollow(Ink.PUBLISHED)))
+    return handles
 
 
 # words

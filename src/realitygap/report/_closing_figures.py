@@ -6,29 +6,25 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from realitygap.drawing import Ink
-from realitygap.report._drawing import (
-    NARROW,
-    Drawing,
-    draw_line,
-    draw_wide,
-    new_figure,
-    place_axes,
-)
-from realitygap.report._marks import MOST_MARKS, Panel, Series
+from realitygap.report.charts.house import NARROW, Drawing, draw_wide
+from realitygap.report.charts.lines import draw_dots, draw_line, head, line_key
+from realitygap.report.charts.marks import MOST_MARKS, Panel, Series
+from realitygap.report.charts.rows import Row, draw_row, name_rows, stacked
+from realitygap.report.charts.scatter import draw_equality
+from realitygap.report.charts.sheet import Sheet, grid
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 Summary = Mapping[str, Any]
 COLORS = {"none": Ink.RUN, "cells": Ink.PEN2, "encoders": Ink.PEN2, "track": Ink.OURS}
 """Colors by the observation level of the calibration."""
 
 MARKERS = {"none": "o", "cells": "s", "encoders": "s", "track": "D"}
-_HEAD, _FOOT, _LEFT, _RIGHT, _GAP = 0.52, 0.5, 0.55, 0.12, 0.34
+_GAP = 0.3
+"""Space between panels [in]."""
 
 
 class Words(NamedTuple):
@@ -99,24 +95,26 @@ def draw_budget(summary: Summary) -> Drawing | None:
         f"was given; by family, and by what it saw of these trials. Thin lines: {words.units}. Thick lines: medians."
     )
     alt = "RMS gap against budget of trials, a panel for each family."
+    colors = {each: COLORS.get(each, Ink.PEN3) for each in summary["plan"]["observations"]}
 
-    def draw_family(axes: Axes, family: str) -> None:
-        axes.set_gid(f"budget-{family}")
-        axes.set_xlim(-0.04 * budgets[-1], 1.04 * budgets[-1] or 1)
-        axes.set_ylim(0, top)
-        axes.set_xticks(budgets)
-        for observe in summary["plan"]["observations"]:
-            _budget_lines(axes, summary, family, observe)
-        axes.set_xlabel("trials for calibrating", labelpad=2)
-        _title(axes, family, words.number(len(_of(summary, family))))
-
-    def draw(width: float) -> Figure:
-        figure, panels = _panels(width, len(families), 1.9)
+    def draw(width: float) -> Sheet:
+        columns = len(families) if width > NARROW + 1 else 1
+        sheet, panels = grid(width, len(families), columns, 1.9, gap=_GAP)
         for axes, family in zip(panels, families, strict=True):
-            draw_family(axes, family)
+            axes.set_gid(f"budget-{family}")
+            axes.set_xlim(-0.04 * budgets[-1], 1.04 * budgets[-1] or 1)
+            axes.set_ylim(0, top)
+            axes.set_xticks(budgets)
+            for observe in summary["plan"]["observations"]:
+                _budget_lines(axes, summary, family, observe)
+            axes.set_xlabel("trials for calibrating", labelpad=2)
+            head(axes, family, words.number(len(_of(summary, family))), stacked=True)
         panels[0].set_ylabel(f"RMS gap, {words.label} less SIM", labelpad=3)
-        _key(figure, [(observe, observe) for observe in summary["plan"]["observations"]])
-        return figure
+        sheet.key(
+            [line_key(each, color=color, linewidth=1.2) for each, color in colors.items()],
+            place="upper right",
+        )
+        return sheet
 
     marks = tuple(
         Panel(f"budget-{family}", tuple(_marks_of_budgets(summary, family)), (0, 3)) for family in families
@@ -192,25 +190,19 @@ def draw_scatter(summary: Summary) -> Drawing | None:
         for kind in kinds
     }
 
-    def draw(width: float) -> Figure:
-        figure, panels = _panels(width, len(kinds), 2.2)
+    def draw(width: float) -> Sheet:
+        sheet, panels = grid(width, len(kinds), len(kinds) if width > NARROW + 1 else 1, 2.2, gap=_GAP)
         for axes, kind in zip(panels, kinds, strict=True):
             axes.set_gid(f"scatter-{kind}")
             means = list(by_kind[kind].values())
-            xs = np.concatenate([each["source"] for each in means])
-            ys = np.concatenate([each["target"] for each in means])
-            axes.set_xlim(0, 1)
-            axes.set_ylim(0, 1)
-            draw_line(axes, [0, 1], [0, 1], color=Ink.MUTED, linewidth=0.7)
-            draw_line(
-                axes, xs, ys, linestyle="none", marker="o", markersize=3.0, markeredgewidth=0,
-                color=COLORS.get(kind, Ink.PEN3), alpha=0.45,
-            )  # fmt: skip
+            xs, ys = (np.concatenate([each[side] for each in means]) for side in ("source", "target"))
+            draw_equality(axes, 0, 1, Ink.MUTED)
+            draw_dots(axes, xs, ys, 3.0, markeredgewidth=0, color=COLORS.get(kind, Ink.PEN3), alpha=0.45)
             axes.set_xlabel("coverage, SIM", labelpad=2)
             title = "as it is" if kind == "none" else f"calibrated, {kind}"
-            _title(axes, title, f"{len(xs)} points, {words.number(len(means))}")
+            head(axes, title, f"{len(xs)} points, {words.number(len(means))}", stacked=True)
         panels[0].set_ylabel(f"coverage, {words.label}", labelpad=3)
-        return figure
+        return sheet
 
     text = f"{{name}}, controller {{label}}: {{x}} in simulation, {{y}} on the {words.robot}"
     marks = tuple(
@@ -262,29 +254,26 @@ def draw_strategies(summary: Summary) -> Drawing | None:
     )
     alt = "Coverage on the twins by strategy of transfer."
 
-    def draw(width: float) -> Figure:
-        left = 1.35
-        height = 0.27 * len(rows)
-        figure = new_figure(width, _HEAD + height + _FOOT)
-        axes = place_axes(figure, left, _HEAD, width - left - _RIGHT, height)
+    offsets = {strategy: stacked(np.array(each), highest) for strategy, each in values.items()}
+
+    def draw(width: float) -> Sheet:
+        sheet, (axes,) = grid(width, 1, 1, 0.27 * len(rows))
         axes.set_gid("strategies")
         axes.set_xlim(0, highest or 1)
-        axes.set_ylim(len(rows) - 0.5, -0.5)
-        axes.set_yticks(range(len(rows)), [row["strategy"] for row in rows])
-        axes.tick_params(axis="y", length=0)
+        name_rows(axes, [row["strategy"] for row in rows], grid=False)
         for place, row in enumerate(rows):
             color = Ink.OURS if row["strategy"].startswith("posterior") else Ink.RUN
-            spread = _spread(place, len(values[row["strategy"]]))
-            draw_line(
-                axes, values[row["strategy"]], spread, linestyle="none", marker="o", markersize=3.0,
-                markeredgewidth=0, color=color, alpha=0.45,
-            )  # fmt: skip
-            if row["low"] is not None:
-                draw_line(axes, [row["low"], row["high"]], [place, place], color=color, linewidth=2.0)
-            draw_line(axes, [row["estimate"]], [place], color=color, marker="o", markersize=6)
+            ends = None if row["low"] is None else (row["low"], row["high"])
+            dots = np.array(values[row["strategy"]])
+            draw_row(axes, place, Row(row["estimate"], ends, dots, offsets[row["strategy"]], color, color))
         axes.set_xlabel("coverage on the twin, TWIN", labelpad=2)
-        _title(axes, "Transfer by strategy", words_of(summary).number(max(row["n"] for row in rows)))
-        return figure
+        head(
+            axes,
+            "Transfer by strategy",
+            words_of(summary).number(max(row["n"] for row in rows)),
+            stacked=True,
+        )
+        return sheet
 
     series = []
     for place, row in enumerate(rows):
@@ -292,16 +281,11 @@ def draw_strategies(summary: Summary) -> Drawing | None:
         mean = np.array([(row["estimate"], float(place))])
         series.append(Series(f"{{name}}: mean coverage {{x}}{within}, n = {row['n']}", mean, row["strategy"]))
         twins = by_twin[row["strategy"]]
-        points = np.column_stack([values[row["strategy"]], _spread(place, len(twins))])
+        points = np.column_stack([values[row["strategy"]], place + offsets[row["strategy"]]])
         labels = tuple(twin for twin, _ in twins)
         series.append(Series("{name}, {label}: coverage {x}", points, row["strategy"], labels))
     marks = (Panel("strategies", tuple(series), (3, 2)),)
     return draw_wide(draw, "closing-strategies", caption, alt, marks=marks)
-
-
-def _spread(place: int, n: int) -> npt.NDArray[np.float64]:
-    """Return places around that of a row, so that equal values are visible, (n,)."""
-    return place + np.random.default_rng(place).uniform(-0.28, 0.28, n)
 
 
 def draw_order(summary: Summary) -> Drawing | None:
@@ -331,48 +315,52 @@ def draw_order(summary: Summary) -> Drawing | None:
         for measure in goals
     }
 
-    def draw(width: float) -> Figure:
-        figure, panels = _panels(width, 2, 0.32 * len(groups), left=1.35)
+    ends = {
+        measure: (min([0.0, *values]), 1.05 * max([goals[measure], *values]))
+        for measure, known in by_measure.items()
+        for values in [[value for _, found in known.values() for _, value in found]]
+    }
+
+    def draw(width: float) -> Sheet:
+        sheet, panels = grid(width, 2, 2 if width > NARROW + 1 else 1, 0.32 * len(groups), gap=_GAP)
         for axes, (measure, goal) in zip(panels, goals.items(), strict=True):
             axes.set_gid(f"order-{measure}")
-            known = {
-                label: (kind, [value for _, value in found])
-                for label, (kind, found) in by_measure[measure].items()
-            }
-            largest = max((value for _, each in known.values() for value in each), default=goal)
-            lowest = min((value for _, each in known.values() for value in each), default=0.0)
-            axes.set_xlim(min(0.0, lowest), 1.05 * max(largest, goal))
-            axes.set_ylim(len(groups) - 0.5, -0.5)
+            axes.set_xlim(*ends[measure])
+            is_named = axes is panels[0] or not sheet.is_wide
+            name_rows(axes, list(groups) if is_named else [""] * len(groups), grid=False)
             draw_line(axes, [goal, goal], [-0.5, len(groups)], color=Ink.PUBLISHED, linewidth=1.0)
-            for place, (kind, values) in enumerate(known.values()):
-                if values:
+            for place, (kind, found) in enumerate(by_measure[measure].values()):
+                if found:
                     color = COLORS.get(kind, Ink.PEN3)
-                    draw_line(
-                        axes, values, _spread(place, len(values)), linestyle="none", marker="o", markersize=3.0,
-                        markeredgewidth=0, color=color, alpha=0.5,
-                    )  # fmt: skip
+                    values = np.array([value for _, value in found])
+                    row = Row(None, None, values, stacked(values, ends[measure][1]), color, color)
+                    draw_row(axes, place, row)
                     middle = float(np.median(values))
                     draw_line(axes, [middle, middle], [place - 0.3, place + 0.3], color=color, linewidth=2.4)
-            axes.set_yticks(range(len(groups)), list(groups) if axes is panels[0] else [""] * len(groups))
-            axes.tick_params(axis="y", length=0)
             at_least = "at least" if measure.startswith("srcc") else "at most"
-            _title(axes, titles[measure], f"goal: {at_least} {goal:g}")
-        return figure
+            head(axes, titles[measure], f"goal: {at_least} {goal:g}", stacked=True)
+        return sheet
 
     marks = tuple(
-        Panel(f"order-{measure}", tuple(_marks_of_order(titles[measure], by_measure[measure])), (3, 2))
+        Panel(
+            f"order-{measure}",
+            tuple(_marks_of_order(titles[measure], by_measure[measure], ends[measure][1])),
+            (3, 2),
+        )
         for measure in goals
     )
     return draw_wide(draw, "closing-order", caption, alt, marks=marks)
 
 
-def _marks_of_order(title: str, known: Mapping[str, tuple[str, list[tuple[str, float]]]]) -> Iterator[Series]:
+def _marks_of_order(
+    title: str, known: Mapping[str, tuple[str, list[tuple[str, float]]]], length: float
+) -> Iterator[Series]:
     for place, (label, (_, found)) in enumerate(known.items()):
         if found:
-            values = [value for _, value in found]
+            values = np.array([value for _, value in found])
             middle = np.array([(float(np.median(values)), float(place))])
             yield Series(f"{{name}}: median {title} {{x}}, n = {len(values)}", middle, label)
-            points = np.column_stack([values, _spread(place, len(values))])
+            points = np.column_stack([values, place + stacked(values, length)])
             yield Series(
                 f"{{name}}, {{label}}: {title} {{x}}", points, label, tuple(twin for twin, _ in found)
             )
@@ -394,34 +382,3 @@ def _after(summary: Summary, observe: str, budget: int) -> list[tuple[Summary, S
         for each in twin["calibrated"]
         if (each["observe"], each["budget"]) == (observe, budget)
     ]
-
-
-def _panels(width: float, n: int, height: float, left: float = _LEFT) -> tuple[Figure, list[Axes]]:
-    """Create axes: side by side in a wide figure, below each other in a narrow one."""
-    wide = width > NARROW + 1
-    columns = n if wide else 1
-    each = (width - left - _RIGHT - (columns - 1) * _GAP) / columns
-    row = _HEAD + height + _FOOT
-    figure = new_figure(width, row * (1 if wide else n))
-    panels = []
-    for k in range(n):
-        column, line = (k, 0) if wide else (0, k)
-        panels.append(place_axes(figure, left + column * (each + _GAP), line * row + _HEAD, each, height))
-    return figure, panels
-
-
-def _title(axes: Axes, title: str, text: str) -> None:
-    place = {"xy": (0, 1), "xycoords": "axes fraction", "textcoords": "offset points"}
-    axes.annotate(title, xytext=(0, 16), fontsize=9, weight="bold", **place)  # type: ignore[arg-type]
-    axes.annotate(text, xytext=(0, 5.5), fontsize=7.5, color=Ink.MUTED, **place)  # type: ignore[arg-type]
-
-
-def _key(figure: Figure, entries: Sequence[tuple[str, str]]) -> None:
-    """Draw the key of colors and markers in the upper right corner."""
-    width = figure.get_size_inches()[0]
-    height = figure.get_size_inches()[1]
-    for k, (kind, text) in enumerate(reversed(entries)):
-        figure.text(
-            1 - (_RIGHT + 0.72 * k) / width, 1 - 0.12 / height, f"— {text}",
-            ha="right", va="top", fontsize=7.5, color=COLORS.get(kind, Ink.PEN3),
-        )  # fmt: skip

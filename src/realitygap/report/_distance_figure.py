@@ -10,23 +10,16 @@ import numpy as np
 
 from realitygap.drawing import Ink
 from realitygap.report._distance_audit import Confound, DistanceAudit, distance_notes, in_words
-from realitygap.report._drawing import (
-    WIDE,
-    Drawing,
-    draw_dots,
-    draw_line,
-    house_style,
-    new_figure,
-    place_axes,
-    shorten,
-    to_svg,
-    write,
-)
 from realitygap.report._formats import captioned, save_drawing
+from realitygap.report.charts.cells import draw_shares
+from realitygap.report.charts.house import WIDE, Drawing, draw_wide, shorten
+from realitygap.report.charts.lines import TextStyle, draw_band, draw_dots, draw_line, head, write
+from realitygap.report.charts.rows import Row, draw_row
+from realitygap.report.charts.sheet import IS_WIDE, Sheet
+from realitygap.world import Grid
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 DARKEST = 2.0
 """The weight, in means over cells, at which a cell of the map has its full color."""
@@ -35,6 +28,9 @@ _POINTS = 500
 _LEAST = 15
 """Pairs of one difference in length from which on their median and quantiles are drawn."""
 _FAR_SIDES = (0.1, 0.9)
+_DATA = ("data", "data")
+_RIGHT: TextStyle = {"ha": "right", "va": "center"}
+_LEFT: TextStyle = {"ha": "left", "va": "center"}
 
 
 def draw_distance(audit: DistanceAudit, *, width: float = WIDE, name: str = "distance") -> Drawing:
@@ -45,10 +41,8 @@ def draw_distance(audit: DistanceAudit, *, width: float = WIDE, name: str = "dis
         width: Width of the figure [in]. A narrow one has the parts below each other.
         name: First part of the ids.
     """
-    with house_style():
-        figure = _draw(audit, width)
-        alt = " ".join(distance_notes(audit)[2:-1])
-        return Drawing(to_svg(figure, name, alt), _caption(audit), alt, figure)
+    alt = " ".join(distance_notes(audit)[2:-1])
+    return draw_wide(lambda width: _draw(audit, width), name, _caption(audit), alt, width=width)
 
 
 def save_distance(audit: DistanceAudit, out: str | Path) -> Path:
@@ -62,58 +56,37 @@ def save_distance(audit: DistanceAudit, out: str | Path) -> Path:
     return save_drawing(drawing, out, title=f"Distance {audit.distance.name}")
 
 
-def _draw(audit: DistanceAudit, width: float) -> Figure:
-    wide = width >= 6
-    left, gap, right, head, foot = 0.42, 0.78, 0.12, 0.5, 0.46
-    map_width = (width - left - gap - right) * 0.56 if wide else width - left - right
-    height = map_width * audit.rows / audit.columns
-    plot_left = left + map_width + gap if wide else left + 0.12
-    plot_top = head if wide else 2 * head + height + foot
-    upper = plot_top + height + foot
+def _draw(audit: DistanceAudit, width: float) -> Sheet:
     studied = audit.confounds[1:]
-    lower = 0.55 + 0.2 * (len(studied) + 1) + foot if studied else 0.0
-    figure = new_figure(width, upper + lower)
-    _draw_map(place_axes(figure, left, head, map_width, height), audit, wide=wide)
-    axes = place_axes(figure, plot_left, plot_top, width - right - plot_left, height)
-    _draw_pairs(axes, audit.confounds[0], audit, wide=wide)
+    below = [0.2 * len(audit.confounds)] if studied else []
+    rows = ["correlations"] * len(below)
+    if width >= IS_WIDE:
+        places = [["map", "pairs"], *([row, row] for row in rows)]
+        sheet = Sheet(width, places, [None, *below], widths=[0.56, 0.44], gap=0.3, pad=0.3)
+    else:
+        places = [["map"], ["pairs"], *([row] for row in rows)]
+        sheet = Sheet(width, places, [None, 2.0, *below], pad=0.3)
+    _draw_map(sheet.panels["map"], audit, wide=sheet.is_wide)
+    _draw_pairs(sheet.panels["pairs"], audit.confounds[0], audit, wide=sheet.is_wide)
     if studied:
-        names = 0.2 * width if wide else 0.3 * width
-        numbers = 1.45
-        box = place_axes(figure, names, upper + 0.4, width - names - numbers, 0.2 * (len(studied) + 1))
-        _draw_correlations(box, audit.confounds, names, wide=wide)
-    return figure
-
-
-def _title(axes: Axes, title: str, text: str = "") -> None:
-    write(axes, title, (0, 1), (0, 17), 9, weight="bold")
-    write(axes, text, (0, 1), (0, 5.5), 7.5, color=Ink.MUTED)
+        _draw_correlations(sheet.panels["correlations"], audit.confounds, wide=sheet.is_wide)
+    return sheet
 
 
 # the map
 
 
 def _draw_map(axes: Axes, audit: DistanceAudit, *, wide: bool) -> None:
-    from matplotlib.colors import LinearSegmentedColormap
-    from matplotlib.patches import Rectangle
-
-    shades = LinearSegmentedColormap.from_list("weight", [Ink.GROUND, Ink.BAND, Ink.OURS])
     axes.set_xlim(0, audit.columns)
     axes.set_ylim(0, audit.rows)
     weights = audit.relative_leverage
+    shares = np.nan_to_num(weights / DARKEST).clip(max=1.0)
+    draw_shares(axes, Grid(0.0, 0.0, 1.0, audit.columns, audit.rows), shares.ravel(), rim=0.8)
     for (row, column), weight in np.ndenumerate(weights):
-        part = 0.0 if math.isnan(weight) else min(weight / DARKEST, 1.0)
-        axes.add_patch(
-            Rectangle((column, row), 1, 1, facecolor=shades(part), edgecolor=Ink.GROUND, linewidth=0.8)
-        )
-        axes.text(
-            column + 0.5,
-            row + 0.5,
-            "" if math.isnan(weight) else f"{weight:.1f}",
-            ha="center",
-            va="center",
-            fontsize=7.0,
-            color=Ink.GROUND if part > 0.62 else Ink.TEXT,
-        )
+        text = "" if math.isnan(weight) else f"{weight:.1f}"
+        color = Ink.GROUND if shares[row, column] > 0.62 else Ink.TEXT
+        middle: TextStyle = {"ha": "center", "va": "center", "color": color}
+        write(axes, text, (column + 0.5, row + 0.5), (0, 0), 7.0, units=("data", "data"), **middle)
     for spine in axes.spines.values():
         spine.set_visible(False)
     axes.set_xticks(np.arange(audit.columns) + 0.5, [str(k) for k in range(audit.columns)])
@@ -121,13 +94,12 @@ def _draw_map(axes: Axes, audit: DistanceAudit, *, wide: bool) -> None:
     axes.tick_params(length=0)
     axes.set_xlabel("column of the cell", labelpad=2)
     axes.set_ylabel("row", labelpad=3)
-    _title(
-        axes,
-        f"What each cell weighs: {audit.distance.name}",
+    note = (
         "what adding or removing it does to a random walk, in means over all cells"
         if wide
-        else "what it does to a walk, in means over all cells",
+        else "what it does to a walk, in means over all cells"
     )
+    head(axes, f"What each cell weighs: {audit.distance.name}", note, stacked=True)
 
 
 # the relation with length
@@ -153,49 +125,41 @@ def _draw_pairs(axes: Axes, confound: Confound, audit: DistanceAudit, *, wide: b
     groups = [distances[differences == value] for value in places]
     if groups:
         low, high = (np.array([np.quantile(each, side) for each in groups]) for side in _FAR_SIDES)
-        axes.fill_between(places, low, high, color=Ink.BAND, alpha=0.6, linewidth=0)
+        draw_band(axes, places, low, high)
         draw_line(axes, places, [np.median(each) for each in groups], color=Ink.OURS, linewidth=1.6)
     axes.set_xlabel("difference in visited cells", labelpad=2)
     unit = {"cells": "distance [cells]", "m": "distance [m]", "1": "distance"}[audit.distance.unit]
     axes.set_ylabel(unit, labelpad=3)
     found = confound.correlation
     text = "no correlation" if found.value is None else f"Spearman {in_words(found)}"
-    _title(
-        axes, "Distance and length", f"{confound.n_pairs:,} pairs of {'random ' if wide else ''}walks: {text}"
-    )
+    note = f"{confound.n_pairs:,} pairs of {'random ' if wide else ''}walks: {text}"
+    head(axes, "Distance and length", note, stacked=True)
 
 
-def _draw_correlations(axes: Axes, confounds: list[Confound], names: float, *, wide: bool) -> None:
+def _draw_correlations(axes: Axes, confounds: list[Confound], *, wide: bool) -> None:
     lows = [each.correlation.low for each in confounds]
-    axes.set_xlim(-1 if any(low is not None and low < -0.25 for low in lows) else -0.25, 1)
+    low = -1.0 if any(end is not None and end < -0.25 for end in lows) else -0.25
+    # names and numbers have their room within the panel, so that those above keep theirs
+    before, after = (0.31, 0.24) if wide else (0.95, 1.25)
+    axes.set_xlim(low - before * (1 - low), 1 + after * (1 - low))
     axes.set_ylim(len(confounds) - 0.5, -0.5)
     axes.set_yticks([])
     axes.spines["left"].set_visible(False)
+    axes.spines["bottom"].set_bounds(low, 1)
+    ticks = np.arange(-5, 6) / 5 if wide else np.array([-1.0, -0.5, 0.0, 0.5, 1.0])
+    axes.set_xticks(ticks[ticks >= low])
     axes.grid(axis="x", color=Ink.RULE, linewidth=0.5)
     draw_line(axes, [0, 0], [-0.5, len(confounds)], color=Ink.MUTED, linewidth=0.8)
-    for row, each in enumerate(confounds):
-        found = each.correlation
-        color = Ink.RUN if row == 0 else Ink.OURS
-        if found.value is not None and found.low is not None and found.high is not None:
-            draw_line(axes, [found.low, found.high], [row, row], color=color, linewidth=2.2)
-            draw_line(axes, [found.value], [row], color=color, marker="o", markersize=5)
-        label = f"{each.label}, {each.of}" if each.label else each.of
-        for text, at, x, side in (
-            (shorten(label, int(names / 0.075)), 0.0, -6, "right"),
-            ("none" if found.value is None else in_words(found), 1.0, 8, "left"),
-        ):
-            write(
-                axes, text, (at, row), (x, 0), 7.5, xycoords=("axes fraction", "data"), ha=side, va="center"
-            )
+    for place, confound in enumerate(confounds):
+        found = confound.correlation
+        ends = None if found.low is None or found.high is None else (found.low, found.high)
+        draw_row(axes, place, Row(found.value, ends, color=Ink.OURS if place else Ink.RUN))
+        name = f"{confound.label}, {confound.of}" if confound.label else confound.of
+        number = "none" if found.value is None else in_words(found)
+        write(axes, shorten(name, 25 if wide else 15), (low, place), (-6, 0), 7.5, units=_DATA, **_RIGHT)
+        write(axes, number, (1.0, place), (8, 0), 7.5, units=_DATA, **_LEFT)
     axes.set_xlabel("Spearman’s correlation of distance with the difference in visited cells", labelpad=2)
-    write(
-        axes,
-        "Distance and length in each condition" if wide else "In each condition",
-        (0, 1),
-        (-72 * names + 4, 8),
-        9,
-        weight="bold",
-    )
+    head(axes, "Distance and length in each condition" if wide else "In each condition")
 
 
 # words

@@ -24,33 +24,23 @@ from realitygap.playback import (
     ray_ends,
 )
 from realitygap.records import ResultsFolder, refuse_results
-from realitygap.report._drawing import (
-    WIDE,
-    Drawing,
-    draw_dots,
-    draw_line,
-    draw_points,
-    house_style,
-    new_figure,
-    place_axes,
-    shorten,
-    to_svg,
-    write,
-)
 from realitygap.report._driven import refuse_replay
 from realitygap.report._formats import captioned, check_ending, save_drawing
-from realitygap.report._path_figure import arena_extent, draw_arena, draw_cells
 from realitygap.report._tally import Tally, read_tally, settings_of
 from realitygap.report._trial_figure import ChosenTrial, choose_trial
+from realitygap.report.charts.arena import draw_arena, draw_cells
+from realitygap.report.charts.house import WIDE, Drawing, draw_wide, shorten
+from realitygap.report.charts.lines import Dash, area_key, draw_band, draw_dots, draw_line, head, line_key
+from realitygap.report.charts.sheet import Sheet
 from realitygap.runs import Condition, genome_of
 from realitygap.trials import NoiseKey
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 _COLORS = (Ink.OURS, Ink.PUBLISHED, Ink.PEN3)
-_DASHES: tuple[Any, ...] = ("solid", (0, (5, 1.5)), (0, (1, 1)))
+_DASHES: tuple[Dash, ...] = ("solid", (0, (5, 1.5)), (0, (1, 1)))
 """Dashes of the platforms."""
 
 _GHOSTS = 7
@@ -213,9 +203,9 @@ def draw_divergence(one: Side, *others: Side, of: str = "", width: float = WIDE)
     between = tuple(measure_divergence(one.trials, [*other.trials[1:], other.trials[0]]) for other in others)
     within = tuple(own_divergence(side.trials) for side in sides)
     caption, alt = _words(sides, between, within, of)
-    with house_style():
-        figure = _draw(sides, between, within, width)
-        return Drawing(to_svg(figure, "divergence", alt), caption, alt, figure)
+    return draw_wide(
+        lambda width: _draw(sides, between, within, width), "divergence", caption, alt, width=width
+    )
 
 
 def _words(
@@ -264,41 +254,34 @@ def _words(
 
 def _draw(
     sides: tuple[Side, ...], between: tuple[Divergence, ...], within: tuple[Divergence, ...], width: float
-) -> Figure:
-    arena = sides[0].trials[0].arena
-    x_range, y_range = arena_extent(arena)
-    gap, head, foot = 0.3, 0.34, 0.42
+) -> Sheet:
     n = len(sides)
-    across = (width - (n - 1) * gap - 0.06) / n
-    half = (width - gap - 0.06) / 2
-    up = across * (y_range[1] - y_range[0]) / (x_range[1] - x_range[0])
-    curve = 1.35
-    figure = new_figure(width, head + up + 0.46 + curve + foot)
+    above = [str(k) for k in range(n) for _ in range(6 // n)]
+    sheet = Sheet(width, [above, ["distance"] * 3 + ["heading"] * 3], [None, 1.35], gap=0.1, pad=0.16)
     for k, side in enumerate(sides):
-        axes = place_axes(figure, 0.03 + k * (across + gap), head, across, up)
-        draw_arena(axes, side.trials[0].arena, x_range, y_range)
-        _draw_side(axes, side, _COLORS[k], is_narrow=n > 2)
-    left = 0.52
-    wide = half - left + 0.03
-    for k, (name, unit) in enumerate((("distance", "apart [m]"), ("heading", "headings apart [rad]"))):
-        axes = place_axes(figure, left + k * (half + gap), head + up + 0.46, wide, curve)
-        _draw_curves(axes, sides, between, within, name)
+        axes = sheet.panels[str(k)]
+        draw_arena(axes, side.trials[0].arena)
+        _draw_side(axes, side, _COLORS[k])
+        _write_head(axes, side, _COLORS[k], is_narrow=n > 2)
+    for name, unit in (("distance", "apart [m]"), ("heading", "headings apart [rad]")):
+        axes = sheet.panels[name]
+        _draw_curves(axes, between, within, name)
         axes.set_ylabel(unit, labelpad=3)
-    return figure
+    sheet.key(_keys(sides))
+    return sheet
 
 
-def _draw_side(axes: Axes, side: Side, color: str, *, is_narrow: bool) -> None:
+def _draw_side(axes: Axes, side: Side, color: str) -> None:
     first = side.trials[0]
-    draw_cells(axes, first.cells, first.arena, facecolor=Ink.VISITED)
+    draw_cells(axes, first.cells, first.arena)
     for trial in side.trials[1:_MOST_TRAILS]:
-        draw_points(axes, trial.poses, color=color, linewidth=0.5, alpha=0.22, zorder=4)
-    draw_points(axes, first.poses, color=color, linewidth=1.7, zorder=6, solid_joinstyle="round")
+        draw_line(axes, *trial.poses.T[:2], color=color, linewidth=0.5, alpha=0.22, zorder=4)
+    draw_line(axes, *first.poses.T[:2], color=color, linewidth=1.7, zorder=6, solid_joinstyle="round")
     rows = np.unique(np.linspace(0, len(first.poses) - 1, _GHOSTS).round().astype(int))
     for row in rows:
         _draw_robot(axes, first, int(row), color, strong=row == rows[-1])
-    ends = np.array([trial.poses[-1, :2] for trial in side.trials])
-    draw_dots(axes, ends[1:, 0], ends[1:, 1], 2.2, color=color, alpha=0.7, markeredgewidth=0, zorder=7)
-    _write_head(axes, side, color, is_narrow=is_narrow)
+    ends = np.array([trial.poses[-1, :2] for trial in side.trials[1:]])
+    draw_dots(axes, ends[:, 0], ends[:, 1], 2.2, color=color, alpha=0.7, markeredgewidth=0, zorder=7)
 
 
 def _draw_robot(axes: Axes, trial: MovingTrial, row: int, color: str, *, strong: bool) -> None:
@@ -307,13 +290,8 @@ def _draw_robot(axes: Axes, trial: MovingTrial, row: int, color: str, *, strong:
         corners = placed([*outline, outline[0]], moment.pose)
         if strong:
             axes.fill(corners[:, 0], corners[:, 1], color=Ink.GROUND, alpha=0.75, linewidth=0, zorder=7.5)
-        draw_points(
-            axes,
-            corners,
-            color=color if strong else Ink.BODY,
-            linewidth=1.6 if strong else 0.6,
-            zorder=8 if strong else 5,
-        )
+        ink, width, order = (color, 1.6, 8) if strong else (Ink.BODY, 0.6, 5)
+        draw_line(axes, *corners.T, color=ink, linewidth=width, zorder=order)
     if not strong:
         return
     for (x1, y1), (x2, y2) in ray_ends(trial.shape, moment):
@@ -329,58 +307,28 @@ def _write_head(axes: Axes, side: Side, color: str, *, is_narrow: bool) -> None:
     facts = (
         f"{side.trials[0].label}, n = {len(side.trials)}, {'' if is_narrow else 'mean '}coverage {mean:.2f}"
     )
-    for x, text, align, ink, weight in (
-        (0.0, shorten(side.name, 14 if is_narrow else 30), "left", color, "bold"),
-        (
-            1.0,
-            facts,
-            "right",
-            Ink.MUTED,
-            "normal",
-        ),
-    ):
-        write(
-            axes,
-            text,
-            (x, 1.0),
-            (0, 5),
-            9.5 if weight == "bold" else 8.0,
-            ha=align,
-            va="bottom",
-            weight=weight,
-            color=ink,
-            annotation_clip=False,
-        )
+    head(axes, shorten(side.name, 14 if is_narrow else 30), facts, color=color)
 
 
 def _draw_curves(
-    axes: Axes,
-    sides: tuple[Side, ...],
-    between: tuple[Divergence, ...],
-    within: tuple[Divergence, ...],
-    name: str,
+    axes: Axes, between: tuple[Divergence, ...], within: tuple[Divergence, ...], name: str
 ) -> None:
-    highest = 0.0
+    highest = 0.02
     for divergence, color in zip(between, _between_colors(between), strict=True):
         values: npt.NDArray[np.float64] = getattr(divergence, name)
-        steps = np.arange(values.shape[1])
         low, high = np.percentile(values, [10, 90], axis=0)
-        axes.fill_between(steps, low, high, color=Ink.BAND, alpha=0.55, linewidth=0)
-        axes.plot(steps, values.mean(axis=0), color=color, linewidth=1.8)
+        draw_band(axes, np.arange(len(low)), low, high, 0.55)
+        axes.plot(np.arange(len(low)), values.mean(axis=0), color=color, linewidth=1.8)
         highest = max(highest, float(high.max()))
-    steps = np.arange(max(each.n_steps for each in between) + 1)
     for own, color, dashes in zip(within, _COLORS, _DASHES, strict=False):
         mean = getattr(own, name).mean(axis=0)
         axes.plot(np.arange(len(mean)), mean, color=color, linewidth=1.0, linestyle=dashes)
-    top = math.pi if name == "heading" else 1.08 * max(highest, 0.02)
-    axes.set_ylim(0, top)
-    axes.set_xlim(0, steps[-1])
+    axes.set_ylim(0, math.pi if name == "heading" else 1.08 * highest)
+    axes.set_xlim(0, max(each.n_steps for each in between))
     if name == "heading":
         axes.set_yticks([0, math.pi / 2, math.pi], ["0", "π/2", "π"])
         axes.axhline(math.pi / 2, color=Ink.RULE, linewidth=0.8, zorder=0)
     axes.set_xlabel("step", labelpad=2)
-    if name == "distance":
-        _legend(axes, sides)
 
 
 def _between_colors(between: tuple[Divergence, ...]) -> tuple[str, ...]:
@@ -388,41 +336,17 @@ def _between_colors(between: tuple[Divergence, ...]) -> tuple[str, ...]:
     return (Ink.TEXT,) if len(between) == 1 else _COLORS[1 : len(between) + 1]
 
 
-def _legend(axes: Axes, sides: tuple[Side, ...]) -> None:
-    from matplotlib.lines import Line2D
-    from matplotlib.patches import Patch
-
+def _keys(sides: tuple[Side, ...]) -> list[Artist]:
     one, *others = sides
     if len(others) == 1:
-        curves = [Line2D([], [], color=Ink.TEXT, linewidth=1.8, label="between the two")]
+        curves = [line_key("between the two", color=Ink.TEXT, linewidth=1.8)]
     else:
         curves = [
-            Line2D([], [], color=color, linewidth=1.8, label=f"{shorten(other.name, 12)} from {one.name}")
+            line_key(f"{shorten(other.name, 12)} from {one.name}", color=color, linewidth=1.8)
             for other, color in zip(others, _COLORS[1:], strict=False)
         ]
-    handles: list[Any] = [
-        *curves,
-        Patch(facecolor=Ink.BAND, alpha=0.55, label="10th to 90th percentile"),
-    ]
-    handles += [
-        Line2D(
-            [],
-            [],
-            color=color,
-            linestyle=dashes,
-            linewidth=1.0,
-            label=f"{shorten(side.name, 16)}, noise alone",
-        )
+    alone = [
+        line_key(f"{shorten(side.name, 16)}, noise alone", color=color, linestyle=dashes, linewidth=1.0)
         for side, color, dashes in zip(sides, _COLORS, _DASHES, strict=False)
     ]
-    axes.legend(
-        handles=handles,
-        loc="lower left",
-        bbox_to_anchor=(0.0, 1.03),
-        ncols=4,
-        frameon=False,
-        fontsize=7.5,
-        handlelength=1.8,
-        borderaxespad=0.1,
-        columnspacing=2.2,
-    )
+    return [*curves, area_key("10th to 90th percentile", Ink.BAND, 0.55), *alone]

@@ -11,8 +11,8 @@ from pathlib import Path
 from realitygap.drawing import Ink, Picture
 from realitygap.errors import did_you_mean
 from realitygap.records import write_whole
-from realitygap.report._drawing import Drawing, house_style, to_svg
-from realitygap.report._shapes_drawing import figure_of
+from realitygap.report.charts.house import Drawing, house_style, to_svg
+from realitygap.report.charts.shapes import picture_sheet
 
 ENDINGS = (".gif", ".mp4", ".pdf", ".png", ".svg")
 """Endings of the names of pictures; `.gif` and `.mp4` only for trials, which move."""
@@ -76,8 +76,9 @@ def save_picture(picture: Picture, path: str | Path) -> Path:
         write_whole(path, picture.to_svg().encode("utf-8"))
         return path
     with house_style():
-        figure = figure_of(picture, _PICTURE_WIDTH)
-        drawing = Drawing("", "", picture.description, figure)
+        sheet = picture_sheet(picture, _PICTURE_WIDTH)
+        sheet.settle()
+        drawing = Drawing("", "", picture.description, sheet.figure)
     write_whole(path, drawing_bytes(drawing, ending, picture.title))
     return path
 
@@ -85,7 +86,7 @@ def save_picture(picture: Picture, path: str | Path) -> Path:
 def captioned(drawing: Drawing, name: str) -> Drawing:
     """Return the drawing with its caption as text below, for a separate file; ids in it begin with `name`.
 
-    Everything in the figure must belong to axes; its figure is changed.
+    The drawing's figure is changed.
     """
     figure = drawing.figure
     if figure is None:
@@ -94,10 +95,12 @@ def captioned(drawing: Drawing, name: str) -> Drawing:
     lines = textwrap.wrap(drawing.caption, int(width * _LETTERS))
     room = 0.14 + 0.155 * len(lines)
     figure.set_size_inches(width, height + room)
+    scale = height / (height + room)
     for axes in figure.axes:
-        box = axes.get_position()
-        scale = height / (height + room)
+        box = axes.get_position(original=True)
         axes.set_position((box.x0, 1 - (1 - box.y0) * scale, box.width, box.height * scale))
+    for legend in figure.legends:
+        legend.set_bbox_to_anchor((0.0, 1 - scale, 1.0, scale), figure.transFigure)
     with house_style():
         for k, line in enumerate(lines):
             y = (room - 0.1 - 0.155 * k) / (height + room)

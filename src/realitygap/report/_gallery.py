@@ -9,13 +9,13 @@ from realitygap._version import __version__
 from realitygap.errors import RecordVersionError
 from realitygap.report import _networks_figure
 from realitygap.report._arena_figure import draw_arena_and_robot
-from realitygap.report._drawing import Drawing
 from realitygap.report._individuals_figure import draw_better, draw_individuals
 from realitygap.report._lineage_figure import draw_lineage
 from realitygap.report._placed import FigureOnPage
 from realitygap.report._species_figure import count_species, draw_species
 from realitygap.report._structures import Structures
 from realitygap.report._tally import Tally, settings_of
+from realitygap.report.charts.house import Drawing
 
 
 def content(tally: Tally) -> dict[str, Any]:

@@ -10,10 +10,13 @@ from realitygap._wording import p_equation, reproduces
 from realitygap.errors import RecordError
 from realitygap.gap import SHOWN, GapResult
 from realitygap.records import is_special, refuse_results, write_whole
-from realitygap.report._gap_maps_figure import draw_gap_maps
-from realitygap.report._gap_order_figure import draw_gap_differences, draw_gap_pairs
-from realitygap.report._gap_replay_figure import draw_gap_replay
-from realitygap.report._gap_why_figure import draw_gap_why
+from realitygap.report._gap_figures import (
+    draw_gap_differences,
+    draw_gap_maps,
+    draw_gap_pairs,
+    draw_gap_replay,
+    draw_gap_why,
+)
 from realitygap.report._page import LABELS
 from realitygap.report._placed import FigureOnPage, hover_content, number_figures
 from realitygap.report._template import render_page

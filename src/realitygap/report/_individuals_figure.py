@@ -12,34 +12,36 @@ import numpy.typing as npt
 import polars as pl
 
 from realitygap.drawing import PENS, Ink
-from realitygap.report._drawing import (
-    Drawing,
-    draw_dots,
-    draw_line,
-    draw_wide,
-    head_axes,
-    shorten,
-    write,
-)
 from realitygap.report._path_figure import (
     TracedPath,
-    arena_extent,
-    draw_arena,
     draw_path,
-    draw_path_legend,
-    draw_visited,
-    panels_of,
+    path_key,
     say_origin,
     trace_paths,
     typical_replicate,
 )
 from realitygap.report._tally import Results, Tally, label_of, read_tally, settings_of
+from realitygap.report.charts.arena import arena_extent, arena_panels, draw_cells, draw_start
+from realitygap.report.charts.house import Drawing, draw_wide, shorten
+from realitygap.report.charts.lines import (
+    LineStyle,
+    TextStyle,
+    area_key,
+    draw_dots,
+    draw_line,
+    draw_rings,
+    head,
+    line_key,
+    mark_key,
+    panel_key,
+    write,
+)
+from realitygap.report.charts.sheet import Sheet
 from realitygap.runs import Condition
 from realitygap.world import Arena, Body
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 _MOST_PANELS = 11
 """Generations shown at most, evenly spread; with the legend they fill rows of two and of three."""
@@ -146,20 +148,18 @@ def draw_better(
     )
     arena, body, label = resolved.placed_arena, resolved.on.body, label_of(described)
 
-    def draw(width: float) -> Figure:
-        figure, places = panels_of(len(paths) + 1, arena, width)
-        short = width < 6
-        for path, axes in zip(paths, places, strict=False):
-            draw_arena(axes, arena, *arena_extent(arena))
+    def draw(width: float) -> Sheet:
+        sheet, panels, key = arena_panels(width, len(paths), arena)
+        for path, axes in zip(paths, panels, strict=True):
             draw_path(axes, path, arena, body)
-            if short:
-                left, right = f"gen {path.generation}, ind {path.individual}", f"{path.coverage:.3f}"
+            if sheet.is_wide:
+                title = f"generation {path.generation}, individual {path.individual}"
+                head(axes, title, f"{shorten(label, 12)}, coverage {path.coverage:.3f}", below=True)
             else:
-                left = f"generation {path.generation}, individual {path.individual}"
-                right = f"{shorten(label, 12)}, coverage {path.coverage:.3f}"
-            head_axes(axes, left, right, y=0.0, shift=(1.0, -4.0))
-        draw_path_legend(places[-1], paths, small=short)
-        return figure
+                title = f"gen {path.generation}, ind {path.individual}"
+                head(axes, title, f"{path.coverage:.3f}", below=True)
+        path_key(key, paths, is_wide=sheet.is_wide)
+        return sheet
 
     return draw_wide(draw, name, caption, alt + ".")
 
@@ -169,33 +169,32 @@ def draw_better(
 
 def _draw_generations(
     panels: list[list[TracedPath]], arena: Arena, body: Body, label: str, width: float
-) -> Figure:
-    figure, places = panels_of(len(panels) + 1, arena, width)
-    small = width < 6
-    for panel, axes in zip(panels, places, strict=False):
-        draw_arena(axes, arena, *arena_extent(arena))
-        _draw_pens(axes, panel, arena, body, small=small)
+) -> Sheet:
+    sheet, places, key = arena_panels(width, len(panels), arena)
+    small = not sheet.is_wide
+    for panel, axes in zip(panels, places, strict=True):
         best = max(panel, key=lambda path: path.coverage)
-        head_axes(
-            axes,
-            f"generation {best.generation}",
+        note = (
             f"best {best.coverage:.3f}"
             if small
-            else f"{shorten(label, 12)}, best: {best.individual}, coverage {best.coverage:.3f}",
-            y=0.0,
-            shift=(1.0, -4.0),
+            else f"{shorten(label, 12)}, best: {best.individual}, coverage {best.coverage:.3f}"
         )
+        head(axes, f"generation {best.generation}", note, below=True)
     n_pens = max((path.individual for panel in panels for path in panel), default=0) + 1
-    _draw_pen_legend(places[-1], n_pens, small=small)
-    return figure
+    _draw_pen_key(key, n_pens, small=small)
+    sheet.settle()  # so that panels have the size in which numbers are moved apart
+    for panel, axes in zip(panels, places, strict=True):
+        _draw_pens(axes, panel, arena, body, small=small)
+    return sheet
 
 
 def _draw_pens(axes: Axes, paths: list[TracedPath], arena: Arena, body: Body, *, small: bool) -> None:
-    draw_visited(axes, sorted({cell for path in paths for cell in path.cells}), arena, body)
+    draw_cells(axes, sorted({cell for path in paths for cell in path.cells}), arena)
+    draw_start(axes, arena, body)
     drawn = [path for path in paths if path.poses is not None]
     for path in paths:
         for poses, _ in path.tracks:
-            draw_line(axes, poses[:, 0], poses[:, 1], zorder=5, **_pen(path.individual, small=small))
+            draw_line(axes, poses[:, 0], poses[:, 1], **_pen(path.individual, small=small))
         if path.poses is None:
             _dot_cells(axes, path, arena, small=small)
     if drawn:
@@ -210,10 +209,10 @@ def _dot_cells(axes: Axes, path: TracedPath, arena: Arena, *, small: bool) -> No
     xs = grid.x + (cells % grid.columns + (across + 1) / 4) * grid.cell
     ys = grid.y + (cells // grid.columns + (up + 1) / 4) * grid.cell
     size = 1.6 if small else 2.6
-    draw_line(axes, xs, ys, marker="o", linestyle="", color=PENS[pen][0], markersize=size, zorder=5)
+    draw_dots(axes, xs, ys, size, color=PENS[pen][0], zorder=5)
 
 
-def _pen(individual: int, *, small: bool) -> dict[str, Any]:
+def _pen(individual: int, *, small: bool) -> LineStyle:
     """Return the line style of a pen. The first pens are broad, so that they show under those drawn over them."""
     pen = individual % len(PENS)
     color, dash = PENS[pen]
@@ -225,6 +224,7 @@ def _pen(individual: int, *, small: bool) -> dict[str, Any]:
         "linestyle": (0, scaled) if scaled else "solid",
         "dash_capstyle": "butt",
         "solid_joinstyle": "round",
+        "zorder": 5,
     }
 
 
@@ -241,30 +241,17 @@ def _number_ends(axes: Axes, paths: list[TracedPath], arena: Arena, *, small: bo
         color = PENS[path.individual % len(PENS)][0]
         if math.dist(end, place) * points > radius:
             draw_line(axes, [end[0], place[0]], [end[1], place[1]], color=color, linewidth=0.6, zorder=8)
-            draw_dots(axes, [end[0]], [end[1]], 2.0, color=color, zorder=8)
-        draw_dots(
-            axes,
-            [place[0]],
-            [place[1]],
-            2 * radius - 0.8,
-            color=color,
-            markerfacecolor=Ink.GROUND,
-            markeredgewidth=0.9,
-            zorder=9,
-        )
-        write(
-            axes,
-            str(path.individual),
-            place,
-            (0, -0.15),
-            5.6 if small else 6.8,
-            xycoords="data",
-            ha="center",
-            va="center_baseline",
-            weight="bold",
-            color=color,
-            zorder=10,
-        )
+            draw_dots(axes, end[0], end[1], 2.0, color=color, zorder=8)
+        draw_rings(axes, place[0], place[1], 2 * radius - 0.8, color, markeredgewidth=0.9, zorder=9)
+        style: TextStyle = {
+            "ha": "center",
+            "va": "center_baseline",
+            "weight": "bold",
+            "color": color,
+            "zorder": 10,
+        }
+        size = 5.6 if small else 6.8
+        write(axes, str(path.individual), place, (0, -0.15), size, units=("data", "data"), **style)
 
 
 def _moved_apart(ends: npt.NDArray[np.float64], least: float) -> npt.NDArray[np.float64]:
@@ -283,33 +270,14 @@ def _moved_apart(ends: npt.NDArray[np.float64], least: float) -> npt.NDArray[np.
     return places
 
 
-def _draw_pen_legend(axes: Axes, n_pens: int, *, small: bool) -> None:
-    from matplotlib.lines import Line2D
-    from matplotlib.patches import Patch
-
-    axes.set_axis_off()
-    n = min(n_pens, len(PENS))
-    handles: list[Any] = []
-    for pen in range(n):
-        same = ", ".join(str(each) for each in range(pen, n_pens, len(PENS)))
-        handles.append(Line2D([], [], label=f"individual {same}", **_pen(pen, small=small)))
-    handles += [
-        Line2D([], [], color=Ink.BODY, marker="s", markerfacecolor="none", linestyle="", markersize=6, label="start"),
-        Patch(facecolor=Ink.VISITED, label="cell that one visits" if not small else "visited cell"),
-    ]  # fmt: skip
-    axes.legend(
-        handles=handles,
-        loc="upper left",
-        bbox_to_anchor=(0.0, 1.03),
-        ncols=2,
-        frameon=False,
-        fontsize=6.0 if small else 8.0,
-        handlelength=2.2 if small else 3.6,
-        borderaxespad=0.0,
-        columnspacing=0.8 if small else 1.4,
-        handletextpad=0.5,
-        labelspacing=0.35 if small else 0.7,
-    )
+def _draw_pen_key(axes: Axes, n_pens: int, *, small: bool) -> None:
+    handles = []
+    for pen in range(min(n_pens, len(PENS))):
+        same = ", ".join(str(individual) for individual in range(pen, n_pens, len(PENS)))
+        handles.append(line_key(f"individual {same}", **_pen(pen, small=small)))
+    handles.append(mark_key("start", "s", 6, color=Ink.BODY, markerfacecolor="none"))
+    handles.append(area_key("visited cell" if small else "cell that one visits", Ink.VISITED))
+    panel_key(axes, handles, columns=2, size=6.0 if small else 8.0, length=2.2 if small else 3.6)
 
 
 # words

@@ -12,20 +12,23 @@ import numpy.typing as npt
 import polars as pl
 
 from realitygap.drawing import Ink
-from realitygap.report._drawing import (
-    Drawing,
-    draw_wide,
-    head_axes,
-    new_figure,
-    place_axes,
-    shorten,
-)
 from realitygap.report._tally import Results, read_tally
 from realitygap.report._trial_figure import ChosenTrial, choose_trial
+from realitygap.report.charts.house import Drawing, draw_wide, shorten
+from realitygap.report.charts.lines import (
+    Dash,
+    LineStyle,
+    TextStyle,
+    draw_dots,
+    draw_line,
+    draw_rings,
+    head,
+    write,
+)
+from realitygap.report.charts.sheet import IS_WIDE, Sheet
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 _PENS = (Ink.PEN1, Ink.PEN2, Ink.PEN3, Ink.PEN5, Ink.PEN4, Ink.PEN6, Ink.PEN7, Ink.PEN0)
 """Pens of species, as in the figure of species. The number of the species is also in each dot."""
@@ -172,25 +175,23 @@ def _brought(
 # drawing
 
 
-def _draw(trial: ChosenTrial, rows: pl.DataFrame, ancestors: list[Ancestor], width: float) -> Figure:
+def _draw(trial: ChosenTrial, rows: pl.DataFrame, ancestors: list[Ancestor], width: float) -> Sheet:
     n = int(rows["generation"].max()) + 1  # type: ignore[arg-type]
     n_individuals = int(rows["individual"].max()) + 1  # type: ignore[arg-type]
-    is_wide = width >= 6
+    is_wide = width >= IS_WIDE
     is_few = n <= (_MOST_LABELED if is_wide else _MOST_LABELED // 2)
     shows_all = is_few and n_individuals <= _MOST_ROWS
     places = _places(ancestors, shows_all)
-    spread = max(places.values()) - min(places.values())
-    most = n_individuals if shows_all else max(spread + 1, 4.0)
-    height = min(max(0.33 * most, 1.6), 4.6)
-    figure = new_figure(width, height + 1.95)
-    left, across = 0.5, width - 0.75
-    axes = place_axes(figure, left, 0.3, across, height)
-    below = place_axes(figure, left, height + 0.45, across, 1.05)
+    most = n_individuals if shows_all else max(max(places.values()) - min(places.values()) + 1, 4.0)
+    sheet = Sheet(width, [["tree"], ["coverage"]], [min(max(0.33 * most, 1.6), 4.6), 1.05], gap=0.2, pad=0.2)
+    axes, below = sheet.panels["tree"], sheet.panels["coverage"]
     if shows_all:
         axes.set_ylim(n_individuals - 0.4, -0.6)
         axes.set_yticks(range(n_individuals))
         axes.set_ylabel("individual")
-        _draw_others(axes, n, n_individuals, set(places))
+        others = [(g, k) for g in range(n) for k in range(n_individuals) if (g, k) not in places]
+        xs, ys = np.array(others, float).reshape(-1, 2).T
+        draw_dots(axes, xs, ys, 3.0, color=Ink.RULE, clip_on=False)
     else:
         middle = (min(places.values()) + max(places.values())) / 2
         axes.set_ylim(middle + most / 2 + 0.2, middle - most / 2 - 0.2)
@@ -204,13 +205,11 @@ def _draw(trial: ChosenTrial, rows: pl.DataFrame, ancestors: list[Ancestor], wid
     axes.set_xticks([])
     axes.spines["bottom"].set_visible(False)
     row = trial.row
-    numbers = (row["generation"], row["individual"])
     which = "generation {}, individual {}" if is_wide else "{}/{}"
-    label = f"{shorten(trial.label, 12)}, coverage {trial.row[trial.measure]:.3f}"
-    head_axes(
-        axes, f"{shorten(row['condition'], 24)}, run {row['replicate']}: {which.format(*numbers)}", label
-    )
-    return figure
+    title = which.format(row["generation"], row["individual"])
+    label = f"{shorten(trial.label, 12)}, coverage {row[trial.measure]:.3f}"
+    head(axes, f"{shorten(row['condition'], 24)}, run {row['replicate']}: {title}", label)
+    return sheet
 
 
 def _places(ancestors: list[Ancestor], shows_all: bool) -> dict[tuple[int, int], float]:
@@ -241,21 +240,6 @@ def _apart(wanted: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
     return placed
 
 
-def _draw_others(axes: Axes, n: int, n_individuals: int, ancestors: set[tuple[int, int]]) -> None:
-    others = np.array(
-        [(g, k) for g in range(n) for k in range(n_individuals) if (g, k) not in ancestors], float
-    ).reshape(-1, 2)
-    axes.plot(
-        others[:, 0],
-        others[:, 1],
-        linestyle="none",
-        marker="o",
-        markersize=3.0,
-        color=Ink.RULE,
-        clip_on=False,
-    )
-
-
 def _draw_links(
     axes: Axes, ancestors: list[Ancestor], places: Mapping[tuple[int, int], float], *, is_few: bool
 ) -> None:
@@ -268,14 +252,11 @@ def _draw_links(
     for (is_copy, rank), ends in links.items():
         gaps = np.full((len(ends), 1, 2), np.nan)
         points = np.concatenate([np.array(ends), gaps], axis=1).reshape(-1, 2)
-        axes.plot(
-            *points.T,
-            color=Ink.RUN,
-            linewidth=(3.0 if is_copy else 1.1) * (1.0 if is_few else 0.6),
-            linestyle="solid" if rank == 0 else (0, (3, 2)),
-            zorder=1.5,
-            clip_on=False,
-        )
+        dashes: Dash = "solid" if rank == 0 else (0, (3, 2))
+        linewidth = (3.0 if is_copy else 1.1) * (1.0 if is_few else 0.6)
+        line: LineStyle = {"color": Ink.RUN, "linewidth": linewidth, "linestyle": dashes, "zorder": 1.5}
+        line["clip_on"] = False
+        draw_line(axes, *points.T, **line)
 
 
 def _draw_dots(
@@ -287,13 +268,15 @@ def _draw_dots(
     is_wide: bool,
 ) -> None:
     champion = ancestors[-1]
-    at = (champion.generation, places[champion.generation, champion.individual])
-    axes.plot(*at, "o", markersize=18.0 if is_few else 9.0, markerfacecolor="none", markeredgecolor=Ink.TEXT,
-              markeredgewidth=1.1, zorder=2, clip_on=False)  # fmt: skip
+    x, y = champion.generation, places[champion.generation, champion.individual]
+    ring: LineStyle = {"color": Ink.TEXT, "markerfacecolor": "none", "markeredgewidth": 1.1, "zorder": 2}
+    ring["clip_on"] = False
+    draw_dots(axes, x, y, 18.0 if is_few else 9.0, **ring)
+    size, rim = (13.0, 1.6) if is_few else (4.5, 1.2)
     for color, members in _by_color(ancestors).items():
-        dots = [(each.generation, places[each.generation, each.individual]) for each in members]
-        axes.plot(*np.transpose(dots), "o", markersize=13.0 if is_few else 4.5, markerfacecolor=Ink.GROUND,
-                  markeredgecolor=color, markeredgewidth=1.6 if is_few else 1.2, zorder=2.5, clip_on=False)  # fmt: skip
+        xs = [member.generation for member in members]
+        ys = [places[member.generation, member.individual] for member in members]
+        draw_rings(axes, xs, ys, size, color, markeredgewidth=rim, zorder=2.5, clip_on=False)
         if is_few:
             _draw_numbers(axes, members, places, color, champion=champion, is_wide=is_wide)
 
@@ -319,21 +302,15 @@ def _draw_numbers(
 ) -> None:
     """Write the species into each dot, and coverage and new structure next to it."""
     for each in members:
-        x, y = each.generation, places[each.generation, each.individual]
-        axes.annotate(
-            str(each.species), (x, y), ha="center", va="center", fontsize=7.0, color=color, zorder=3
-        )
+        at = (each.generation, places[each.generation, each.individual])
+        middle: TextStyle = {"ha": "center", "va": "center", "color": color, "zorder": 3}
+        write(axes, str(each.species), at, (0, 0), 7.0, units=("data", "data"), **middle)
         right = 12.5 if each is champion else 9.5
         text = f"{each.coverage:.3f}" if is_wide else f"{each.coverage:.2f}".removeprefix("0")
-        _label(axes, (x, y), (right, 4.5 if each.brought else 0.0), text, Ink.MUTED)
+        _label(axes, at, (right, 4.5 if each.brought else 0.0), text, Ink.MUTED)
         if each.brought:
-            _label(
-                axes,
-                (x, y),
-                (right, -4.5),
-                "+ " + (shorten(each.brought, 24) if is_wide else _in_short(each.brought)),
-                color,
-            )
+            brought = shorten(each.brought, 24) if is_wide else _in_short(each.brought)
+            _label(axes, at, (right, -4.5), f"+ {brought}", color)
 
 
 def _in_short(brought: str) -> str:
@@ -343,10 +320,9 @@ def _in_short(brought: str) -> str:
 
 
 def _label(axes: Axes, at: tuple[float, float], shift: tuple[float, float], text: str, color: str) -> None:
-    axes.annotate(
-        text, at, shift, textcoords="offset points", ha="left", va="center", fontsize=7.0, color=color, zorder=3,
-        bbox={"facecolor": Ink.GROUND, "edgecolor": "none", "pad": 0.6, "alpha": 0.85}, annotation_clip=False,
-    )  # fmt: skip
+    style: TextStyle = {"va": "center", "color": color, "zorder": 3, "annotation_clip": False}
+    style["bbox"] = {"facecolor": Ink.GROUND, "edgecolor": "none", "pad": 0.6, "alpha": 0.85}
+    write(axes, text, at, shift, 7.0, units=("data", "data"), **style)
 
 
 def _draw_coverage(axes: Axes, trial: ChosenTrial, rows: pl.DataFrame, ancestors: list[Ancestor]) -> None:
@@ -355,8 +331,8 @@ def _draw_coverage(axes: Axes, trial: ChosenTrial, rows: pl.DataFrame, ancestors
     best = rows.group_by("generation", maintain_order=True).agg(pl.col(trial.measure).max())
     axes.plot(best["generation"], best[trial.measure], color=Ink.RUN, linewidth=1.1)
     for color, members in _by_color(ancestors).items():
-        dots = [(each.generation, each.coverage) for each in members]
-        axes.plot(*np.transpose(dots), "o", markersize=4.0, color=color, clip_on=False)
+        xs, ys = zip(*((each.generation, each.coverage) for each in members), strict=True)
+        draw_dots(axes, xs, ys, 4.0, color=color, clip_on=False)
     axes.set_ylim(0, None)
     axes.grid(axis="y", color=Ink.RULE, linewidth=0.5)
     axes.xaxis.set_major_locator(MaxNLocator(12, integer=True))

@@ -12,18 +12,12 @@ from realitygap._wording import counted
 from realitygap.drawing import Picture
 from realitygap.errors import RealityGapError
 from realitygap.evolution import network_picture
-from realitygap.report._drawing import (
-    Drawing,
-    draw_wide,
-    head_axes,
-    house_style,
-    new_figure,
-    place_axes,
-    to_svg,
-)
-from realitygap.report._shapes_drawing import draw_picture
 from realitygap.report._structures import Structures, count_structures
 from realitygap.report._tally import Results, Tally, label_of, read_tally, settings_of
+from realitygap.report.charts.house import Drawing, draw_wide
+from realitygap.report.charts.lines import head
+from realitygap.report.charts.shapes import draw_picture
+from realitygap.report.charts.sheet import IS_WIDE, Sheet, grid
 from realitygap.runs import Condition, genome_of
 
 _MARKS = (
@@ -85,9 +79,8 @@ def draw_network(condition: Condition, row: Mapping[str, Any], measure: str) -> 
     caption = f"{picture.title}. {_MARKS} {condition.label}, n = 1 network, no interval."
     title = picture.title.removeprefix("Network of ")
     text = f"{condition.label}, coverage {row[measure]:.3f}"
-    with house_style():
-        figure = _draw([(title, text, picture)], 5.9)
-        return Drawing(to_svg(figure, "network", picture.description), caption, picture.description, figure)
+    shown = [(title, text, picture)]
+    return draw_wide(lambda width: _draw(shown, width), "network", caption, picture.description, width=5.9)
 
 
 def _first_objective(tally: Tally) -> str:
@@ -138,20 +131,12 @@ def picture_of(condition: Condition, row: Mapping[str, Any]) -> Picture:
     )
 
 
-def _draw(pictures: list[tuple[str, str, Picture]], width: float) -> Any:
-    n_columns = 2 if width >= 6 else 1
-    gap, text_height = 0.3, 0.4
-    across = (width - gap * (n_columns - 1)) / n_columns
-    picture = pictures[0][2]
-    up = across * (picture.top - picture.bottom) / (picture.right - picture.left)
-    n_rows = -(-len(pictures) // n_columns)
-    figure = new_figure(width, n_rows * (up + text_height))
-    for index, (title, text, shown) in enumerate(pictures):
-        row, column = divmod(index, n_columns)
-        axes = place_axes(figure, column * (across + gap), row * (up + text_height) + 0.26, across, up)
-        draw_picture(axes, shown, scale=1.08 if n_columns == 2 else 0.95)
-        head_axes(axes, title, text, shift=(1.0, 4.0))
-    return figure
+def _draw(pictures: Sequence[tuple[str, str, Picture]], width: float) -> Sheet:
+    sheet, panels = grid(width, len(pictures), 2 if width >= IS_WIDE else 1, None, gap=0.3, pad=0.16)
+    for axes, (title, text, picture) in zip(panels, pictures, strict=True):
+        draw_picture(axes, picture, scale=1.08 if sheet.is_wide else 0.95)
+        head(axes, title, text)
+    return sheet
 
 
 def _caption(tally: Tally, condition: str, group: Structures) -> str:

@@ -31,23 +31,22 @@ from realitygap.report._bests_figure import draw_bests
 from realitygap.report._champions import Champions, retry_champions
 from realitygap.report._choices_figure import compare_choices, draw_choices
 from realitygap.report._comparisons import Comparison, compare_champions, compare_conditions
-from realitygap.report._coverage_figure import draw_coverage
-from realitygap.report._drawing import house_style
 from realitygap.report._driven import describe_driven
 from realitygap.report._export import export_page
 from realitygap.report._findings import find, leading_conditions
+from realitygap.report._generations_figure import draw_coverage, draw_scores
 from realitygap.report._paper_audit import paper_audit_content
 from realitygap.report._parameters import neat_parameters, settings_tables
 from realitygap.report._path_figure import draw_paths
 from realitygap.report._placed import FigureOnPage, hover_content, number_figures
 from realitygap.report._replay import content as replay_content
-from realitygap.report._score_figure import draw_scores
 from realitygap.report._statistics_section import statistics_content
 from realitygap.report._structures import selection_of
 from realitygap.report._summary import summarize
 from realitygap.report._tally import Tally, label_of, read_tally, score_text, settings_of
 from realitygap.report._task_summary import summarize_tasks
 from realitygap.report._template import render_page
+from realitygap.report.charts.house import house_style
 from realitygap.stats import CONFIDENCE, MEDIAN_SMALLEST_N, interval_ranks
 from realitygap.study import load_study, named_studies
 

@@ -10,9 +10,9 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from realitygap._foreign_text import script_text
-from realitygap.report._drawing import NARROW, Drawing, inline
-from realitygap.report._marks import marks_content
 from realitygap.report._template import packed, template_text
+from realitygap.report.charts.house import NARROW, Drawing, inline
+from realitygap.report.charts.marks import marks_content
 
 if TYPE_CHECKING:
     from markupsafe import Markup

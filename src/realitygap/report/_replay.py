@@ -20,10 +20,11 @@ import polars as pl
 
 from realitygap.errors import RealityGapError
 from realitygap.playback import RobotShape, first_visits, pack_pen, pack_scene, pack_shape
-from realitygap.report._path_figure import arena_extent, typical_replicate
+from realitygap.report._path_figure import typical_replicate
 from realitygap.report._placed import as_json, hash_of
 from realitygap.report._tally import Tally, label_of, score_text, settings_of, task_of
 from realitygap.report._template import template_text
+from realitygap.report.charts.arena import arena_extent
 from realitygap.runs import Condition, replay
 from realitygap.trials import Trajectory
 

@@ -12,8 +12,10 @@ import numpy as np
 from realitygap.drawing import Ink
 from realitygap.errors import RecordError
 from realitygap.records import refuse_results
-from realitygap.report._drawing import WIDE, Drawing, draw_line, house_style, new_figure, place_axes, to_svg
 from realitygap.report._formats import captioned, check_ending, save_drawing
+from realitygap.report.charts.house import Drawing, draw_wide
+from realitygap.report.charts.lines import draw_band, draw_line, head
+from realitygap.report.charts.sheet import IS_WIDE, Sheet, grid
 from realitygap.world import INCH, Calibration
 
 if TYPE_CHECKING:
@@ -22,8 +24,8 @@ if TYPE_CHECKING:
 MOST_ABREAST = 3
 """Panels in a row."""
 
-_HEIGHT, _LEFT, _GAP, _TOP, _BELOW = 2.2, 0.55, 0.25, 0.35, 0.5
-"""Sizes of a panel and of the space around it [in]."""
+_HEIGHT = 2.2
+"""Height of a panel [in]."""
 
 _STRIP = 0.8
 """Width of the strip of readings at a distance [in on the ground]."""
@@ -65,41 +67,31 @@ def draw_sensors(calibration: Calibration) -> Drawing:
     alt = (
         f"Readings by distance of {len(sensors)} range sensors ({calibration.label}), with the fitted model."
     )
-    with house_style():
-        columns = min(MOST_ABREAST, len(sensors))
-        rows = -(-len(sensors) // columns)
-        figure = new_figure(WIDE, rows * (_TOP + _HEIGHT + _BELOW))
-        width = (WIDE - _LEFT - 0.1 - (columns - 1) * _GAP) / columns
-        for k, sensor in enumerate(sensors):
-            row, column = divmod(k, columns)
-            axes = place_axes(
-                figure,
-                _LEFT + column * (width + _GAP),
-                _TOP + row * (_TOP + _HEIGHT + _BELOW),
-                width,
-                _HEIGHT,
-            )
-            _draw_sensor(axes, sensor, calibration.label, is_first=column == 0)
-        svg = to_svg(figure, "sensors", alt)
-    return Drawing(svg, caption, alt, figure)
+
+    def draw(width: float) -> Sheet:
+        columns = MOST_ABREAST if width >= IS_WIDE else 1
+        sheet, panels = grid(width, len(sensors), columns, _HEIGHT, gap=0.2)
+        for k, (axes, sensor) in enumerate(zip(panels, sensors, strict=True)):
+            _draw_sensor(axes, sensor)
+            head(axes, f"{sensor['name']} ({calibration.label})")
+            axes.tick_params(labelleft=k % columns == 0)
+            axes.set_ylabel("" if k % columns else "reading")
+        return sheet
+
+    return draw_wide(draw, "sensors", caption, alt)
 
 
-def _draw_sensor(axes: Axes, sensor: Mapping[str, Any], label: str, *, is_first: bool) -> None:
+def _draw_sensor(axes: Axes, sensor: Mapping[str, Any]) -> None:
     curve = {key: np.asarray(values, float) for key, values in sensor["curve"].items()}
     inches = curve["distances_m"] / INCH
     axes.set_xlim(0, float(inches[-1]))
     axes.set_xticks(np.arange(0, inches[-1], 3))
     axes.set_ylim(-0.04, 1.04)
-    axes.fill_between(inches, curve["low"], curve["high"], color=Ink.BAND, alpha=0.6, linewidth=0)
+    draw_band(axes, inches, curve["low"], curve["high"])
     for distance, readings in _by_distance(sensor):
         _draw_strip(axes, distance / INCH, readings)
     draw_line(axes, inches, curve["mean"], color=Ink.OURS, linewidth=1.4)
-    axes.set_title(f"{sensor['name']} ({label})", loc="left", fontsize=8.5)
     axes.set_xlabel("distance to the wall [in]")
-    if is_first:
-        axes.set_ylabel("reading")
-    else:
-        axes.set_yticklabels([])
 
 
 def _by_distance(sensor: Mapping[str, Any]) -> list[tuple[float, list[float]]]:

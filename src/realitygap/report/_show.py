@@ -10,7 +10,6 @@ from realitygap.errors import did_you_mean
 from realitygap.platforms import JyroPlatform
 from realitygap.playback import save_movie
 from realitygap.records import RecordWarning, ResultsFolder, refuse_results
-from realitygap.report._drawing import Drawing
 from realitygap.report._formats import captioned, check_ending, save_drawing, save_picture
 from realitygap.report._lineage_figure import draw_lineage
 from realitygap.report._motion import choose_moving
@@ -19,6 +18,7 @@ from realitygap.report._path_figure import draw_paths
 from realitygap.report._species_figure import draw_species
 from realitygap.report._tally import read_tally
 from realitygap.report._trial_figure import choose_trial, draw_trial
+from realitygap.report.charts.house import Drawing
 from realitygap.robots.twin import TwinModel, load_twin, twin_picture
 from realitygap.world import arena_picture, load_arena, load_robot, model_picture
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -13,24 +12,21 @@ import polars as pl
 
 from realitygap._wording import counted
 from realitygap.drawing import Ink
-from realitygap.report._drawing import (
-    Drawing,
-    draw_wide,
-    head_axes,
-    new_figure,
-    place_axes,
-    shorten,
-)
-from realitygap.report._marks import MOST_MARKS, Panel, Series
 from realitygap.report._structures import selection_of
 from realitygap.report._tally import Results, Tally, label_of, read_tally
+from realitygap.report.charts.house import Drawing, draw_wide, shorten
+from realitygap.report.charts.lines import Dash, LineStyle, TextStyle, draw_line, head, spread, write
+from realitygap.report.charts.marks import MOST_MARKS, Panel, Series
+from realitygap.report.charts.sheet import IS_WIDE, Sheet
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 _PENS = (Ink.PEN1, Ink.PEN2, Ink.PEN3, Ink.PEN5, Ink.PEN4, Ink.PEN6, Ink.PEN7, Ink.PEN0)
-_LINES = {
+_HEIGHT = 2.25
+"""Height of a panel [in]."""
+
+_LINES: dict[str, tuple[str, Dash, str]] = {
     "coverage": (Ink.PEN1, "solid", "o"),
     "novelty": (Ink.PEN2, (0, (5, 1.5)), "s"),
     "random": (Ink.RUN, (0, (1.2, 1.4)), "^"),
@@ -151,24 +147,22 @@ def draw_species(
         Panel("means", tuple(_marks_of_means(means)), (0, 2)),
     )
 
-    def draw(width: float) -> Figure:
-        is_wide = width >= 6
-        height = 2.25
-        figure = new_figure(width, height + 0.75 if is_wide else 2 * (height + 0.75) + 0.1)
-        across = 0.42 * width if is_wide else width - 0.55
-        left = place_axes(figure, 0.5, 0.3, across, height)
-        left.set_gid("shares")
-        _draw_shares(left, shares, f"{shorten(condition, 28)}, run {replicate}", label_of(described))
-        right = place_axes(
-            figure,
-            0.57 * width if is_wide else 0.5,
-            0.3 if is_wide else height + 1.15,
-            (0.33 * width if is_wide else across - 0.75),
-            height,
-        )
-        right.set_gid("means")
-        _draw_means(right, means, f"{labels}, n = {counted(n_runs, 'run')}")
-        return figure
+    def draw(width: float) -> Sheet:
+        if width >= IS_WIDE:
+            sheet = Sheet(width, [["shares", "means"]], [_HEIGHT], widths=[0.55, 0.45], gap=0.4)
+        else:
+            sheet = Sheet(width, [["shares"], ["means"]], [_HEIGHT, _HEIGHT], pad=0.16)
+        for key, axes in sheet.panels.items():
+            axes.set_gid(key)
+        left, right = sheet.panels["shares"], sheet.panels["means"]
+        _label(left, "share of the population")
+        _label(right, "mean number of species")
+        head(left, f"{shorten(condition, 28)}, run {replicate}", f"{label_of(described)}, n = 1")
+        head(right, "all runs", f"{labels}, n = {counted(n_runs, 'run')}")
+        _draw_means(right, means)
+        sheet.settle()  # so that the panel has the size in which numbers have room
+        _draw_shares(left, shares)
+        return sheet
 
     return draw_wide(draw, name, caption, alt, marks=marks)
 
@@ -203,14 +197,13 @@ def _shares(rows: pl.DataFrame) -> dict[int, npt.NDArray[np.float64]]:
     return dict(zip(numbers.tolist(), counts / counts.sum(axis=0), strict=True))
 
 
-def _draw_shares(axes: Axes, shares: Mapping[int, npt.NDArray[np.float64]], title: str, label: str) -> None:
+def _draw_shares(axes: Axes, shares: Mapping[int, npt.NDArray[np.float64]]) -> None:
     n = len(next(iter(shares.values())))
     axes.set_ylim(0, 1)
     axes.set_xlim(-0.55, n - 0.45)
     floors = np.cumsum([np.zeros(n), *shares.values()], axis=0)[:-1]
     draw = _draw_bars if n <= _MOST_BARS else _draw_bands
     draw(axes, shares, floors)
-    _label(axes, n, "share of the population", title, f"{label}, n = 1")
 
 
 def _draw_bars(
@@ -262,56 +255,31 @@ def _numbers_with_room(
 
 
 def _write_number(axes: Axes, number: int, x: float, y: float) -> None:
-    axes.annotate(str(number), (x, y), ha="center", va="center", fontsize=7.5)
+    write(axes, str(number), (x, y), (0, 0), 7.5, units=("data", "data"), ha="center", va="center")
 
 
-def _draw_means(axes: Axes, means: Mapping[str, npt.NDArray[np.float64]], label: str) -> None:
+def _draw_means(axes: Axes, means: Mapping[str, npt.NDArray[np.float64]]) -> None:
     n = max(len(values) for values in means.values())
-    most = max(float(values.max()) for values in means.values())
-    top = max(1.5, 1.08 * most)
+    top = max(1.5, 1.08 * max(float(values.max()) for values in means.values()))
     axes.set_ylim(0, top)
     axes.set_xlim(-0.2, max(n - 1, 1))
-    places = _spread([float(values[-1]) for values in means.values()], 0.075 * top)
+    places = spread([float(values[-1]) for values in means.values()], 0.075 * top)
     for (selection, values), place in zip(means.items(), places, strict=True):
         color, dashes, mark = _LINES.get(selection, (Ink.PEN3, "solid", "D"))
-        axes.plot(
-            np.arange(len(values)),
-            values,
-            color=color,
-            linestyle=dashes,
-            marker=mark if n <= _MOST_BARS else None,
-            markersize=4.0,
-            linewidth=1.4,
-            clip_on=False,
-        )
-        axes.annotate(
-            shorten(selection, 12),
-            (len(values) - 1, values[-1]),
-            (1.03, place),
-            textcoords=("axes fraction", "data"),
-            ha="left",
-            va="center",
-            fontsize=8.0,
-            color=color,
-            annotation_clip=False,
+        marker = mark if n <= _MOST_BARS else "none"
+        line: LineStyle = {"color": color, "linestyle": dashes, "linewidth": 1.4, "clip_on": False}
+        line |= {"marker": marker, "markersize": 4.0}
+        draw_line(axes, np.arange(len(values)), values, **line)
+        beside: TextStyle = {"va": "center", "color": color}
+        write(
+            axes, shorten(selection, 12), (1.03, place), (0, 0), 8, units=("axes fraction", "data"), **beside
         )
     axes.grid(axis="y", color=Ink.RULE, linewidth=0.5)
-    _label(axes, n, "mean number of species", "all runs", label)
 
 
-def _spread(values: list[float], least: float) -> list[float]:
-    """The values moved apart to at least `least`, in their order."""
-    order = sorted(range(len(values)), key=lambda k: values[k])
-    places = list(values)
-    for before, after in itertools.pairwise(order):
-        places[after] = max(places[after], places[before] + least)
-    return places
-
-
-def _label(axes: Axes, n: int, unit: str, title: str, label: str) -> None:
+def _label(axes: Axes, unit: str) -> None:
     from matplotlib.ticker import MaxNLocator
 
     axes.xaxis.set_major_locator(MaxNLocator(8, integer=True))
     axes.set_xlabel("generation", labelpad=2)
     axes.set_ylabel(unit)
-    head_axes(axes, title, label)

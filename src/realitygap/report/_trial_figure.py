@@ -2,43 +2,36 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import numpy.typing as npt
 import polars as pl
 
 from realitygap.drawing import Ink
 from realitygap.errors import whole_number
-from realitygap.report._drawing import (
-    Drawing,
-    head_axes,
-    house_style,
-    new_figure,
-    place_axes,
-    shorten,
-    to_svg,
-)
 from realitygap.report._driven import refuse_replay
-from realitygap.report._path_figure import (
-    TracedPath,
-    arena_extent,
-    draw_arena,
-    draw_path,
-    typical_replicate,
-)
+from realitygap.report._path_figure import typical_replicate
 from realitygap.report._tally import Results, Tally, label_of, read_tally, settings_of
+from realitygap.report.charts.arena import draw_arena, draw_cells, draw_start, draw_tracks
+from realitygap.report.charts.house import Drawing, draw_wide, shorten
+from realitygap.report.charts.lines import Dash, head
+from realitygap.report.charts.sheet import Sheet
 from realitygap.runs import Condition, replay
 from realitygap.trials import Trajectory
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
-_WIDTH = 9.6
-"""Width of the figure [in]."""
+Values = npt.NDArray[np.floating]
 
-_READINGS = ((Ink.PEN1, "solid"), (Ink.PEN0, (0, (5, 1.5))), (Ink.PEN2, (0, (1.3, 1.5))))
+_READINGS: tuple[tuple[str, Dash], ...] = (
+    (Ink.PEN1, "solid"),
+    (Ink.PEN0, (0, (5, 1.5))),
+    (Ink.PEN2, (0, (1.3, 1.5))),
+)
 
 
 @dataclass(frozen=True)
@@ -153,9 +146,7 @@ def draw_trial(
         f"{several if trajectory.others else ''}{trial.label}, n = 1 trial, no interval. Recomputed from the records."
     )
     alt = f"Path, readings and commands of one trial. {caption}"
-    with house_style():
-        figure = _draw(trial, trajectory)
-        return Drawing(to_svg(figure, "trial", alt), caption, alt, figure)
+    return draw_wide(lambda width: _draw(trial, trajectory, width), "trial", caption, alt)
 
 
 def _replayed(trial: ChosenTrial) -> Trajectory:
@@ -167,57 +158,35 @@ def _replayed(trial: ChosenTrial) -> Trajectory:
 # drawing
 
 
-def _traced(trial: ChosenTrial, trajectory: Trajectory) -> TracedPath:
-    row = trial.row
-    return TracedPath(
-        row["generation"],
-        row["individual"],
-        row[trial.measure],
-        tuple(row["cells"]),
-        trajectory.poses,
-        trajectory.stalled,
-        tuple((robot.poses, robot.stalled) for robot in trajectory.others),
-    )
-
-
-def _draw(trial: ChosenTrial, trajectory: Trajectory) -> Figure:
-    arena = trial.condition.arena_of(trajectory)
-    x_range, y_range = arena_extent(arena)
-    across = 0.56 * _WIDTH
-    up = across * (y_range[1] - y_range[0]) / (x_range[1] - x_range[0])
-    head = 0.36
-    figure = new_figure(_WIDTH, up + head + 0.42)
-    field = place_axes(figure, 0.05, head, across, up)
-    draw_arena(field, arena, x_range, y_range)
-    draw_path(field, _traced(trial, trajectory), arena, trial.condition.on.body)
-    _head(field, trial)
-    left, gap = across + 0.65, 0.24
-    height = (up - 2 * gap) / 3
-    width = _WIDTH - left - 0.72
-    axes = [place_axes(figure, left, head + k * (height + gap), width, height) for k in range(3)]
+def _draw(trial: ChosenTrial, trajectory: Trajectory, width: float) -> Sheet:
+    places = [["path", "readings"], ["path", "input"], ["path", "command"]]
+    sheet = Sheet(width, places, [None, None, None], widths=[5.4, 2.4], gap=0.2, pad=0.16)
+    arena, row = trial.condition.arena_of(trajectory), trial.row
+    tracks = [(robot.poses, robot.stalled) for robot in trajectory.robots]
+    field = sheet.panels["path"]
+    draw_arena(field, arena)
+    draw_cells(field, row["cells"], arena)
+    draw_start(field, arena, trial.condition.on.body)
+    draw_tracks(field, tracks)
+    head(field, shorten(trial.title, 60), f"{shorten(trial.label, 12)}, coverage {row[trial.measure]:.3f}")
     times = trajectory.step_s * np.arange(len(trajectory.poses))
     n_sensors = trajectory.readings.shape[1]
     names = ("left", "middle", "right") if n_sensors == 3 else [f"sensor {k}" for k in range(n_sensors)]
-    _lines(axes[0], times, trajectory.readings.T, names, "distance [m]")
-    axes[0].set_ylim(0, 1.08 * trial.condition.on.sensors.max_range)
-    _lines(axes[1], times[1:], trajectory.inputs[:, :1].T, trial.condition.network_inputs[:1], "input")
-    _lines(axes[2], times[1:], trajectory.commands.T, ("move", "turn"), "command")
-    axes[2].set_ylim(-1.1, 1.1)
-    for each in axes:
-        each.set_xlim(0, times[-1])
-        _stripes(each, times, trajectory)
-        if each is not axes[-1]:
-            each.set_xticklabels([])
-    axes[-1].set_xlabel("time [s]", labelpad=2)
-    return figure
+    readings, inputs, commands = (sheet.panels[name] for name in ("readings", "input", "command"))
+    _draw_lines(readings, times, trajectory.readings.T, names, "distance [m]")
+    readings.set_ylim(0, 1.08 * trial.condition.on.sensors.max_range)
+    _draw_lines(inputs, times[1:], trajectory.inputs[:, :1].T, trial.condition.network_inputs[:1], "input")
+    _draw_lines(commands, times[1:], trajectory.commands.T, ("move", "turn"), "command")
+    commands.set_ylim(-1.1, 1.1)
+    for axes in (readings, inputs, commands):
+        axes.set_xlim(0, times[-1])
+        _draw_stripes(axes, times, trajectory)
+        axes.tick_params(labelbottom=axes is commands)
+    commands.set_xlabel("time [s]", labelpad=2)
+    return sheet
 
 
-def _head(axes: Axes, trial: ChosenTrial) -> None:
-    facts = f"{shorten(trial.label, 12)}, coverage {trial.row[trial.measure]:.3f}"
-    head_axes(axes, shorten(trial.title, 60), facts, shift=(0.0, 5.0), annotation_clip=False)
-
-
-def _lines(axes: Axes, times: Any, rows: Any, names: Any, unit: str) -> None:
+def _draw_lines(axes: Axes, times: Values, rows: Values, names: Sequence[str], unit: str) -> None:
     for (color, dashes), values, name in zip(_READINGS, rows, names, strict=False):
         axes.plot(times, values, color=color, linestyle=dashes, linewidth=1.1, label=name, clip_on=False)
     axes.set_ylabel(unit)
@@ -232,7 +201,7 @@ def _lines(axes: Axes, times: Any, rows: Any, names: Any, unit: str) -> None:
     )
 
 
-def _stripes(axes: Axes, times: Any, trajectory: Trajectory) -> None:
+def _draw_stripes(axes: Axes, times: Values, trajectory: Trajectory) -> None:
     """The steps in which the robot was blocked."""
     step = trajectory.step_s
     edges = np.flatnonzero(np.diff(np.concatenate([[0], trajectory.stalled.astype(np.int8), [0]])))

@@ -57,10 +57,14 @@ class Marked(Protocol):
     """A drawing with its marks, and the frames of their panels."""
 
     @property
-    def marks(self) -> tuple[Panel, ...]: ...
+    def marks(self) -> tuple[Panel, ...]:
+        """The panels with marks."""
+        ...
 
     @property
-    def frames(self) -> tuple[tuple[float, ...], ...]: ...
+    def frames(self) -> tuple[tuple[float, ...], ...]:
+        """The frame of each panel, as of `frames_of`."""
+        ...
 
 
 def frames_of(figure: Figure, panels: Sequence[Panel]) -> tuple[tuple[float, ...], ...]:

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from realitygap.drawing import Disc, Ink, Line, Picture, Text
+from realitygap.report.charts.lines import TextStyle, draw_dots, draw_line, write
+from realitygap.report.charts.sheet import Sheet, grid
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
-from realitygap.report._drawing import draw_dots, draw_line, new_figure, place_axes, write
+
+_SIDES: dict[str, Literal["left", "center", "right"]] = {"start": "left", "middle": "center", "end": "right"}
 
 
 def draw_picture(axes: Axes, picture: Picture, *, scale: float = 1.0) -> None:
@@ -45,17 +47,11 @@ def draw_picture(axes: Axes, picture: Picture, *, scale: float = 1.0) -> None:
             _draw_text(axes, shape, order, scale)
 
 
-def figure_of(picture: Picture, width: float) -> Figure:
-    """A figure that holds nothing but a picture; call under `house_style`.
-
-    Args:
-        picture: Picture to draw.
-        width: Width of the figure [in].
-    """
-    height = width * (picture.top - picture.bottom) / (picture.right - picture.left)
-    figure = new_figure(width, height)
-    draw_picture(place_axes(figure, 0.0, 0.0, width, height), picture)
-    return figure
+def picture_sheet(picture: Picture, width: float) -> Sheet:
+    """A figure of a width [in] that holds nothing but a picture; call under `house_style`."""
+    sheet, (axes,) = grid(width, 1, 1, None, gap=0.0, pad=0.0)
+    draw_picture(axes, picture)
+    return sheet
 
 
 def _draw_line(axes: Axes, line: Line, order: int, scale: float) -> None:
@@ -79,20 +75,16 @@ def _draw_line(axes: Axes, line: Line, order: int, scale: float) -> None:
 
 
 def _draw_text(axes: Axes, text: Text, order: int, scale: float) -> None:
-    box = {"boxstyle": "square,pad=0.08", "facecolor": Ink.GROUND, "edgecolor": "none"} if text.halo else None
-    write(
-        axes,
-        text.text,
-        (text.x, text.y),
-        (text.shift[0] * scale, text.shift[1] * scale),
-        text.size * scale,
-        xycoords="data",
-        ha={"start": "left", "middle": "center", "end": "right"}[text.anchor],
-        va="center",
-        rotation=90 if text.upright else 0,
-        color=text.color,
-        weight="bold" if text.bold else "normal",
-        zorder=2 + order,
-        bbox=box,
-        annotation_clip=False,
-    )
+    style: TextStyle = {
+        "ha": _SIDES[text.anchor],
+        "va": "center",
+        "rotation": 90 if text.upright else 0,
+        "color": text.color,
+        "weight": "bold" if text.bold else "normal",
+        "zorder": 2 + order,
+        "annotation_clip": False,
+    }
+    if text.halo:
+        style["bbox"] = {"boxstyle": "square,pad=0.08", "facecolor": Ink.GROUND, "edgecolor": "none"}
+    shift = text.shift[0] * scale, text.shift[1] * scale
+    write(axes, text.text, (text.x, text.y), shift, text.size * scale, units=("data", "data"), **style)

@@ -1,33 +1,40 @@
-"""Figure 4: best coverage by generation, one panel per condition."""
+"""Figure 4, best coverage by generation, and the scores of other tasks: one panel per condition."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from realitygap.drawing import Ink
-from realitygap.report._drawing import (
-    Drawing,
-    draw_wide,
-    mark_key,
-    new_figure,
-    place_axes,
-    wrap,
-    write,
+from realitygap.errors import RealityGapError
+from realitygap.records import ResultsFolder
+from realitygap.report._tally import (
+    Results,
+    Tally,
+    bests_of,
+    label_of,
+    labeled_conditions,
+    read_tally,
+    replicates_of,
+    settings_of,
+    task_of,
 )
-from realitygap.report._marks import MOST_MARKS, Series
-from realitygap.report._marks import Panel as MarkedPanel
-from realitygap.report._tally import Results, Tally, label_of, read_tally, settings_of
+from realitygap.report.charts.house import Drawing, draw_wide, letters_in, wrap
+from realitygap.report.charts.lines import area_key, draw_rings, head, hollow, line_key, mark_key, write
+from realitygap.report.charts.marks import MOST_MARKS, Series, decimals_for
+from realitygap.report.charts.marks import Panel as MarkedPanel
+from realitygap.report.charts.sheet import IS_WIDE, Sheet, grid
+from realitygap.runs import Condition
 from realitygap.stats import MEDIAN_SMALLEST_N, median_interval, quartiles
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 Points = Literal["best-of-generation", "best-so-far"]
 
@@ -100,12 +107,79 @@ def draw_coverage(folder: Results, *, points: Points | None = None) -> Drawing:
         "median with its interval, and the best of the runs. Their numbers are in the table of results."
     )
     return draw_wide(
-        lambda width: draw_panels(panels, width, _coverage_axis(panels)),
+        lambda width: _draw_panels(panels, width, _coverage_axis(panels)),
         "coverage",
         caption,
         alt,
-        marks=marks_of(panels, 3),
+        marks=_marks_of(panels, 3),
     )
+
+
+def draw_scores(folder: ResultsFolder | str | Path) -> list[Drawing]:
+    """Best score by generation, for conditions of other tasks than coverage.
+
+    Args:
+        folder: Results of a study, or the path to them.
+
+    Returns:
+        One figure for each score; none if all conditions are of coverage, or have no runs.
+
+    Raises:
+        RecordError: there is no such folder, or a file in it is damaged.
+    """
+    folder = folder if isinstance(folder, ResultsFolder) else ResultsFolder.open(folder)
+    panels: dict[tuple[str, float, float], list[Panel]] = {}
+    labels: dict[tuple[str, float, float], set[str]] = {}
+    for condition in labeled_conditions(folder):
+        score = _score_of(condition)
+        if score is not None and len(values := bests_of(folder, condition["name"])):
+            label = label_of(condition)
+            labels.setdefault(score, set()).add(label)
+            panels.setdefault(score, []).append(
+                Panel(
+                    title=condition["name"],
+                    note=f"{label}, n = {len(values)}",
+                    values=values,
+                    n_drawn=_count_drawable(values),
+                    run_bests=values.max(axis=1),
+                    published=(),
+                    replicates=replicates_of(folder, condition["name"]),
+                )
+            )
+    return [
+        _draw_score(score, group, sorted(labels[score]), f"scores-{number}")
+        for number, (score, group) in enumerate(panels.items())
+    ]
+
+
+def _score_of(condition: Mapping[str, Any]) -> tuple[str, float, float] | None:
+    """Name, least and greatest value of a condition's score; None for coverage."""
+    settings, kind = settings_of(condition), task_of(condition)
+    if kind == "coverage":
+        return None
+    try:
+        task = Condition.from_settings(condition["name"], dict(settings)).task_of_trials
+        return (task.score_name, *task.score_range)
+    except RealityGapError:  # settings of another version
+        return f"score of {kind}", -np.inf, np.inf
+
+
+def _draw_score(
+    of: tuple[str, float, float], panels: list[Panel], labels: Sequence[str], name: str
+) -> Drawing:
+    score, least, greatest = of
+    axis = _score_axis(score, panels, least, greatest)
+    caption = (
+        f"Best {score} of each generation, by generation (from 0). {' and '.join(labels)}. {_say_runs(panels)} Blue: "
+        f"the median over the runs{_say_interval(panels)}. Gray column, “run”: the best of whole runs, with its "
+        "median, interval and quartiles."
+    )
+    alt = (
+        f"Best {score} by generation in {len(panels)} panels, one per condition: a line for each run, the median with "
+        "its interval, and the best of the runs. Their numbers are in the table of scores."
+    )
+    marks = _marks_of(panels, decimals_for(np.concatenate([panel.run_bests for panel in panels])))
+    return draw_wide(lambda width: _draw_panels(panels, width, axis), name, caption, alt, marks=marks)
 
 
 def _points_of(description: Mapping[str, Any]) -> Points:
@@ -124,14 +198,14 @@ def _panel(tally: Tally, condition: Mapping[str, Any], points: Points) -> Panel:
         title=name,
         note=f"{label_of(condition)}, n = {len(values)}",
         values=values,
-        n_drawn=count_drawable(values),
+        n_drawn=_count_drawable(values),
         run_bests=tally.run_bests(name, tally.measure),
         published=tuple(condition.get("published") or ()),
         replicates=tuple(int(run) for run in tally.replicates(name)),
     )
 
 
-def count_drawable(values: npt.NDArray[np.float64]) -> int:
+def _count_drawable(values: npt.NDArray[np.float64]) -> int:
     """Number of runs, from the first, whose distinct pieces of lines are few enough; `values` is (n, g)."""
     n_drawn = len(values)
     while n_drawn > 1 and sum(len(counts) for _, counts in _segments(values[:n_drawn])) > _MOST_SEGMENTS:
@@ -150,7 +224,7 @@ def _segments(values: npt.NDArray[np.float64]) -> list[tuple[npt.NDArray[np.floa
     return found
 
 
-def marks_of(panels: Sequence[Panel], decimals: int) -> tuple[MarkedPanel, ...]:
+def _marks_of(panels: Sequence[Panel], decimals: int) -> tuple[MarkedPanel, ...]:
     """Return what a page shows on hover: the median with its interval, and the first runs of each panel."""
     n_marks = sum(panel.values.shape[1] for panel in panels)
     n_runs = max(1, MOST_MARKS // max(1, n_marks))
@@ -183,40 +257,38 @@ def _series(panel: Panel, n_runs: int, decimals: int) -> tuple[Series, ...]:
 # drawing
 
 
-def draw_panels(panels: list[Panel], width: float, axis: Axis) -> Figure:
+def _draw_panels(panels: list[Panel], width: float, axis: Axis) -> Sheet:
     """Return a figure of this width [in] with a panel for each condition, and a legend."""
-    n_columns = _columns(len(panels), width)
-    n_rows = math.ceil(len(panels) / n_columns)
-    left, right, gap = 0.56 + 0.07 * max(0, len(f"{axis.high:.{axis.decimals}f}") - 3), 0.06, 0.22
-    panel_width = (width - left - right - gap * (n_columns - 1)) / n_columns
-    panel_height = min(1.75, max(1.15, 0.55 * panel_width))
-    letters = int(panel_width / 0.078)
-    notes_below = any(len(panel.title) + len(panel.note) + 1 > letters for panel in panels)
-    n_lines = max(wrap(panel.title, letters).count("\n") for panel in panels) + 1
-    title_height = 0.2 + 0.145 * (n_lines + notes_below)
-    tick_height, legend_height = 0.24, 0.62 if width >= 6 else 0.98
-    height = n_rows * (title_height + panel_height + tick_height) + legend_height
-    figure = new_figure(width, height)
-    for index, panel in enumerate(panels):
-        row, column = divmod(index, n_columns)
-        x = left + column * (panel_width + gap)
-        y = row * (title_height + panel_height + tick_height) + title_height
-        axes = place_axes(figure, x, y, panel_width, panel_height)
+    n_columns = (
+        min(len(panels), 1 if width < IS_WIDE else 3) if len(panels) <= 9 else 2 if width < IS_WIDE else 4
+    )
+    sheet, places = grid(
+        width, len(panels), n_columns, min(1.75, max(1.15, 0.55 * width / n_columns - 0.3)), gap=0.2
+    )
+    letters = letters_in((width - 0.6) / n_columns)
+    stacked = any(len(panel.title) + len(panel.note) + 1 > letters for panel in panels)
+    for index, (panel, axes) in enumerate(zip(panels, places, strict=True)):
         axes.set_gid(f"panel-{index}")
-        _draw_panel(axes, panel, axis, first_column=column == 0)
-        _write_title(axes, panel, letters, note_below=notes_below)
-        if column == 0:
-            axes.set_ylabel(wrap(axis.label, int(panel_height / 0.078)), labelpad=4)
+        _draw_panel(axes, panel, axis)
+        head(axes, wrap(panel.title, letters), panel.note, stacked=stacked)
+        if index % n_columns == 0:
+            axes.set_ylabel(wrap(axis.label, 20), labelpad=4)
+        else:
+            axes.tick_params(labelleft=False)
         if index + n_columns >= len(panels):
             axes.set_xlabel("generation", labelpad=2)
-    _draw_legend(figure, panels, left if width >= 6 else 0.1, height - legend_height + 0.3, width)
-    return figure
-
-
-def _columns(n_panels: int, width: float) -> int:
-    if width < 6:
-        return min(n_panels, 1 if n_panels <= 9 else 2)
-    return min(n_panels, 3 if n_panels <= 9 else 4)
+    handles = [
+        line_key("one run", color=Ink.RUN, linewidth=0.8, alpha=0.7),
+        line_key("median", color=Ink.OURS, linewidth=1.7, marker="o", markersize=3.4),
+    ]
+    if any(len(panel.values) >= MEDIAN_SMALLEST_N for panel in panels):
+        handles.append(area_key("95 % interval of the median", Ink.BAND))
+    if any(len(panel.values) > 1 for panel in panels):
+        handles.append(line_key("quartiles, best of run", color=Ink.OURS, linewidth=1.0))
+    if any(panel.published for panel in panels):
+        handles.append(mark_key("the paper’s runs", "D", 4.2, **hollow(Ink.PUBLISHED)))
+    sheet.key(handles)
+    return sheet
 
 
 def _coverage_axis(panels: list[Panel]) -> Axis:
@@ -228,18 +300,36 @@ def _coverage_axis(panels: list[Panel]) -> Axis:
     return Axis("coverage", 0.0, top, tuple(ticks.tolist()), 1)
 
 
-def _draw_panel(axes: Axes, panel: Panel, axis: Axis, *, first_column: bool) -> None:
+def _score_axis(score: str, panels: Sequence[Panel], least: float, greatest: float) -> Axis:
+    """An axis with round numbers around everything shown, and no value that a score cannot have."""
+    from matplotlib.ticker import MaxNLocator
+
+    shown = np.concatenate([panel.values.ravel() for panel in panels])
+    low, high = float(np.nanmin(shown)), float(np.nanmax(shown))
+    if high - low < 1e-9:
+        low, high = max(low - 0.5, least), min(high + 0.5, greatest)
+    ticks = np.asarray(MaxNLocator(5, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high))
+    step = float(ticks[1] - ticks[0])
+    decimals = next(d for d in range(12) if abs(round(step, d) - step) < 1e-9 * step)
+    ticks = ticks[(ticks >= least - 1e-9) & (ticks <= greatest + 1e-9)]
+    return Axis(
+        score, min(low, float(ticks[0])), max(high, float(ticks[-1])), tuple(ticks.tolist()), decimals
+    )
+
+
+def _draw_panel(axes: Axes, panel: Panel, axis: Axis) -> None:
     n_generations = max(1, panel.values.shape[1])
-    side = n_generations - 1 + _side_offset(n_generations)
-    step = _side_offset(n_generations)
+    step = max(1.0, 0.2 * n_generations)
+    side = n_generations - 1 + step  # the place of the best of whole runs
     axes.set_xlim(-0.25 * step, side + 0.6 * step)
     axes.set_ylim(axis.low, axis.high)
     axes.set_yticks(axis.ticks)
     axes.yaxis.set_major_formatter(lambda value, _: f"{value:.{axis.decimals}f}")
     axes.grid(axis="y", color=Ink.RULE, linewidth=0.5)
-    axes.tick_params(axis="y", length=0, labelleft=first_column)
+    axes.tick_params(axis="y", length=0)
     axes.spines["left"].set_visible(False)
-    ticks = _generation_ticks(n_generations)
+    between = next(each for each in (1, 2, 5, 10, 20, 50, 100, 10**9) if n_generations <= 8 * each)
+    ticks = range(0, n_generations, between)
     axes.set_xticks([*ticks, side], [*map(str, ticks), "run"])
     axes.axvspan(side - 0.55 * step, side + 0.6 * step, color=Ink.RULE, alpha=0.35, linewidth=0)
     if len(panel.values):
@@ -247,47 +337,10 @@ def _draw_panel(axes: Axes, panel: Panel, axis: Axis, *, first_column: bool) -> 
         _draw_median(axes, panel.values)
         _draw_best_of_runs(axes, panel.run_bests, side - 0.3 * step)
     else:
-        axes.text(0.45, 0.5, "no runs yet", transform=axes.transAxes, ha="center", color=Ink.MUTED)
-    if panel.published:
-        # side by side in the order of the paper's runs, since two of them may be equal
-        x = np.linspace(side, side + 0.42 * step, len(panel.published))
-        axes.plot(
-            x,
-            panel.published,
-            "D",
-            markersize=4.0,
-            color=Ink.PUBLISHED,
-            markerfacecolor=Ink.GROUND,
-            markeredgewidth=1.1,
-            clip_on=False,
-        )
-
-
-def _write_title(axes: Axes, panel: Panel, letters: int, *, note_below: bool) -> None:
-    title = wrap(panel.title, letters)
-    axes.set_title(
-        title, loc="left", fontsize=8.5, weight="bold", linespacing=1.1, pad=17 if note_below else 5
-    )
-    write(
-        axes,
-        panel.note,
-        (0.0 if note_below else 1.0, 1.0),
-        (0.0, 5.0),
-        7.5,
-        ha="left" if note_below else "right",
-        va="bottom",
-        color=Ink.MUTED,
-    )
-
-
-def _side_offset(n_generations: int) -> float:
-    """Return the distance from the last generation to the mark of the run's best on its right [generations]."""
-    return max(1.0, 0.2 * n_generations)
-
-
-def _generation_ticks(n_generations: int) -> list[int]:
-    step = next(step for step in (1, 2, 5, 10, 20, 50, 100, 10**9) if n_generations <= 8 * step)
-    return list(range(0, n_generations, step))
+        write(axes, "no runs yet", (0.45, 0.5), (0, 0), 8.0, ha="center", color=Ink.MUTED)
+    # side by side in the order of the paper's runs, since two of them may be equal
+    xs = np.linspace(side, side + 0.42 * step, len(panel.published))
+    draw_rings(axes, xs, panel.published, 4.0, Ink.PUBLISHED, marker="D", clip_on=False)
 
 
 def _draw_runs(axes: Axes, values: npt.NDArray[np.float64]) -> None:
@@ -346,37 +399,6 @@ def _draw_best_of_runs(axes: Axes, bests: npt.NDArray[np.float64], x: float) -> 
     axes.plot([x], [middle.median], "o", color=Ink.OURS, markersize=4.2)
 
 
-def _draw_legend(figure: Figure, panels: list[Panel], left: float, top: float, width: float) -> None:
-    from matplotlib.lines import Line2D
-    from matplotlib.patches import Patch
-
-    handles: list[Any] = [
-        Line2D([], [], color=Ink.RUN, linewidth=0.8, alpha=0.7, label="one run"),
-        Line2D([], [], color=Ink.OURS, linewidth=1.7, marker="o", markersize=3.4, label="median"),
-    ]
-    if any(len(panel.values) >= MEDIAN_SMALLEST_N for panel in panels):
-        handles.append(Patch(facecolor=Ink.BAND, label="95 % interval of the median"))
-    if any(len(panel.values) > 1 for panel in panels):
-        handles.append(Line2D([], [], color=Ink.OURS, linewidth=1.0, label="quartiles, best of run"))
-    if any(panel.published for panel in panels):
-        handles.append(
-            mark_key("the paper’s runs", "D", 4.2, Ink.PUBLISHED, markeredgewidth=1.1, hollow=True)
-        )
-    height = float(figure.get_size_inches()[1])
-    figure.legend(
-        handles=handles,
-        loc="upper left",
-        bbox_to_anchor=(left / width, 1.0 - top / height),
-        ncols=len(handles) if width >= 6 else 2,
-        frameon=False,
-        fontsize=8.0,
-        borderaxespad=0.0,
-        borderpad=0.0,
-        handlelength=1.6,
-        columnspacing=1.4,
-    )
-
-
 # words
 
 
@@ -386,8 +408,8 @@ def _caption(tally: Tally, panels: list[Panel], points: Points) -> str:
     counted = "along the line driven" if tally.measure == "line" else "at the ends of steps"
     parts = [
         f"{each}, counted {counted}, by generation (from 0). {' and '.join(labels)}.",
-        say_runs(panels),
-        f"Blue: the median over the runs{say_interval(panels)}.",
+        _say_runs(panels),
+        f"Blue: the median over the runs{_say_interval(panels)}.",
         "Gray column, “run”: the best of whole runs, with its median, interval and quartiles"
         + (", beside the values that the paper prints." if any(panel.published for panel in panels) else "."),
     ]
@@ -397,7 +419,7 @@ def _caption(tally: Tally, panels: list[Panel], points: Points) -> str:
     return " ".join(parts)
 
 
-def say_runs(panels: list[Panel]) -> str:
+def _say_runs(panels: list[Panel]) -> str:
     """Return a sentence on which lines are runs, and whether some are left out."""
     cut = [panel for panel in panels if panel.n_drawn < len(panel.values)]
     if cut:
@@ -409,7 +431,7 @@ def say_runs(panels: list[Panel]) -> str:
     return "Gray: every run; a piece of line that several runs share is stronger."
 
 
-def say_interval(panels: list[Panel]) -> str:
+def _say_interval(panels: list[Panel]) -> str:
     """Return a sentence on the intervals of the medians."""
     counts = [len(panel.values) for panel in panels]
     if max(counts) < MEDIAN_SMALLEST_N:

@@ -16,16 +16,13 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
-import numpy.typing as npt
-
 from realitygap._foreign_text import page_text
 from realitygap.drawing import FONT, Ink
-from realitygap.report._marks import Panel, frames_of
+from realitygap.report.charts.marks import Panel, frames_of
+from realitygap.report.charts.sheet import Sheet
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from matplotlib.lines import Line2D
 
 _SVG = "http://www.w3.org/2000/svg"
 _XLINK = "http://www.w3.org/1999/xlink"
@@ -82,7 +79,7 @@ class Drawing:
         caption: Content of the figure, number of runs, and interval.
         alt: Text for readers who cannot see the figure, in a sentence; `svg` includes it.
         figure: Source figure, for other formats.
-        draw: Function that draws the figure with a width [in]; None if it has one width only.
+        draw: Function that draws the figure in a width [in].
         name: First part of the ids in `svg`.
         mark: Function that returns the values that a page shows on hover, for a width [in]; None if there are none.
         marks: Values that a page shows on hover.
@@ -93,7 +90,7 @@ class Drawing:
     caption: str
     alt: str
     figure: Figure | None = field(default=None, repr=False, compare=False)
-    draw: Callable[[float], Figure] | None = field(default=None, repr=False, compare=False)
+    draw: Callable[[float], Sheet] | None = field(default=None, repr=False, compare=False)
     name: str = field(default="", repr=False, compare=False)
     mark: Callable[[float], tuple[Panel, ...]] | None = field(default=None, repr=False, compare=False)
     marks: tuple[Panel, ...] = field(default=(), repr=False, compare=False)
@@ -106,7 +103,7 @@ class Drawing:
         """Return the same figure in another width [in], for the same page.
 
         Raises:
-            ValueError: it has one width only.
+            ValueError: it was made without a function that draws it.
         """
         if self.draw is None:
             raise ValueError("This figure has one width only.")
@@ -114,7 +111,7 @@ class Drawing:
 
 
 def draw_wide(
-    draw: Callable[[float], Figure],
+    draw: Callable[[float], Sheet],
     name: str,
     caption: str,
     alt: str,
@@ -125,7 +122,7 @@ def draw_wide(
     """A figure in the width of a desktop's page, which `Drawing.in_width` draws in another one.
 
     Args:
-        draw: Function that makes the figure of a width [in].
+        draw: Function that makes the sheet of a width [in].
         name: First part of the ids in the drawing.
         caption, alt: Caption and text of `Drawing`.
         marks: Values that a page shows on hover, or a function that makes them for a width [in] if places depend on it.
@@ -135,12 +132,13 @@ def draw_wide(
     return _drawn(Drawing("", caption, alt, draw=draw, name=name, mark=mark), draw, width, 0)
 
 
-def _drawn(drawing: Drawing, draw: Callable[[float], Figure], width: float, number: int) -> Drawing:
+def _drawn(drawing: Drawing, draw: Callable[[float], Sheet], width: float, number: int) -> Drawing:
     with house_style():
-        figure = draw(width)
-        svg = to_svg(figure, f"{drawing.name}-{number}", drawing.alt)
+        sheet = draw(width)
+        sheet.settle()
+        svg = to_svg(sheet.figure, f"{drawing.name}-{number}", drawing.alt)
     marks = () if drawing.mark is None else drawing.mark(width)
-    return replace(drawing, svg=svg, figure=figure, marks=marks, frames=frames_of(figure, marks))
+    return replace(drawing, svg=svg, figure=sheet.figure, marks=marks, frames=frames_of(sheet.figure, marks))
 
 
 @contextmanager
@@ -163,88 +161,6 @@ def house_style() -> Iterator[None]:
         yield
 
 
-def new_figure(width: float, height: float) -> Figure:
-    """An empty figure [in]; call under `house_style`."""
-    from matplotlib.figure import Figure
-
-    return Figure(figsize=(width, height))
-
-
-def place_axes(figure: Figure, left: float, top: float, width: float, height: float) -> Axes:
-    """Axes by the distances of their box from the figure's left and upper edge, and its size [in]."""
-    total_width, total_height = figure.get_size_inches()
-    box = (
-        left / total_width,
-        1.0 - (top + height) / total_height,
-        width / total_width,
-        height / total_height,
-    )
-    return figure.add_axes(box)
-
-
-def draw_line(axes: Axes, xs: npt.ArrayLike, ys: npt.ArrayLike, **style: Any) -> None:
-    """Plot like `axes.plot` if the limits of the axes are set, without measuring the line."""
-    from matplotlib.lines import Line2D
-
-    axes.add_artist(Line2D(xs, ys, **style))
-
-
-def draw_points(axes: Axes, points: npt.NDArray[Any], **style: Any) -> None:
-    """A line through points (n, 2 or more), x and y first, as by `draw_line`."""
-    draw_line(axes, points[:, 0], points[:, 1], **style)
-
-
-def mark_key(
-    label: str, marker: str, size: float, color: str, *, hollow: bool = False, **style: Any
-) -> Line2D:
-    """A mark of a size [points] for a legend; a hollow one has the color of the ground inside."""
-    from matplotlib.lines import Line2D
-
-    fixed: dict[str, Any] = {
-        "linestyle": "",
-        "marker": marker,
-        "markersize": size,
-        "color": color,
-        "label": label,
-    }
-    inside = {"markerfacecolor": Ink.GROUND} if hollow else {}
-    return Line2D([], [], **{**fixed, **inside, **style})
-
-
-def draw_dots(axes: Axes, xs: npt.ArrayLike, ys: npt.ArrayLike, size: float, **style: Any) -> None:
-    """Round marks of a size [points], as by `draw_line`."""
-    draw_line(axes, xs, ys, **{"marker": "o", "linestyle": "", "markersize": size, **style})
-
-
-def write(
-    axes: Axes,
-    text: str,
-    place: tuple[float, float],
-    shift: tuple[float, float],
-    size: float,
-    *,
-    xycoords: Any = "axes fraction",
-    **style: Any,
-) -> None:
-    """Text of a size [points], moved by `shift` [points] from a place in the axes."""
-    axes.annotate(text, place, shift, xycoords=xycoords, textcoords="offset points", fontsize=size, **style)
-
-
-def head_axes(
-    axes: Axes,
-    title: str,
-    label: str,
-    *,
-    y: float = 1.0,
-    shift: tuple[float, float] = (0.0, 6.0),
-    **style: Any,
-) -> None:
-    """Above axes, or below them with y = 0: what they show on the left, of what it is on the right."""
-    (x, up), va = shift, "bottom" if y else "top"
-    write(axes, title, (0.0, y), (x, up), 8.0, va=va, weight="bold", **style)
-    write(axes, label, (1.0, y), (-x, up), 8.0, ha="right", va=va, color=Ink.MUTED, **style)
-
-
 def shorten(text: str, n_letters: int) -> str:
     """Text of a user's file on one line, printable, at most so long."""
     plain = "".join(letter if letter.isprintable() else " " for letter in text)
@@ -255,6 +171,11 @@ def wrap(text: str, n_letters: int, n_lines: int = 3) -> str:
     """Text of a user's file on a few lines, printable, none much longer than asked."""
     plain = "".join(letter if letter.isprintable() else " " for letter in text)
     return "\n".join(textwrap.wrap(plain, n_letters, max_lines=n_lines, placeholder="…"))
+
+
+def letters_in(width: float, size: float = 8.0) -> int:
+    """Return the number of letters of a size [points] that a line of a width [in] has room for."""
+    return int(width / (0.0098 * size))
 
 
 def _cut(text: str, n_letters: int) -> str:

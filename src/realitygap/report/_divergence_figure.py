@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -97,7 +97,7 @@ def save_divergence(
     path = Path(path)
     check_ending(path, (".pdf", ".png", ".svg"))
     refuse_results(path)
-    which, sides = _compare(results, against, repeats, condition, replicate, generation, individual)
+    which, sides = _compare(results, against, repeats, (condition, replicate, generation, individual))
     title = " and ".join(side.name for side in sides)
     drawing = draw_divergence(*sides, of=which)
     return save_drawing(captioned(drawing, "divergence"), path, title=title)
@@ -117,11 +117,14 @@ def compare_trials(
 
     Arguments and errors as in `save_divergence`.
     """
-    return _compare(results, against, repeats, condition, replicate, generation, individual)[1]
+    return _compare(results, against, repeats, (condition, replicate, generation, individual))[1]
 
 
 def _compare(
-    results: ResultsFolder | str | Path, against: str, repeats: int, *which: Any
+    results: ResultsFolder | str | Path,
+    against: str,
+    repeats: int,
+    which: tuple[str | None, int | None, int | None, int | None],
 ) -> tuple[str, tuple[Side, ...]]:
     """Return the network's name and its trials on all sides; `which` has the arguments of `choose_trial`."""
     whole_number("repeats", repeats, 2, 1000)

@@ -20,7 +20,7 @@ Dash = Literal["solid", "", "none"] | tuple[float, Sequence[float]]
 
 
 class LineStyle(TypedDict, total=False):
-    """What matplotlib takes for a line with marks."""
+    """Arguments of matplotlib for a line with marks."""
 
     color: str
     alpha: float
@@ -39,7 +39,7 @@ class LineStyle(TypedDict, total=False):
 
 
 class TextStyle(TypedDict, total=False):
-    """What matplotlib takes for a text."""
+    """Arguments of matplotlib for a text."""
 
     color: str
     ha: Literal["left", "center", "right"]

@@ -66,7 +66,7 @@ class Sheet:
     def key(
         self, handles: Sequence[Artist], *, place: Literal["lower left", "upper right"] = "lower left"
     ) -> None:
-        """A legend beside all panels, in as few lines as its width allows."""
+        """A legend above or below all panels, in as few lines as its width allows."""
         n = len(handles)
         for n_columns in dict.fromkeys([n, *(-(-n // lines) for lines in range(2, n + 1))]):
             legend = self.figure.legend(
@@ -118,7 +118,7 @@ class Sheet:
 def grid(
     width: float, n: int, columns: int, height: float | None, *, gap: float = 0.12, pad: float = 0.08
 ) -> tuple[Sheet, list[Axes]]:
-    """Panels of one height in rows of so many columns, from the upper left on; arguments as those of `Sheet`."""
+    """Panels of one height, row by row from the upper left; arguments as those of `Sheet`."""
     columns = min(n, columns)
     names = [str(k) if k < n else "." for k in range(-(-n // columns) * columns)]
     places = [names[k : k + columns] for k in range(0, len(names), columns)]

@@ -137,8 +137,8 @@ function makeStage(svg) {
     if (!scene || !width) return;
     const [left, right, bottom, top] = scene.extent;
     pixel = MM / Math.min(width / (right - left), height / (top - bottom));
-    layers.letters.style.fontSize = `${(13 * pixel).toFixed(2)}px`;
-    layers.letters.style.strokeWidth = `${(3 * pixel).toFixed(2)}px`;
+    layers.letters.style.fontSize = `${(14 * pixel).toFixed(2)}px`;
+    layers.letters.style.strokeWidth = `${(4.5 * pixel).toFixed(2)}px`;
     for (const part of drawn) part.row = Infinity;
   }
 

@@ -95,6 +95,20 @@ def with_interval(estimate: Estimate, *, signs: bool = False) -> str:
     return f"{value} [{ends[0]}, {ends[1]}]" if ends else value
 
 
+def between(estimate: Estimate, digits: int = 3, missing: str = "–") -> str:
+    """Return the ends of an interval, such as `0.100 to 0.200`; another text without one."""
+    return missing if estimate.ends is None else " to ".join(f"{end:.{digits}f}" for end in estimate.ends)
+
+
+def bracketed(estimate: Estimate, digits: int = 3, missing: str = "") -> str:
+    """Return the ends of an interval in brackets, such as `[0.100, 0.200]`; another text without one."""
+    return (
+        missing
+        if estimate.ends is None
+        else "[" + ", ".join(f"{end:.{digits}f}" for end in estimate.ends) + "]"
+    )
+
+
 def p_in_words(p: float) -> str:
     """Return a p value: three decimals, or a power of ten; below 10⁻⁹ exactness is of no use."""
     if p >= 0.001:
@@ -162,6 +176,20 @@ def higher_verdict(one: str, other: str, difference: float) -> str:
     return f"{higher} above {lower}"
 
 
+def apart_clause(one: str, other: str, difference: float) -> str:
+    """Return by how much one is above or below another, of a difference that is shown."""
+    return f"{one} {'above' if difference > 0 else 'below'} {other} by {abs(difference):.3f}"
+
+
+def undecided_clause(can_claim: bool, is_equivalent: bool, margin: float) -> str:
+    """Return why a difference is not claimed, and whether equivalence is."""
+    if not can_claim:
+        return "too few runs for a claim"
+    if is_equivalent:
+        return f"not shown to differ, and equivalent within ±{margin:g}"
+    return f"not shown to differ, nor to be equivalent within ±{margin:g}"
+
+
 def not_shown_verdict(detectable: float | None = None, needed: int | None = None, most: int = 100_000) -> str:
     """Return that a difference is not shown, with what n can detect.
 
@@ -227,6 +255,9 @@ def reproduces(is_misspecified: bool) -> str:
     """Return whether a simulator can reproduce the observations of its calibration, as a sentence."""
     return f"The simulator {'cannot' if is_misspecified else 'can'} reproduce the observations of its calibration."
 
+
+FEW_RUNS = "[few runs]"
+"""Stands for an interval in a table if there are too few runs for one."""
 
 GOAL_VERDICTS = {True: "met", False: "missed", None: "open"}
 """Words for goals whose whole interval meets them, or misses them, or for which the data do not decide."""

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 from rich.table import Table
 
 from realitygap._numbers import significant
+from realitygap._wording import bracketed
 
 from ._tables import table_of
 
 if TYPE_CHECKING:
     from realitygap.report import Audit
-    from realitygap.stats import Estimate
 
 _PROBLEMS = {"impossible": "no k/{n}", "cut": "cut, not rounded", "raised": "raised, not rounded"}
 
@@ -73,7 +73,7 @@ def pairs_table(audit: Audit) -> Table:
         _row(
             table,
             f"{each.one} -\n{each.other}",
-            f"{each.a12.value:.2f}\n{_interval(each.a12)}",
+            f"{each.a12.value:.2f}\n{bracketed(each.a12, 2, '[none]')}",
             f"{each.p:.2g}",
             f"{each.p_holm:.2g}",
             f"{each.smallest_p:.2g}",
@@ -81,10 +81,6 @@ def pairs_table(audit: Audit) -> Table:
             each.verdict,
         )
     return table
-
-
-def _interval(share: Estimate) -> str:
-    return "[none]" if share.ends is None else f"[{share.low:.2f}, {share.high:.2f}]"
 
 
 def _columns(table: Table, words: list[str], numbers: list[str]) -> None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from realitygap._terminal import echo
-from realitygap._wording import p_equation, reproduces
+from realitygap._wording import bracketed, counted, p_equation, reproduces
 from realitygap.errors import StudyError
 from realitygap.orders import GapOrder
 
@@ -109,10 +109,9 @@ def _print(result: GapResult, replay: ReplayError | None) -> None:
 
 def _print_row(title: str, found: Estimate) -> None:
     number = "-" if found.value is None else f"{found.value:.3f}"
-    ends = "" if found.low is None else f"[{found.low:.3f}, {found.high:.3f}]"
     p = found.more.get("p")
     more = "" if p is None else p_equation(p)
-    echo(f"  {title:32}{number:>8}  {ends:17} {more}".rstrip())
+    echo(f"  {title:32}{number:>8}  {bracketed(found):17} {more}".rstrip())
     if found.refused:
         echo(f"    {found.refused}")
 
@@ -124,8 +123,7 @@ def _print_why(why: Why) -> None:
     )
     for k in why.order:
         fall, n = why.falls[k], why.numbers[k]
-        ends = "" if fall.low is None else f"[{fall.low:.3f}, {fall.high:.3f}]"
-        echo(f"  {why.parts[k]:16}{fall.value:>8.3f}  {ends:17} {n} number{'s' if n != 1 else ''}")
+        echo(f"  {why.parts[k]:16}{fall.value:>8.3f}  {bracketed(fall):17} {counted(n, 'number')}")
     echo(why.advice)
 
 

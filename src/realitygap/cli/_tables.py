@@ -9,6 +9,7 @@ from rich.table import Table
 
 from realitygap._console import PlainConsole
 from realitygap._numbers import fixed
+from realitygap._wording import FEW_RUNS
 
 if TYPE_CHECKING:
     import polars as pl
@@ -46,7 +47,7 @@ def summary_table(summary: pl.DataFrame, title: str) -> Table:
             median, q25, q75, low, high = (
                 _number(row[f"{measure}_{name}"]) for name in ("median", "q25", "q75", "low", "high")
             )
-            interval = f"[{low}, {high}]" if low != "-" else "[few runs]"
+            interval = f"[{low}, {high}]" if low != "-" else FEW_RUNS
             cells.append("not seen" if median == "-" and row["n"] else f"{median} {interval}\n{q25} to {q75}")
         if published:
             cells.append(" ".join(_number(value) for value in row["published"] or []))
@@ -71,7 +72,7 @@ def task_table(summary: pl.DataFrame, title: str) -> Table:
         first, last, median, q25, q75, low, high = (
             _number(row[name]) for name in ("first", "last", "median", "q25", "q75", "low", "high")
         )
-        interval = f"[{low}, {high}]" if low != "-" else "[few runs]"
+        interval = f"[{low}, {high}]" if low != "-" else FEW_RUNS
         cells = [row["condition"], f"{row['n']:,}", first, last, f"{median} {interval}\n{q25} to {q75}"]
         table.add_row(*cells)
     return table

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from realitygap._terminal import echo
+from realitygap._wording import between
 from realitygap.orders import TransferOrder
 
 from ._code import AllowPlatforms
@@ -47,9 +48,9 @@ def transfer(
     echo(f"Results: {folder}   champions: {folder / 'champions'}")
 
 
-def _with_interval(found: Estimate) -> str:
-    ends = "" if found.low is None else f" ({found.low:.3f} to {found.high:.3f})"
-    return f"{found.value:.3f}{ends}"
+def _with_interval(estimate: Estimate) -> str:
+    ends = "" if estimate.ends is None else f" ({between(estimate)})"
+    return f"{estimate.value:.3f}{ends}"
 
 
 def _print(result: TransferResult) -> None:

@@ -16,7 +16,7 @@ from ._order import (
 )
 from ._replay_error import ReplayError, replay_error
 from ._resampling import bootstrap, shrunk_means
-from ._result import COVERAGE, MEASURES, SHOWN, GapResult, Measure
+from ._result import COVERAGE, MEASURES, SHOWN, GapResult
 from ._side import GapSide
 from ._why import Why, coalitions, explain_gap, shapley_values
 
@@ -28,7 +28,6 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     "COVERAGE",
     "MEASURES",
     "SHOWN",
-    "Measure",
     # level
     "mean_difference",
     "square_differences",

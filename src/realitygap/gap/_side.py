@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realitygap.errors import finite_numbers
-from realitygap.stats import CONFIDENCE, UNBOUNDED, Range, t_interval
+from realitygap.stats import CONFIDENCE, Range, t_interval
 
 Values = NDArray[np.float64]
 
@@ -32,7 +32,7 @@ class GapSide:
     values: Values
     cells: NDArray[np.bool_] = field(default_factory=lambda: np.empty((0, 0, 0), np.bool_))
     ends: Values = field(default_factory=lambda: np.empty((0, 0, 2)))
-    score_range: Range = UNBOUNDED
+    score_range: Range = (-np.inf, np.inf)
 
     def __post_init__(self) -> None:
         if self.values.ndim != 2 or 0 in self.values.shape:

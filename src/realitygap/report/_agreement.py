@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
+from realitygap._wording import between, counted
 from realitygap.errors import LedgerError
 from realitygap.records import LEDGER_NAME, Ledger
 from realitygap.stats import BCA_SMALLEST_N, CONFIDENCE, RESAMPLES, SEED, Estimate
@@ -41,16 +42,15 @@ class Agreement:
     @property
     def sentence(self) -> str:
         """Return the agreement in words."""
-        trials = "1 trial" if self.n_trials == 1 else f"{self.n_trials} trials"
-        counted = f"{trials} counted by two people, {self.n_cells:,} cells"
+        judged = f"{counted(self.n_trials, 'trial')} counted by two people, {counted(self.n_cells, 'cell')}"
         if self.kappa.value is None:
-            return f"{counted}: all judged alike, and no kappa without both kinds of cells."
+            return f"{judged}: all judged alike, and no kappa without both kinds of cells."
         interval = (
             f"no interval below {BCA_SMALLEST_N} trials"
             if self.kappa.ends is None
-            else f"95 % interval {self.kappa.low:.3f} to {self.kappa.high:.3f}, trials resampled whole"
+            else f"95 % interval {between(self.kappa)}, trials resampled whole"
         )
-        return f"{counted}: {100 * self.same:.1f} % judged alike. Cohen's kappa {self.kappa.value:.3f} ({interval})."
+        return f"{judged}: {100 * self.same:.1f} % judged alike. Cohen's kappa {self.kappa.value:.3f} ({interval})."
 
 
 def measure_agreement(folder: str | Path) -> Agreement:

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from realitygap._version import __version__
-from realitygap._wording import p_equation, reproduces
+from realitygap._wording import between, p_equation, reproduces
 from realitygap.errors import RecordError
 from realitygap.gap import SHOWN, GapResult
 from realitygap.records import is_special, refuse_results, write_whole
@@ -142,7 +142,7 @@ def _row(result: GapResult, name: str, title: str, meaning: str) -> dict[str, An
         "title": title,
         "meaning": meaning.format(score=result.score),
         "estimate": "–" if found.value is None else f"{found.value:.3f}",
-        "interval": "–" if found.low is None else f"{found.low:.3f} to {found.high:.3f}",
+        "interval": between(found),
         "n": found.n,
         "p": "" if p is None else p_equation(p).removeprefix("p ").removeprefix("= "),
         "refused": found.refused,

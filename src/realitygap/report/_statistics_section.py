@@ -11,7 +11,7 @@ import numpy.typing as npt
 import polars as pl
 
 from realitygap._numbers import fixed
-from realitygap._wording import Basis, signed, span
+from realitygap._wording import Basis, apart_clause, signed, span, undecided_clause
 from realitygap.platforms import is_physical
 from realitygap.report._champions import FRESH_TRIALS, MOST_RUNS, Champions
 from realitygap.report._comparisons import (
@@ -151,14 +151,8 @@ def _apart(comparisons: Sequence[Comparison], names: Mapping[str, str], one: str
         return f"{words[0]} and {words[1]} not compared"
     within = _within(found.difference)
     if found.is_shown:
-        where = "above" if found.size > 0 else "below"
-        return f"{words[0]} {where} {words[1]} by {abs(found.size):.3f}{within}"
-    if not found.can_claim:
-        why = "too few runs for a claim"
-    elif found.is_equivalent:
-        why = f"not shown to differ, and equivalent within ±{MARGIN:g}"
-    else:
-        why = f"not shown to differ, nor to be equivalent within ±{MARGIN:g}"
+        return f"{apart_clause(*words, found.size)}{within}"
+    why = undecided_clause(found.can_claim, bool(found.is_equivalent), MARGIN)
     return f"{words[0]} less {words[1]} {signed(found.size)}{within}, {why}"
 
 

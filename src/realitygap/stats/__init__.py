@@ -9,14 +9,13 @@ from ._equivalence import Equivalence, prove_equivalence
 from ._estimate import CONFIDENCE, Ends, Estimate, Method
 from ._means import (
     SMALLEST_N,
-    UNBOUNDED,
     Range,
     difference_interval,
     mean_interval,
     range_of_differences,
     t_interval,
 )
-from ._medians import MEDIAN_SMALLEST_N, IntervalRanks, Quartiles, interval_ranks, median_interval, quartiles
+from ._medians import MEDIAN_SMALLEST_N, IntervalRanks, interval_ranks, median_interval, quartiles
 from ._permutation import (
     ALPHA,
     SEED,
@@ -77,7 +76,6 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     "difference_interval",
     "t_interval",
     "Range",
-    "UNBOUNDED",
     "range_of_differences",
     "SMALLEST_N",
     # medians
@@ -85,7 +83,6 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     "interval_ranks",
     "IntervalRanks",
     "quartiles",
-    "Quartiles",
     "MEDIAN_SMALLEST_N",
     # shares, and sizes of effects
     "share_interval",

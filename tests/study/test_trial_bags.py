@@ -7,7 +7,7 @@ from typer.testing import CliRunner
 from realitygap.cli import app
 from realitygap.errors import LogError, StudyError
 from realitygap.logs import import_log, mapping_of
-from realitygap.records import LEDGER_NAME, Ledger, read_observations, write_observations
+from realitygap.records import LEDGER_NAME, Ledger, TrialLog, read_observations, write_observations
 from realitygap.study import export_trials
 from tests.logs.test_write_bag import HEAD, trial
 
@@ -32,6 +32,13 @@ def test_each_driven_trial_of_a_file_has_a_bag(trials, tmp_path):
         "drive-7.map.toml", "drive-7.mcap", "drive-9.map.toml", "drive-9.mcap"
     ]  # fmt: skip
     assert f"mapping: {tmp_path / 'drive-9.map.toml'}" in done.stdout
+
+
+def test_void_trial_of_a_file_has_no_bag(trials, tmp_path):
+    with TrialLog.open(trials) as log:
+        log.void(9, "it was pushed")
+    (report,) = export_trials(trials, tmp_path / "drive.mcap")
+    assert report.bag == tmp_path / "drive.mcap"
 
 
 def test_one_trial_has_the_name_that_was_given(trials, tmp_path):

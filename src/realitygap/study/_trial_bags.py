@@ -11,6 +11,7 @@ import numpy as np
 from realitygap.errors import StudyError
 from realitygap.logs import WHEEL_DIAMETER_MM, BagReport, write_bag
 from realitygap.records import LEDGER_NAME, Ledger, read_observations
+from realitygap.trials import those_that_count
 
 from ._tracked import TrialToTrack, trial_of_file, trial_of_ledger
 
@@ -59,7 +60,7 @@ def _driven(source: Path) -> list[int]:
         with Ledger.open(source / LEDGER_NAME, writable=False) as ledger:
             numbers = [trial.trial for trial in ledger.trials(states=("driven", "scored"))]
     else:
-        found = read_observations(source).trials
+        found = those_that_count(read_observations(source).trials)
         numbers = list(dict.fromkeys(trial.number for trial in found if len(trial.commands)))
     if not numbers:
         raise StudyError(f"{source} has no trial that was driven. Drive one first.")

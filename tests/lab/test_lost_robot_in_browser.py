@@ -9,8 +9,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from realitygap.records import read_observations
-from realitygap.trials import those_that_count
+from realitygap.records import read_observations, those_that_count
 
 from .conftest import open_advanced, open_fold
 from .robot_study import CONNECT, ledger_of, make_study, pass_preflight, start_trial

@@ -8,7 +8,7 @@ import pytest
 from realitygap.errors import RecordError, RobotError, StudyError
 from realitygap.gap import GapSide
 from realitygap.platforms import SimPlatform, SimTarget
-from realitygap.records import read_observations
+from realitygap.records import EndReason, read_observations
 from realitygap.study import (
     PARTS,
     Controller,
@@ -22,7 +22,6 @@ from realitygap.study import (
     why_gap,
 )
 from realitygap.study._gap import between as study_gap_between
-from realitygap.trials import EndReason
 from realitygap.world import Calibration, paper_arena
 
 pytestmark = pytest.mark.slow

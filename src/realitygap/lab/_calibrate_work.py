@@ -9,7 +9,7 @@ import numpy as np
 
 from realitygap.orders import CalibrateOrder
 from realitygap.platforms import class_of, platform_of
-from realitygap.records import NO_LINE, TrialRecord, read_observations
+from realitygap.records import NO_LINE, TrialRecord, read_observations, those_that_count
 from realitygap.report import save_sensor_figure
 from realitygap.study import (
     StoppedByPerson,
@@ -18,7 +18,7 @@ from realitygap.study import (
     placing_words,
     with_ruled_end,
 )
-from realitygap.trials import Led, Operator, SheetObserver, TrialPlan, Verdict, those_that_count
+from realitygap.trials import Led, Operator, SheetObserver, TrialPlan, Verdict
 from realitygap.world import INCH, Arena, Calibration, RobotModel, load_arena, load_robot
 
 from ._channel import Channel, Message

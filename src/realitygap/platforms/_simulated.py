@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 
 from realitygap.evolution import ControllerInterface
 from realitygap.kernels.math.philox import MAX_INDIVIDUALS
-from realitygap.records import Observe, TrialRecord, sees
+from realitygap.records import EndReason, Observe, TrialRecord, sees
 from realitygap.robots import Label
 from realitygap.trials import (
-    EndReason,
     NoiseKey,
     RepeatableTarget,
     RobotObserver,

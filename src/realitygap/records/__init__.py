@@ -21,6 +21,7 @@ from realitygap.records._columns import (
 )
 from realitygap.records._ctrl_c import wake_on_ctrl_c
 from realitygap.records._derived import DerivedFrame, derived_table
+from realitygap.records._ending import EndReason, is_taken_back, is_whole, taken_back, those_that_count
 from realitygap.records._folder import ResultsFolder
 from realitygap.records._inbox import Delivery, MissingInboxError, deliver
 from realitygap.records._inside import refuse_links, refuse_links_in
@@ -103,6 +104,11 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     "ledger_tables",
     # what an observer sees of trials one by one
     "TrialRecord",
+    "EndReason",
+    "is_whole",
+    "is_taken_back",
+    "taken_back",
+    "those_that_count",
     "Observe",
     "CALIBRATES",
     "NO_LINE",

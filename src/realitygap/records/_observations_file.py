@@ -24,11 +24,12 @@ from realitygap._limits import MOST_LINES_BYTES, LimitError, parse_json, read_fi
 from realitygap._version import __version__
 from realitygap.errors import RecordError
 
+from ._ending import UNDER_WAY
 from ._files import reading
 from ._inside import open_inside
 from ._lock import lock_descriptor
 from ._output import refuse_results, write_whole
-from ._trial_record import OBSERVATIONS, UNDER_WAY, Observe, TrialRecord
+from ._trial_record import OBSERVATIONS, Observe, TrialRecord
 
 OBSERVATIONS_FORMAT = "realitygap observations 1"
 _WIDTHS = {"commands": 2, "wheels": 2, "poses": 3}

@@ -11,14 +11,16 @@ from realitygap._closed_on_exit import ClosedOnExit
 from realitygap.errors import RecordError
 from realitygap.world import Arena
 
+from ._ending import EndReason, is_whole, taken_back
 from ._ledger_kinds import Score, ScoreRole, TrialState, checked_cells
 from ._observations_file import Note, Observations, ObservationsFile, read_observations
 from ._trial_record import NO_LINE, TrialRecord
 
-WHOLE, TAKEN_BACK = "step limit", "aborted"
-"""Ends of trials that count, and of records that the one before of the same trial does not."""
-
-_STATES: Mapping[str, TrialState] = {WHOLE: "scored", "running": "running", "driven": "driven"}
+_STATES: Mapping[str, TrialState] = {
+    EndReason.STEP_LIMIT: "scored",
+    EndReason.RUNNING: "running",
+    EndReason.DRIVEN: "driven",
+}
 
 
 @dataclass(frozen=True)
@@ -123,12 +125,12 @@ class TrialLog(ClosedOnExit):
         entries = []
         for number, score in scores.items():
             record = self._require(number, "driven", "scored")
-            if record.purpose in NO_LINE or not (record.cells or record.end != WHOLE):
+            if record.purpose in NO_LINE or (is_whole(record) and not record.cells):
                 raise RecordError(
                     f"The cells of trial {number} ({record.purpose}) are not counted. Nothing was entered."
                 )
             cells = tuple(sorted(checked_cells(score.cells, n_cells)))
-            entries.append((replace(record, cells=cells, end=WHOLE), score.who))
+            entries.append((replace(record, cells=cells, end=str(EndReason.STEP_LIMIT)), score.who))
         for record, who in entries:
             self._writable().note(f"{len(record.cells)} cells were entered", who, record.number)
             self._append(record)
@@ -142,7 +144,7 @@ class TrialLog(ClosedOnExit):
         if not reason.strip():
             raise RecordError(f"Trial {number} cannot be void without a reason. Give a reason.")
         record = self._require(number, "running", "driven", "scored")
-        self._append(replace(record, end=TAKEN_BACK, problem=reason))
+        self._append(taken_back(record, reason))
 
     def note(self, text: str, who: str, number: int | None = None) -> None:
         """Add a remark on a trial or on the whole file."""

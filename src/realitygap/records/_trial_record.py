@@ -18,10 +18,6 @@ CALIBRATES: tuple[Observe, ...] = OBSERVATIONS[1:]
 """Levels that a calibration can use. Readings alone contain no information about the robot's position."""
 
 
-UNDER_WAY = ("running", "driven")
-"""Ends of records of unfinished trials: the robot drives, or a person has yet to report what they saw."""
-
-
 NO_LINE = ("path", "sensors")
 """Purposes of trials of which no cells are counted: the first ends where a ruler says, the second stands."""
 

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from realitygap._numbers import fixed
 from realitygap.errors import RobotError, VisionError
-from realitygap.records import Observe, Score, TrialRecord
+from realitygap.records import EndReason, Observe, Score, TrialRecord
 from realitygap.robots import Clock, Robot
-from realitygap.trials import EndReason, PortObserver, SheetObserver, TrialPlan
+from realitygap.trials import PortObserver, SheetObserver, TrialPlan
 from realitygap.vision import Track, Tracked
 from realitygap.world import Arena
 

@@ -11,18 +11,18 @@ import numpy as np
 from realitygap._closed_on_exit import ClosedOnExit
 from realitygap.calibration import ruled
 from realitygap.errors import RecordError, RobotError, StudyError
-from realitygap.records import ObservationsFile, Observe, TrialRecord, sees
-from realitygap.trials import (
+from realitygap.records import (
     EndReason,
-    Operator,
-    Target,
-    TellTrial,
-    TrialPlan,
+    ObservationsFile,
+    Observe,
+    TrialRecord,
     is_taken_back,
     is_whole,
+    sees,
     taken_back,
     those_that_count,
 )
+from realitygap.trials import Operator, Target, TellTrial, TrialPlan
 from realitygap.world import Arena
 
 PATH = "path"

@@ -8,19 +8,21 @@ from dataclasses import dataclass, replace
 
 from realitygap.errors import LedgerError, RobotError, StudyError, TaskError
 from realitygap.platforms import Platform
-from realitygap.records import ROBOT, Generation, Individual, Ledger, Score, Trial, complete_runs, sees
+from realitygap.records import (
+    ROBOT,
+    EndReason,
+    Generation,
+    Individual,
+    Ledger,
+    Score,
+    Trial,
+    complete_runs,
+    sees,
+)
 from realitygap.robots import Robot
 from realitygap.runs import Condition, Evolution
 from realitygap.tasks import score_observed
-from realitygap.trials import (
-    Card,
-    EndReason,
-    Operator,
-    TrialInterrupted,
-    Verdict,
-    drive_trial,
-    preflight,
-)
+from realitygap.trials import Card, Operator, TrialInterrupted, Verdict, drive_trial, preflight
 
 from ._blocks import Block, blocks_of, turns_of
 from ._study import Study

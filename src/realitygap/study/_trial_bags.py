@@ -10,8 +10,7 @@ import numpy as np
 
 from realitygap.errors import StudyError
 from realitygap.logs import WHEEL_DIAMETER_MM, BagReport, write_bag
-from realitygap.records import LEDGER_NAME, Ledger, read_observations
-from realitygap.trials import those_that_count
+from realitygap.records import LEDGER_NAME, Ledger, read_observations, those_that_count
 
 from ._tracked import TrialToTrack, trial_of_file, trial_of_ledger
 

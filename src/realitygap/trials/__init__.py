@@ -20,7 +20,6 @@ from ._batch import (
 )
 from ._carry_out import carry_out_on_robot
 from ._draws import Draws
-from ._ending import EndReason, is_taken_back, is_whole, taken_back, those_that_count
 from ._loop import (
     Controller,
     TrialInterrupted,
@@ -45,7 +44,6 @@ __all__ = [
     "Card",
     "Controller",
     "Draws",
-    "EndReason",
     "Led",
     "NoiseKey",
     "Observer",
@@ -79,8 +77,6 @@ __all__ = [
     "counters_of_individuals",
     "counters_of_robot",
     "drive_trial",
-    "is_taken_back",
-    "is_whole",
     "kind_of",
     "maze_exit",
     "maze_rules",
@@ -93,7 +89,5 @@ __all__ = [
     "simulate_case",
     "simulate_file",
     "start_words",
-    "taken_back",
-    "those_that_count",
     "usable_processors",
 ]

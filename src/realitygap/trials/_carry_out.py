@@ -8,11 +8,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from realitygap.errors import RobotError
-from realitygap.records import Observe, TrialRecord, sees
+from realitygap.records import EndReason, Observe, TrialRecord, sees
 from realitygap.robots import Command, Robot, check_command
 from realitygap.world import Pose
 
-from ._ending import EndReason
 from ._loop import Controller, TrialInterrupted, controller_of, replaying, run_trial
 from ._observer import Observer
 from ._target import TrialPlan

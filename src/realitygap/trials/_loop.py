@@ -9,7 +9,7 @@ import numpy as np
 
 from realitygap.errors import RobotError, RobotStopped
 from realitygap.evolution import ControllerInterface, Network, inputs_of_robot, listed, paper_interface
-from realitygap.records import TrialRecord
+from realitygap.records import EndReason, TrialRecord
 from realitygap.robots import (
     Clock,
     Command,
@@ -21,8 +21,6 @@ from realitygap.robots import (
     select_channels,
 )
 from realitygap.world import Pose
-
-from ._ending import EndReason
 
 Controller = Callable[[Observation, int], Command]
 """Returns the command of a step from the observation before it and the step's number, which counts from 0."""

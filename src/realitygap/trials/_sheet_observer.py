@@ -9,11 +9,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from realitygap.records import Observe, Score, TrialRecord
+from realitygap.records import EndReason, Observe, Score, TrialRecord
 from realitygap.robots import Clock, Robot
 from realitygap.world import Arena
 
-from ._ending import EndReason
 from ._own_senses import OwnSenses
 from ._target import TrialPlan
 

@@ -13,12 +13,11 @@ import numpy as np
 from realitygap._closed_on_exit import ClosedOnExit
 from realitygap.errors import RobotError
 from realitygap.evolution import inputs_of_robot
-from realitygap.records import Observe, TrialRecord
+from realitygap.records import EndReason, Observe, TrialRecord
 from realitygap.robots import Clock, Command, Label, Observation, Robot, channels_of, select_channels
 from realitygap.world import Arena, Pose
 
 from ._carry_out import carry_out_on_robot
-from ._ending import EndReason
 from ._loop import TrialInterrupted
 from ._observer import PortObserver
 from ._target import TellTrial, TrialPlan, check_plans

@@ -17,9 +17,10 @@ from realitygap.errors import RecordError, RobotError, RobotStopped
 from realitygap.families.thymio import Playground, Thymio
 from realitygap.families.thymio._program import TICK_S
 from realitygap.families.thymio.playground._playground import why_not
+from realitygap.records import EndReason
 from realitygap.robots import Command, RecordedRobot, read_recording
 from realitygap.testing import check_robot
-from realitygap.trials import EndReason, run_trial
+from realitygap.trials import run_trial
 from realitygap.world import Pose, paper_arena
 
 from .conftest import ROW, SPEED

@@ -19,9 +19,10 @@ from realitygap.records import (
     TrialRecord,
     is_observations,
     read_observations,
+    those_that_count,
 )
 from realitygap.robots import Label
-from realitygap.trials import RepeatableTarget, TellTrial, TrialPlan, check_plans, those_that_count
+from realitygap.trials import RepeatableTarget, TellTrial, TrialPlan, check_plans
 from realitygap.world import Arena
 
 MOST_NUMBER = 2**63 - 1

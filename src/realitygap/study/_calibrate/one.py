@@ -20,9 +20,10 @@ from realitygap.records import (
     TrialRecord,
     read_observations,
     sees,
+    those_that_count,
     write_whole,
 )
-from realitygap.trials import Operator, Target, TrialPlan, those_that_count
+from realitygap.trials import Operator, Target, TrialPlan
 from realitygap.world import Arena, Calibration, Fitted, RobotModel, load_robot, read_calibration
 
 from .._kept_target import PATH, KeptTarget

@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 
 from realitygap.errors import StudyError, whole_number
 from realitygap.platforms import open_target
-from realitygap.records import read_observations
+from realitygap.records import read_observations, those_that_count
 from realitygap.stats import Needed, check_plan, plan_correlation, plan_effect, plan_margin, trial_reliability
 from realitygap.tasks import CoverageTask, Task, score_observed
-from realitygap.trials import those_that_count
 from realitygap.world import Arena, load_arena
 
 from .._controllers import sample_controllers

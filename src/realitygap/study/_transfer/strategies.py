@@ -22,11 +22,12 @@ from realitygap.records import (
     read_observations,
     refuse_links,
     refuse_links_in,
+    those_that_count,
     write_whole,
 )
 from realitygap.runs import Condition
 from realitygap.tasks import score_observed
-from realitygap.trials import Target, those_that_count
+from realitygap.trials import Target
 from realitygap.world import load_calibration, load_robot
 
 from .._code import allowed_task

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 from enum import StrEnum
 
-from realitygap.records import TrialRecord
+from ._trial_record import TrialRecord
 
 
 class EndReason(StrEnum):
@@ -24,6 +24,10 @@ class EndReason(StrEnum):
     """Not ended yet. After a crash, that is all that is known."""
     DRIVEN = "driven"
     """The robot has driven its last step, and a person has yet to report what they saw."""
+
+
+UNDER_WAY = (EndReason.RUNNING, EndReason.DRIVEN)
+"""Ends of records of unfinished trials: the robot drives, or a person has yet to report what they saw."""
 
 
 def is_whole(trial: TrialRecord) -> bool:

@@ -30,14 +30,15 @@ WHERE = """([anchor, wide, name, label]) => {
 
 
 @pytest.fixture(scope="module")
-def bests(tiny_study) -> pl.DataFrame:
-    return read_tally(tiny_study).runs
+def runs(tiny_study, tmp_path_factory) -> pl.DataFrame:
+    """The data of a figure, as it is exported with the page."""
+    folder = tmp_path_factory.mktemp("exported")
+    write_report(tiny_study, folder / "page.html", figures=folder / "figures")
+    return pl.read_csv(folder / "figures" / "data-coverage-by-run.csv")
 
 
 @pytest.mark.parametrize("size", [DESKTOP, PHONE])
-def test_hover_on_a_run_shows_its_number_and_the_value_of_the_csv(show, tiny_study, bests, tmp_path, size):  # noqa: F811
-    write_report(tiny_study, tmp_path / "page.html", figures=tmp_path / "figures")
-    runs = pl.read_csv(tmp_path / "figures" / "data-coverage-by-run.csv")
+def test_hover_on_a_run_shows_its_number_and_the_value_of_the_csv(show, runs, size):  # noqa: F811
     touch = size == PHONE
     page = show(size=size, reduced_motion="reduce", has_touch=touch)
     for condition, run, value in runs.select("condition", "replicate", "line").iter_rows():

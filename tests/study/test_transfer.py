@@ -237,11 +237,11 @@ platform = "sim"
 """
 
 
-def test_all_strategies_carry_over_to_another_task(tmp_path):
+def test_all_strategies_carry_over_to_another_task(calibration, tmp_path):
     """Readings score avoidance, so that only a strategy that compares cells asks for them."""
     file = tmp_path / "avoid.toml"
     file.write_text(AVOID)
-    found = transfer(file, CountingTarget(), "all", 6, out=tmp_path / "t", **SMALL)
+    found = transfer(file, CountingTarget(), "all", 6, out=tmp_path / "t", calibration=calibration, **SMALL)
     assert found.score == "avoidance score"
     assert {row.strategy for row in found.strategies} == set(STRATEGIES)
     for champion in found.champions:
@@ -255,6 +255,16 @@ def test_all_strategies_carry_over_to_another_task(tmp_path):
     }
     assert seen["select"] == "readings"
     assert seen["transferability"] == "cells"
+
+
+@pytest.mark.long
+def test_a_calibration_on_the_budget_carries_over_to_another_task(tmp_path):
+    file = tmp_path / "avoid.toml"
+    file.write_text(AVOID)
+    target = CountingTarget()
+    found = transfer(file, target, "calibrated", 6, out=tmp_path / "t", **SMALL)
+    assert target.n == 6 + SMALL["fresh_trials"]
+    assert found.score == "avoidance score"
 
 
 def test_evolution_in_the_true_simulator_does_better_than_plain(calibration, tmp_path):

@@ -5,7 +5,6 @@ Every test also fails on any message of the console and on any request but to th
 
 from __future__ import annotations
 
-import contextlib
 import os
 import signal
 import socket
@@ -142,15 +141,15 @@ NEW_PYTHONS = pytest.mark.parametrize("lab", ["new Pythons"], indirect=True)
 
 
 @pytest.fixture(scope="package")
-def lab_port() -> int:
-    """A port for all labs of this process, so that a browser need not compile their scripts again."""
-    worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))
-    ports = range(20_000 + 1000 * (worker % 10), 30_000)  # below those that systems give to connections
-    for port in ports:
-        with socket.socket() as listener, contextlib.suppress(OSError):
-            listener.bind(("127.0.0.1", port))
-            return port
-    raise AssertionError(f"none of the ports {ports} is free")
+def lab_port() -> Iterator[int]:
+    """A port for all labs of this process, so that a browser need not compile their scripts again.
+
+    A socket that is bound, and does not listen, keeps it from other processes; a lab can listen there nevertheless.
+    """
+    with socket.socket() as holder:
+        holder.bind(("127.0.0.1", 0))
+        holder.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        yield holder.getsockname()[1]
 
 
 @pytest.fixture

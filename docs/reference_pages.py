@@ -21,10 +21,10 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from task_pages import task_parts
 
-from realitygap import myro
+from realitygap.classroom import myro
+from realitygap.classroom.myro._catalog import DONE, LEFT_OUT
 from realitygap.cli import app
 from realitygap.evolution import DISTANCES, NAMED_SETTINGS, NeatSettings, NoveltySettings
-from realitygap.myro._catalog import DONE, LEFT_OUT
 from realitygap.platforms import built_in_platforms
 from realitygap.records import column_table, derived_table, ledger_tables
 from realitygap.runs import Condition

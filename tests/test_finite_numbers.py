@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from realitygap.calibration import motion_log, place_ranks
+from realitygap.classroom import jyro
 from realitygap.emulator import serve_tcp
 from realitygap.errors import RealityGapError
 from realitygap.evolution import Genome, NearestArchive, NeatSettings, PaperArchive, Population
@@ -23,7 +24,7 @@ from realitygap.logs import read_range_table
 from realitygap.platforms import JyroPlatform, SimEnsemble, SimPlatform, SimWorld, open_target, try_genomes
 from realitygap.records import TrialRecord, trial_from_dict, trial_to_dict
 from realitygap.report import audit_distance
-from realitygap.robots import Command, Observation, VirtualClock, check_command, check_observation, jyro
+from realitygap.robots import Command, Observation, VirtualClock, check_command, check_observation
 from realitygap.robots.twin import sample_twin
 from realitygap.runs import Condition, Evolution
 from realitygap.stats import controllers_for_margin, equivalence_power, median_interval, plan_margin

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from realitygap.robots import jyro
+from realitygap.classroom import jyro
 
 ROOT = Path(__file__).parent.parent
 TABLE = tomllib.loads((ROOT / "docs" / "data" / "jyro-features.toml").read_text("utf-8"))
@@ -53,7 +53,10 @@ def source_of(kind: type) -> str:
 
 def test_everything_that_a_world_offers_is_in_the_table() -> None:
     named = {
-        place.split(".")[2] for entry in HERE for place in entry["here"] if place.startswith("robots.jyro.")
+        place.split(".")[2]
+        for entry in HERE
+        for place in entry["here"]
+        if place.startswith("classroom.jyro.")
     }
     parts_of_others = {
         "Area",

@@ -70,6 +70,7 @@ __all__ = [
 
 _PACKAGES = {
     "calibration",
+    "classroom",
     "drawing",
     "emulator",
     "errors",

@@ -103,7 +103,7 @@ PRINTED_BY = {
 OTHER_PROGRAMS = (
     "_how_to_run.py",
     "families/thymio/playground/_playground.py",
-    "myro/__main__.py",
+    "classroom/myro/__main__.py",
     "cli/_commands.py",
 )
 """Modules with the options of other programs, and of the list of commands."""

@@ -145,7 +145,7 @@ OPENINGS = {
     "a port": "from realitygap.robots import open_on; robot = open_on(sys.argv[1])[1]",
     "a platform": "from realitygap.platforms import platform_of; from realitygap.world import paper_arena; "
     "robot = platform_of(sys.argv[1]).open_robot(paper_arena())",
-    "Myro": "from realitygap.myro import *; initialize(sys.argv[1]); robot = None",
+    "Myro": "from realitygap.classroom.myro import *; initialize(sys.argv[1]); robot = None",
 }
 
 

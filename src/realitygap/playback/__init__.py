@@ -8,20 +8,17 @@ from ._divergence import Divergence, measure_divergence, own_divergence
 from ._live import Page, WatchedRobot
 from ._movie import WIDTH, save_movie
 from ._moving import MovingTrial, RobotShape, first_visits, in_motion, placed, ray_ends
-from ._panel import DrivePanel, WorldPanel
-from ._player import pack_pen, pack_scene, pack_shape, pack_trials, play
+from ._player import pack_pen, pack_scene, pack_shape, pack_trials, play, widget_modules
 from ._twin import TwinDrive, save_twin_trial, wander
 
 __all__ = [
     "WIDTH",
     "Divergence",
-    "DrivePanel",
     "MovingTrial",
     "Page",
     "RobotShape",
     "TwinDrive",
     "WatchedRobot",
-    "WorldPanel",
     "first_visits",
     "in_motion",
     "measure_divergence",
@@ -36,4 +33,5 @@ __all__ = [
     "save_movie",
     "save_twin_trial",
     "wander",
+    "widget_modules",
 ]

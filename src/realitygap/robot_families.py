@@ -157,6 +157,11 @@ def ports_in_words() -> str:
     return f"{', '.join(ports[:-1])} or {ports[-1]}"
 
 
+def port_platforms() -> str:
+    """Return how users name robots on ports, for help texts, such as NAME:PORT."""
+    return ", ".join(family.named("PORT") for family in _own())
+
+
 def ports_by_family() -> str:
     """Return a sentence for each of our families with examples of its ports, for help texts."""
     sentences = []

@@ -147,7 +147,7 @@ RANGE: tuple[tuple[str, Distribution, str, str], ...] = (
 
 
 def scribbler_prior(robot: RobotModel) -> tuple[Parameter, ...]:
-    """Return the prior of a Scribbler, or of another robot with two wheels.
+    """Return the prior of a robot with two wheels.
 
     Ranges are wide, and chosen: ratios as likely for sizes, even for what may be nothing at all. A parameter of which
     the robot has no number is left out.
@@ -236,7 +236,7 @@ Known = Mapping[str, Parameter]
 
 
 def parameters_of(robot: RobotModel, prior: Sequence[Parameter] | None = None) -> dict[str, Parameter]:
-    """Return the prior of each parameter by name. Default: that of a Scribbler."""
+    """Return the prior of each parameter by name. Default: that of a robot with two wheels."""
     return {parameter.name: parameter for parameter in prior or scribbler_prior(robot)}
 
 

@@ -12,10 +12,12 @@ import typer
 from realitygap._how_to_run import launcher
 from realitygap._terminal import echo
 from realitygap.errors import StudyError
+from realitygap.robot_families import default_family
 
 from ._browser import show_page
 
-_ROBOT = "scribbler:emulator://s2?fluke=2&speed=off"
+_FAMILY = default_family()
+_ROBOT = f"{_FAMILY.named(_FAMILY.emulated)}&speed=off"
 
 
 def demo(
@@ -85,7 +87,7 @@ def _steps(folder: Path) -> list[tuple[str, list[list[str]]]]:
         ),
         ("Write the report of the study.", [["report", study]]),
         (
-            "Save the best controller of a novelty search, film it, and drive it on an emulated Scribbler.",
+            "Save the best controller of a novelty search, film it, and drive it on an emulated robot.",
             [
                 ["export", study, "--condition", "novelty-50", "-o", champion],
                 ["show", study, "--condition", "novelty-50", "-o", film],

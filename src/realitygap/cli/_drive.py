@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from realitygap._terminal import echo
+from realitygap.robot_families import ports_by_family
 
 from ._browser import show_page
 from ._camera import CAMERA_HELP, operated_under_camera
@@ -28,8 +29,7 @@ def drive(
         str,
         typer.Option(
             metavar="PORT",
-            help="Port of the robot: /dev/rfcomm0, COM3, socket://HOST:PORT, thymio:/dev/ttyACM0, or an emulated robot "
-            "in this program, emulator://s2?speed=off or thymio:emulator://playground?speed=8.",
+            help=f"{ports_by_family()} A port emulator://HOST is an emulated robot in this program.",
         ),
     ],
     replicates: Annotated[

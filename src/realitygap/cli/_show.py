@@ -118,7 +118,7 @@ def show(
 
     Example: realitygap show arena maze-hard --robot khepera -o arena.svg
 
-    Example: realitygap show robot scribbler-s2-fluke2 -o robot.svg
+    Example: realitygap show robot khepera -o robot.svg
 
     In Python: realitygap.report.save_view("results/paper", "run.svg", condition="coverage-50", replicate=3)
 
@@ -130,7 +130,7 @@ def show(
 
     In Python: realitygap.report.save_arena("arena.svg", "maze-hard", robot="khepera")
 
-    In Python: realitygap.report.save_robot("robot.svg", "scribbler-s2-fluke2")
+    In Python: realitygap.report.save_robot("robot.svg", "khepera")
     """
     if out is None:
         raise StudyError("No output file. Name one with -o, such as -o run.svg.")

@@ -11,6 +11,7 @@ import typer
 
 from realitygap._terminal import echo
 from realitygap.errors import StudyError
+from realitygap.robot_families import port_platforms
 
 from ._code import AllowPlatforms
 from ._json import print_json
@@ -26,7 +27,7 @@ def try_genome(
         typer.Option(
             "--on",
             metavar="PLATFORM",
-            help="Platform: jyro, sim, sim:FILE, twin:FILE, scribbler:PORT or thymio:PORT.",
+            help=f"Platform: jyro, sim, sim:FILE, twin:FILE, {port_platforms()}.",
         ),
     ],
     trials: Annotated[int, typer.Option(min=1, max=9999, help="Number of trials.")] = 1,
@@ -66,8 +67,6 @@ def try_genome(
     on a real or emulated robot, if the platform has its inputs.
 
     Example: realitygap try champion.json --on twin:worn-1.toml --trials 20
-
-    Example: realitygap try champion.json --on "scribbler:emulator://s2?fluke=2&speed=off&twin=worn-1.toml"
 
     In Python: realitygap.study.try_on(target, realitygap.Genome.load("champion.json"), trials=20)
     """

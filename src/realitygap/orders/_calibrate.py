@@ -6,6 +6,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import ClassVar, Literal
 
+from realitygap.robot_families import default_family, port_platforms
+
 from ._field import argument, option
 from ._order import Order
 
@@ -59,7 +61,7 @@ class CalibrateOrder(Order):
     what: str = argument("WHAT", help="Part of the robot: path, sensors, motion, contact or all.")
     robot: str | None = option(
         None,
-        help="Robot to measure: scribbler:PORT, thymio:PORT, enki, twin:FILE, sim or sim:FILE.",
+        help=f"Robot to measure: {port_platforms()}, enki, twin:FILE, sim or sim:FILE.",
         metavar="PLATFORM",
         label="Robot",
         refers="platform",
@@ -126,7 +128,7 @@ class CalibrateOrder(Order):
     base: str | None = option(
         None,
         help="Robot, robot file, or earlier calibration whose numbers the fit starts from.",
-        default_is="that of the platform, such as scribbler-s2-fluke2 or thymio",
+        default_is=f"that of the platform, such as {default_family().robot}",
         metavar="ROBOT",
         label="Robot model",
         refers="file",

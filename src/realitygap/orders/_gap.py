@@ -6,6 +6,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import ClassVar, Literal
 
+from realitygap.robot_families import port_platforms
+
 from ._field import argument, option
 from ._order import Order
 
@@ -39,7 +41,7 @@ class GapOrder(Order):
     sim: str = argument("SIM", help="Simulator: sim, sim:FILE or jyro.", label="Simulator", refers="platform")
     target: str = argument(
         "TARGET",
-        help="Target: twin:FILE, scribbler:PORT, thymio:PORT, enki, recorded:FILE, sim, sim:FILE or jyro.",
+        help=f"Target: twin:FILE, {port_platforms()}, enki, recorded:FILE, sim, sim:FILE or jyro.",
         label="Target",
         refers="platform",
     )

@@ -7,6 +7,8 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
+from realitygap.robot_families import port_platforms
+
 from ._field import argument, option
 from ._order import Order
 
@@ -40,7 +42,7 @@ class TransferOrder(Order):
 
     study: str = argument("STUDY", help="Study by name or file. See --condition.", refers="file")
     to: str = option(
-        help="Target: sim:FILE, twin:FILE, scribbler:PORT, thymio:PORT, ...",
+        help=f"Target: sim:FILE, twin:FILE, {port_platforms()}, ...",
         metavar="PLATFORM",
         refers="platform",
     )

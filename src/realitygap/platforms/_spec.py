@@ -107,7 +107,7 @@ def open_target(
 
     Args:
         spec: Name of the target: `jyro`, `sim`, `sim:FILE` with the file of a robot or a calibration, `twin:FILE`,
-            `scribbler:PORT`, `thymio:PORT`, `recorded:FILE` with earlier trials, or a platform of another package.
+            a robot on a port, `NAME:PORT`, `recorded:FILE` with earlier trials, or a platform of another package.
         arena: Arena of the trials.
         processes: Number of processes of a twin; one for each processor when not given.
         witness: Address of the witness of an emulated robot in another program, HOST:PORT.

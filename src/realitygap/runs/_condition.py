@@ -33,6 +33,7 @@ from realitygap.platforms import (
     platform_names,
     study_platforms,
 )
+from realitygap.robot_families import default_family
 from realitygap.settings import Settings, mistakes, shown
 from realitygap.tasks import ControllerSettings, CoverageTask, Task, as_task
 from realitygap.trials import MOST_TEAMS, Trajectory
@@ -66,7 +67,7 @@ class Condition(Settings):
         "jyro",
         description="Platform that drives the networks. jyro: the paper's simulation. sim: a robot simulated with its "
         "outline, contact, motors, and sensors (sim:FILE: the robot of a file). twin:FILE: pseudo-reality in MuJoCo. "
-        "scribbler: the robot. Other packages can add platforms.",
+        f"{default_family().name}: the robot. Other packages can add platforms.",
     )
     noise: float = Field(
         0.1,

@@ -16,6 +16,7 @@ from realitygap.kernels.neat.network import Networks, make_networks
 from realitygap.kernels.sim.lanes import SimRules, make_sim_room, make_sim_trace
 from realitygap.kernels.sim.shape import half_width, make_sim_shape, sim_table, substeps_for
 from realitygap.kernels.sim.trial import run_sim_trials
+from realitygap.platforms import DEFAULT_ROBOT
 from realitygap.world import Arena, load_arena, load_robot, paper_arena
 
 from ._bench import check_seconds, fastest_rate
@@ -58,7 +59,7 @@ PRESSED = ((0.0, 0.0, 0.0, 2.5), (0.2, 0.0, -0.1, 0.03))
 
 
 def measure_realism(seconds: float = 2.0) -> dict[str, Any]:
-    """Return robot-steps a second of one core, with everything that `sim` has for a Scribbler.
+    """Return robot-steps a second of one core, with everything that `sim` has for its default robot.
 
     Outline of ten corners and their radius, contact `slide`, three infrared sensors with their mixture of noise,
     a drive with lag, delay and noise; every number of robot and drive is different in each trial. Steps of
@@ -177,7 +178,7 @@ class RealisticTrials:
 
 
 def _numbers(arena: Arena) -> dict[str, float]:
-    robot = load_robot("scribbler-s2-fluke2").numbers()
+    robot = load_robot(DEFAULT_ROBOT).numbers()
     numbers: dict[str, float] = {}
     for name, value in {**robot, **arena.numbers()}.items():
         if name.split(".")[0] in ("body", "contact", "drive", "arena"):

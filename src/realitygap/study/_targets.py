@@ -106,6 +106,6 @@ SEEN_AS: dict[Observe, str] = {
 WOULD_SEE: dict[Observe, str] = {
     "readings": "Record new trials.",
     "cells": "Use an operator who counts them, a camera, or the witness of an emulated robot.",
-    "encoders": "A Scribbler 2, a real Thymio, and a simulated robot have encoders.",
+    "encoders": "Simulated robots and some real ones have encoders.",
     "track": "Use a camera, or the witness of an emulated robot.",
 }

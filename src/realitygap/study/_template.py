@@ -11,6 +11,7 @@ from typing import Any
 from pydantic import BaseModel
 
 from realitygap.evolution import NAMED_SETTINGS
+from realitygap.robot_families import default_family
 from realitygap.runs import NAME_PATTERN, Condition
 from realitygap.settings import is_hidden
 from realitygap.world import RobotModel
@@ -65,7 +66,7 @@ def study_template(name: str, source: str | None = None) -> str:
         _comment(
             "One [[condition]] for each cell of the design. What differs from the sections above goes into "
             "[condition.arena], [condition.task], [condition.controller], [condition.neat], [condition.novelty], and "
-            "[condition.jyro], [condition.sim] or [condition.scribbler], whichever its platform is."
+            f"[condition.jyro], [condition.sim] or [condition.{default_family().name}], whichever its platform is."
         )
     )
     own = ["name", "selection", "platform", "noise"]

@@ -87,7 +87,7 @@ CLASSICAL_TASKS: Mapping[str, ClassicalTask] = {task.name: task for task in _TAS
 
 
 UNIT = 0.01
-"""A unit of the published mazes [m]: the agent's radius of 8 of them is about that of a Scribbler."""
+"""A unit of the published mazes [m]: the agent's radius of 8 of them is about that of the paper's robot."""
 
 
 @dataclass(frozen=True)

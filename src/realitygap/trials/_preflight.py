@@ -123,5 +123,5 @@ def _battery_under_load(robot: Robot) -> float | str:
     finally:
         robot.stop()
     if math.isnan(volts):
-        return "unknown: nothing measures it (a Scribbler's Fluke does, if one is plugged in)"
+        return "unknown: nothing measures it (on some robots, a board does, if it is plugged in)"
     return volts

@@ -182,5 +182,5 @@ class RangeSensors:
         check_finite(vars(self))
 
 
-# Jyro's Scribbler: forward +-0.09 m, left +-0.08 m.
+# Jyro's robot: forward +-0.09 m, left +-0.08 m.
 JYRO_SCRIBBLER = Body(((0.09, 0.08), (0.09, -0.08), (-0.09, -0.08), (-0.09, 0.08)))

@@ -15,6 +15,7 @@ from realitygap.lab._gap_plan import PLACING_S
 from realitygap.lab._lab import Lab, Visitor
 from realitygap.orders import CalibrateOrder
 from realitygap.platforms import emulated_robots
+from realitygap.robot_families import default_family, port_platforms
 from realitygap.world import Fitted, load_arena
 
 from ._fields import Form
@@ -33,7 +34,7 @@ _KINDS = {
     "contact": ("Contact", "Effect of walls on the motion.", 10, 12),
     "all": ("All", "Motion, sensors, and contact together.", 20, 15),
 }
-"""Name, meaning, trials on a Scribbler, and their time [min] of each kind of calibration."""
+"""Name, meaning, trials on a robot of the default family, and their time [min] of each kind of calibration."""
 _FIELDS = {field.name: field for field in CalibrateOrder.fields() if field.face.label}
 _OF_ROBOT = ("robot", "name")
 """Fields of the first step."""
@@ -171,7 +172,7 @@ class _Page:
                 "sim",
                 ["sim", *emulated_robots()],
                 is_needed=True,
-                explanation="scribbler:PORT, thymio:PORT, twin:FILE, sim, or sim:FILE. Emulated robots: "
+                explanation=f"{port_platforms()}, twin:FILE, sim, or sim:FILE. Emulated robots: "
                 f"{', '.join(emulated_robots())}.",
             )
             form.text("name", "Name", "my-robot", is_needed=True, explanation="Name of the calibration file.")
@@ -185,7 +186,7 @@ class _Page:
             ):
                 self._cards = {kind: self._show_card(kind) for kind in _KINDS}
             hint(
-                f"Minutes are for a Scribbler, with {PLACING_S:.0f} s to place it before each trial. "
+                f"Minutes are for a {default_family().noun}, with {PLACING_S:.0f} s to place it before each trial. "
                 "Simulated robots take less."
             )
             with ui.expansion("Advanced").classes("lab-expansion"):

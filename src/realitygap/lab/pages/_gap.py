@@ -17,6 +17,7 @@ from realitygap.lab._gap_plan import plan_words
 from realitygap.lab._lab import Lab, Visitor
 from realitygap.orders import GapOrder
 from realitygap.platforms import emulated_robots
+from realitygap.robot_families import default_family
 
 from ._fields import Form
 from ._frame import framed, hint, section, text_of, visitor_of
@@ -114,7 +115,7 @@ class _Page:
             _FIELDS["target"],
             "jyro",
             explanation=f"jyro, twin:FILE, or an emulated robot: {', '.join(emulated_robots())}. An emulator in "
-            "another program, such as scribbler:socket://HOST:PORT, also needs its witness.",
+            f"another program, such as {default_family().named('socket://HOST:PORT')}, also needs its witness.",
         )
         with ui.element("div").classes("lab-fields"):
             self._numbers = {key: form.number_of(_FIELDS[key]) for key in _NUMBERS}

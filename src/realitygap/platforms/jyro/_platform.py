@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 class JyroPlatform(JyroSettings):
-    """The Scribbler as the paper simulated it.
+    """The robot as the paper simulated it.
 
     Box body, a blocked robot freezes, three thin rays, uniform noise. A step lasts 0.1 s; full output
     moves 0.1 m.

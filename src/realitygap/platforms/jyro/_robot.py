@@ -16,7 +16,7 @@ from ._trials import jyro_rules, jyro_scene
 
 
 class JyroRobot(ProgramRobot):
-    """The paper's simulated Scribbler, one command at a time.
+    """The paper's simulated robot, one command at a time.
 
     A controller that answers each observation drives the same trial as `try_genomes` with its genome, the same noise,
     and the same key (in double precision, in which networks compute outside of trials).

@@ -20,6 +20,7 @@ from pydantic import (
     model_validator,
 )
 
+from realitygap.robot_families import default_family
 from realitygap.world import (
     Arena,
     Body,
@@ -36,7 +37,7 @@ from .._simulated import SimulatedPlatform
 
 T = TypeVar("T")
 
-DEFAULT_ROBOT = "scribbler-s2-fluke2"
+DEFAULT_ROBOT = default_family().robot
 
 NOISE = (
     *("noise_uniform", "noise_gain", "drop_most", "outlier_most", "noise", "noise_per_m", "delay_jitter"),

@@ -24,6 +24,7 @@ from realitygap.world import Arena, Obstacle, Pose, RobotModel, arena_picture, p
 from ._overlap import as_obstacles, overlaps
 from ._platform import SimPlatform
 from ._scene import sim_scene
+from ._settings import DEFAULT_ROBOT
 from ._trials import sensor_names, sim_rules
 
 PENS = ("royalblue3", "darkorange3", "seagreen4", "orchid3", "goldenrod3", "firebrick3")
@@ -36,7 +37,7 @@ class SimWorld:
     """Robots with outlines, contact, motors and sensors in one arena.
 
         world = SimWorld(paper_arena())
-        ada = world.add("scribbler-s2-fluke2", Pose(0.3, 0.3, 0.0))
+        ada = world.add("khepera", Pose(0.3, 0.3, 0.0))
         eve = world.add("e-puck", Pose(0.7, 0.3, math.pi))
         ada.move(0.8, 0.1)
         world.step(10)
@@ -80,7 +81,7 @@ class SimWorld:
 
     def add(
         self,
-        robot: str | Path | RobotModel | SimPlatform = "scribbler-s2-fluke2",
+        robot: str | Path | RobotModel | SimPlatform = DEFAULT_ROBOT,
         start: Pose | None = None,
         *,
         name: str | None = None,

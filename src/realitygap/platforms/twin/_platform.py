@@ -47,7 +47,7 @@ class TwinPlatform(Platform):
     """A twin, as pseudo-reality to evolve on.
 
     It runs in separate processes, and only they read its file. This process identifies it by its hash. Figures draw the
-    Scribbler's outline for any twin.
+    outline of the paper's robot for any twin.
     """
 
     name: ClassVar[str] = "twin"

@@ -1,4 +1,4 @@
-"""A twin as the body of an emulated Scribbler: the emulator's firmware tells its wheels, and reads its sensors."""
+"""A twin as the body of an emulated robot: the emulator's firmware tells its wheels, and reads its sensors."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ AT_REST = 1e-4  # speed of a wheel that has come to rest [m/s]
 
 
 class TwinBody:
-    """A twin that the emulator moves, in the Scribbler's frame: the end without the caster is ahead.
+    """A twin that the emulator moves, in a frame of the robot: the end without the caster is ahead.
 
     It has the interface of a simulated robot behind an emulator, and the optional parts of a body: infrared, battery,
     noise. The firmware sets the steps of speed, so `motors.stepped` and `step_s` have no effect.
@@ -108,7 +108,7 @@ class TwinBody:
         return self._encoders.turn(*turned)
 
     def _follow_heading(self, here: Pose) -> None:
-        """Update the Scribbler's pose; its heading continues without a jump."""
+        """Update the robot's pose; its heading continues without a jump."""
         was = self.pose.heading
         turned = (here.heading - math.pi - was + math.pi) % math.tau - math.pi
         self.pose = Pose(here.x, here.y, was + turned)
@@ -147,7 +147,7 @@ class TwinBody:
         return self._servo.volts_at(load)
 
     def ranges(self, mounts: Floats, reach: float) -> Floats:
-        """Return distances to walls and obstacles [m], from mounts in the Scribbler's frame."""
+        """Return distances to walls and obstacles [m], from mounts in the robot's frame."""
         return np.array(
             [
                 self._physics.look(-x, -y, np.array([direction + math.pi]), reach)[0][0]

@@ -18,8 +18,8 @@ Length = Annotated[float, Field(gt=0, le=1)]
 Offset = Annotated[float, Field(ge=-0.5, le=0.5)]
 Angle = Annotated[float, Field(ge=-6.3, le=6.3)]
 
-# The Scribbler's shell from above, the end with the Fluke ahead, before it is grown by the radius of its corners.
-# Source: as in scribbler-s1.toml, turned half round.
+# The shell of the paper's robot from above, its camera ahead, before it is grown by the radius of its corners.
+# Source: as in the robot file of its first model, turned half round.
 SHELL = (
     *((0.079, 0.0455), (0.063, 0.0615), (0.047, 0.0695), (-0.047, 0.0695), (-0.079, 0.0535)),
     *((-0.079, -0.0535), (-0.047, -0.0695), (0.047, -0.0695), (0.063, -0.0615), (0.079, -0.0455)),
@@ -280,7 +280,7 @@ class TwinLight(Settings):
         ),
         min_length=1,
         max_length=MOST_MOUNTS,
-        description="Sensors in the order of their names. A Scribbler has them at the end without the caster.",
+        description="Sensors in the order of their names. The paper's robot has them at the end without the caster.",
     )
     room: Annotated[float, Field(ge=0, le=100)] = Field(
         1.0, description="Ambient light from all sides. A lamp of strength 1 at a distance of 1 m gives 1."
@@ -349,7 +349,7 @@ class TwinOddities(Settings):
 
 
 class TwinModel(Settings):
-    """A twin of the Scribbler: a robot with wheels, motors, and sensors in MuJoCo, used as pseudo-reality.
+    """A twin of the paper's robot: a robot with wheels, motors, and sensors in MuJoCo, used as pseudo-reality.
 
     Frame: origin at the pen, x towards the end with the caster and the Fluke, y to the left. Meters, radians,
     seconds, kilograms, volts.

@@ -20,7 +20,7 @@ STANDING = (0.0, 0.0)
 class SpeedSteps:
     """An S2's regulator: a speed in steps of 12.5 mm/s, rising by one of them each 20 ms.
 
-    Source: ipre_s2_port.spin and s2.spin of Myro's repository, as in `realitygap.emulator`.
+    Source: ipre_s2_port.spin and s2.spin as in the emulator of the paper's robot.
     """
 
     def __init__(self) -> None:

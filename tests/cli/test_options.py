@@ -101,6 +101,7 @@ PRINTED_BY = {
 }
 """Commands that print the messages of a module. A message of others names the command: `realitygap run --fresh`."""
 OTHER_PROGRAMS = (
+    "vision/_cells.py",
     "_how_to_run.py",
     "families/thymio/playground/_playground.py",
     "classroom/myro/__main__.py",

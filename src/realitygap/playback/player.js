@@ -8,10 +8,11 @@ const MM = 1000;
 const SPEEDS = [0.25, 0.5, 1, 2, 4, 8];
 const FAN = 48; // from a robot's middle to its letter, if another robot is nearer than that [mm]
 const PLAY = "M4 2.5v11L13 8z", PAUSE = "M3.5 2.5h3.2v11H3.5zM9.3 2.5h3.2v11H9.3z";
+const SVG = new DOMParser().parseFromString("<svg></svg>", "text/html").querySelector("svg").namespaceURI;
 const still = window.matchMedia("(prefers-reduced-motion: reduce)");
 
 function make(name, attributes = {}, parent = null) {
-  const element = document.createElementNS("http://www.w3.org/2000/svg", name);
+  const element = document.createElementNS(SVG, name);
   for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
   if (parent) parent.append(element);
   return element;

@@ -52,7 +52,7 @@ def test_a_whole_study_is_driven_and_counted_by_taps_on_a_phone(lab, visit):
     for first in (1, 3):
         start_trial(page, first)
         start_trial(page, first + 1)
-        page.get_by_text("is full").wait_for()
+        page.get_by_text("To score: 2").wait_for()
         count(page, first, 0, 1, 13)
         count(page, first + 1, 0, 12)
         page.get_by_role("button", name="Close generation").click()

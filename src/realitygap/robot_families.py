@@ -40,6 +40,20 @@ class Reading(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True)
+class NetworkProgram:
+    """A format in which robots of a family run a network without a computer.
+
+    Attributes:
+        ending: Ending of its files, without a dot.
+        write: Reference to a function of a network, its interface, and the keywords `steps`, `step_s`, and `origin`,
+            which returns the program in ASCII.
+    """
+
+    ending: str
+    write: str
+
+
+@dataclass(frozen=True, kw_only=True)
 class RobotFamily:
     """The description of a family of robots.
 
@@ -59,6 +73,7 @@ class RobotFamily:
             can.
         builds: Reference to a function that compiles a program and returns its path, by the name of the program in
             `realitygap twin build-NAME`.
+        programs: Formats of programs that compute a network on its robots, by name.
         robot: Name of the robot file that calibrations of its robots build on.
         additions: Names of files in `robots/additions` that a robot can be equipped with, at most one of each group.
         range_readings: Range sensors by their number, for pages. Default: none is shown.
@@ -78,6 +93,7 @@ class RobotFamily:
     emulate: str = ""
     lacks: str = ""
     builds: Mapping[str, str] = field(default_factory=dict)
+    programs: Mapping[str, NetworkProgram] = field(default_factory=dict)
     robot: str = ""
     additions: tuple[tuple[str, ...], ...] = ()
     range_readings: Mapping[int, tuple[Reading, ...]] = field(default_factory=dict)
@@ -169,6 +185,11 @@ def ports_by_family() -> str:
         ports = [family.as_typed(port) for port in (*family.ports, family.emulated) if port]
         sentences.append(f"Port of a {family.noun}: {', '.join(ports[:-1])} or {ports[-1]}.")
     return " ".join(sentences)
+
+
+def network_programs() -> dict[str, NetworkProgram]:
+    """Return the formats of programs of all families, by name."""
+    return {name: program for family in robot_families() for name, program in family.programs.items()}
 
 
 @functools.cache

@@ -56,7 +56,7 @@ def export(
 
     A folder alone gives one individual, the one that `realitygap show network` draws with the same options. The format
     json is the genome, which realitygap.Genome.load reads. The format c is the network as a header of C99, for robots
-    that carry it. The format aseba is the network as a program for a Thymio II, which Aseba Studio opens. The formats
+    that carry it. Robots may add a format: aseba is the network as a program that Aseba Studio opens. The formats
     onnx, for any ONNX runtime, and graphml, a graph, need the extra 'export'.
 
     Species, innovations and lineage are tables in Parquet. They list each species of each generation, the origin of

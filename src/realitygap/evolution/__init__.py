@@ -1,7 +1,6 @@
 """NEAT and novelty search: settings, genomes and what they become elsewhere, populations to ask and tell, archives."""
 
 from ._archive import Member, NoveltyArchive, archive_members
-from ._aseba import aseba_error, to_aseba
 from ._c import to_c
 from ._distances import (
     DISTANCES,
@@ -71,7 +70,6 @@ __all__ = [
     "Population",
     "Sense",
     "archive_members",
-    "aseba_error",
     "behavior_distance",
     "decode_all",
     "distance_kind",
@@ -88,7 +86,6 @@ __all__ = [
     "paper_interface",
     "random_key",
     "sorted_cells_distance",
-    "to_aseba",
     "to_c",
     "to_networkx",
     "to_onnx",

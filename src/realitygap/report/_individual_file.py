@@ -1,29 +1,29 @@
-"""An individual of a study as a file for other programs: JSON, ONNX, GraphML, C, or Aseba."""
+"""An individual of a study as a file for other programs: JSON, ONNX, GraphML, C, or a robot's program."""
 
 from __future__ import annotations
 
 import io
 import warnings
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from realitygap._version import __version__
 from realitygap.errors import did_you_mean, from_extra
-from realitygap.evolution import Genome, interface_to_dict, to_aseba, to_c, to_networkx, to_onnx, to_text
+from realitygap.evolution import Genome, interface_to_dict, to_c, to_networkx, to_onnx, to_text
 from realitygap.records import RecordWarning, ResultsFolder, refuse_results, write_whole
 from realitygap.report._tally import read_tally
 from realitygap.report._trial_figure import ChosenTrial, choose_trial
+from realitygap.robot_families import NetworkProgram, load, network_programs
 from realitygap.runs import genome_of
-
-Format = Literal["json", "onnx", "graphml", "c", "aseba"]
 
 
 def export_individual(
     folder: ResultsFolder | str | Path,
     out: str | Path,
     *,
-    format: Format | None = None,
+    format: str | None = None,
     condition: str | None = None,
     replicate: int | None = None,
     generation: int | None = None,
@@ -35,8 +35,8 @@ def export_individual(
     * onnx: the network, as `to_onnx` makes it, in double precision.
     * graphml: the genome as a graph, as `to_networkx` makes it.
     * c: the network as a header of C99, as `to_c` makes it, in double precision; files end in .c or .h.
-    * aseba: the network as a program for a Thymio II, as `to_aseba` makes it; files end in .aesl. A command lasts as
-      long as on the platform of the condition, and a wheel turns at 300 units for a command of 1.
+    * A family of robots can add formats: the network as a program that its robots run without a computer, such as aseba
+      of `realitygap.families.thymio`; files end in .aesl. A command lasts as long as on the platform of the condition.
 
     Each has the names of inputs and outputs, and says which individual it is.
 
@@ -53,12 +53,12 @@ def export_individual(
         The path of the file.
 
     Raises:
-        MissingExtraError: the extra `export` is not installed; JSON, C and Aseba need none.
+        MissingExtraError: the extra `export` is not installed; the others need none.
         RecordError: there is no such folder, a file in it is damaged, it holds no trials yet, its settings are another
             version's, or the file is one of a study's own or cannot be written.
         TypeError: the number of a run, generation or individual is not a whole number.
-        ControllerError: a Thymio lacks an input of the network.
-        ValueError: the network is too large for a Thymio; or there is no such condition, run, generation, individual
+        ControllerError: the robots of a program lack an input of the network.
+        ValueError: the network is too large for a program; or there is no such condition, run, generation, individual
             or format, and the message says which there are.
     """
     out = Path(out)
@@ -82,21 +82,23 @@ def export_individual(
 
 
 def _writer(out: Path, format: str | None) -> Callable[[ChosenTrial, Genome, dict[str, Any]], bytes]:
-    writers = {
+    writers: dict[str, Callable[[ChosenTrial, Genome, dict[str, Any]], bytes]] = {
         "json": _json,
         "onnx": _onnx,
         "graphml": _graphml,
         "c": _c,
         "h": _c,
-        "aseba": _aseba,
-        "aesl": _aseba,
     }
+    programs = network_programs()
+    for name, program in programs.items():
+        writers |= dict.fromkeys((name, program.ending), partial(_program, program))
     word = out.suffix.lower().removeprefix(".") if format is None else format
     if word not in writers:
         what = f"{out} ends in {out.suffix or 'nothing'}" if format is None else f"Unknown format {format!r}"
         near = did_you_mean(word, writers)
+        *others, last = ("json", "onnx", "graphml", "c", *programs)
         raise ValueError(
-            f"{what}, expected json, onnx, graphml, c or aseba.{f' {near}' if near.startswith('Did') else ''}"
+            f"{what}, expected {', '.join(others)} or {last}.{f' {near}' if near.startswith('Did') else ''}"
         )
     return writers[word]
 
@@ -127,9 +129,9 @@ def _c(chosen: ChosenTrial, genome: Genome, origin: dict[str, Any]) -> bytes:
     return to_c(network, inputs[: network.n_inputs], outputs, origin=origin).encode("ascii")
 
 
-def _aseba(chosen: ChosenTrial, genome: Genome, origin: dict[str, Any]) -> bytes:
+def _program(program: NetworkProgram, chosen: ChosenTrial, genome: Genome, origin: dict[str, Any]) -> bytes:
     platform = chosen.condition.on
-    text = to_aseba(
+    text: str = load(program.write)(
         genome.network(), genome.interface, steps=platform.steps, step_s=platform.command_s, origin=origin
     )
     return text.encode("ascii")

@@ -9,10 +9,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from realitygap.evolution import ControllerInterface, Network, to_aseba
-from realitygap.evolution._fixed_point import ONE, fixed_point
-from realitygap.families.thymio import Playground
+from realitygap.evolution import ControllerInterface, Network
+from realitygap.families.thymio import Playground, to_aseba
 from realitygap.families.thymio import _messages as messages
+from realitygap.families.thymio._fixed_point import ONE, fixed_point
 from realitygap.families.thymio._link import Link, open_port
 from realitygap.families.thymio._messages import Kind
 from realitygap.families.thymio.playground._playground import why_not

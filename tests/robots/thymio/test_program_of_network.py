@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from realitygap.errors import ControllerError
-from realitygap.evolution import ControllerInterface, Network, to_aseba
-from realitygap.evolution._aseba import FULL_SPEED, GROUND_BLACK, GROUND_WHITE, MOST_WORDS, READING_MAX
-from realitygap.evolution._fixed_point import ONE, SATURATED, errors, fixed_point, tangent
-from realitygap.families.thymio import Thymio, _robot
+from realitygap.evolution import ControllerInterface, Network
+from realitygap.families.thymio import Thymio, _robot, to_aseba
+from realitygap.families.thymio._aseba import FULL_SPEED, GROUND_BLACK, GROUND_WHITE, MOST_WORDS, READING_MAX
+from realitygap.families.thymio._fixed_point import ONE, SATURATED, errors, fixed_point, tangent
 from realitygap.families.thymio._robot import FULL_SCALE
 
 from ...evolution.test_export import IDS, KINDS, evolved

@@ -6,9 +6,10 @@
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from realitygap.robot_families import Reading, RobotFamily
+from realitygap.robot_families import NetworkProgram, Reading, RobotFamily
 
 if TYPE_CHECKING:
+    from ._aseba import aseba_error, to_aseba
     from ._platform import ThymioPlatform
     from ._ports import find_ports
     from ._robot import Thymio, ThymioInfo
@@ -23,10 +24,12 @@ _HOME = {
     "Thymio": "._robot",
     "ThymioInfo": "._robot",
     "ThymioPlatform": "._platform",
+    "aseba_error": "._aseba",
     "build_enki": ".enki._build",
     "find_ports": "._ports",
     "harness_path": ".enki._build",
     "open_playground": ".playground._port",
+    "to_aseba": "._aseba",
 }
 
 FAMILY = RobotFamily(
@@ -44,6 +47,7 @@ FAMILY = RobotFamily(
     emulate=f"{__name__}._emulate:emulate",
     lacks=f"{__name__}.playground._playground:why_not",
     builds={"enki": f"{__name__}.enki._build:build_enki"},
+    programs={"aseba": NetworkProgram(ending="aesl", write=f"{__name__}._aseba:to_aseba")},
     robot="thymio",
     range_readings={
         7: tuple(
@@ -64,10 +68,12 @@ __all__ = [
     "Thymio",
     "ThymioInfo",
     "ThymioPlatform",
+    "aseba_error",
     "build_enki",
     "find_ports",
     "harness_path",
     "open_playground",
+    "to_aseba",
 ]
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ._genome import Network
+from realitygap.evolution import Network
 
 ONE_BITS = 14
 ONE = 1 << ONE_BITS

@@ -12,6 +12,7 @@ import numpy as np
 
 from realitygap._version import __version__
 from realitygap.errors import ControllerError
+from realitygap.evolution import ControllerInterface, Network, listed
 
 from ._fixed_point import (
     CUBE,
@@ -26,8 +27,6 @@ from ._fixed_point import (
     errors,
     fixed_point,
 )
-from ._genome import Network
-from ._interface import ControllerInterface, listed
 
 MOST_WORDS = 1534
 """Words of bytecode that a Thymio has room for. Source: Mobsya/aseba-target-thymio2, `skel-usb-user.h`."""

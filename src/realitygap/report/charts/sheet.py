@@ -89,7 +89,7 @@ class Sheet:
             return
         self._is_settled = True
         self._engine.execute(self.figure)
-        self.figure.set_layout_engine("none")
+        self.figure.set_layout_engine(None)  # saving a figure that has one, "none" included, draws it twice
         width, height = self.figure.get_size_inches()
         boxes = {axes: axes.get_position() for axes in self.panels.values()}
         rows = {axes: _rows_of(axes) for axes in boxes}

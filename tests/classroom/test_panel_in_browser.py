@@ -15,10 +15,10 @@ from realitygap.classroom import _panel as panels
 from realitygap.classroom.jyro import Camera, JyroWorld, Pioneer
 from realitygap.world import paper_arena
 from tests.browsers import LOCAL
+from tests.playback.page import PANEL, page_of
+from tests.playback.test_player_in_browser import PATIENCE_MS
 
-from .page import PANEL, page_of
 from .test_panel import Driven
-from .test_player_in_browser import PATIENCE_MS
 
 pytestmark = pytest.mark.slow
 

@@ -213,15 +213,16 @@ def calibration_file() -> dict[str, Any]:
     return tomllib.loads(found.to_toml())
 
 
-def packaged(kind: str, name: str) -> dict[str, Any]:
-    return tomllib.loads(
-        (Path(realitygap.__file__).parent / "world" / kind / f"{name}.toml").read_text("utf-8")
-    )
+PACKAGE = Path(realitygap.__file__).parent
+
+
+def packaged(path: str) -> dict[str, Any]:
+    return tomllib.loads((PACKAGE / path).read_text("utf-8"))
 
 
 FILES: dict[str, tuple[Callable[[], dict[str, Any]], Callable[[Path], Any]]] = {
-    "robot.toml": (lambda: packaged("robots", "scribbler-s2"), load_robot),
-    "arena.toml": (lambda: packaged("arenas", "light"), load_arena),
+    "robot.toml": (lambda: packaged("families/scribbler/robots/scribbler-s2.toml"), load_robot),
+    "arena.toml": (lambda: packaged("world/arenas/light.toml"), load_arena),
     "twin.toml": (lambda: tomllib.loads(sample_twin("worn", 1).to_toml()), load_twin),
     "fit.toml": (calibration_file, read_calibration),
     "sim.toml": (calibration_file, lambda path: SimPlatform(robot=str(path))),

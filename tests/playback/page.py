@@ -39,7 +39,7 @@ PANEL = ("title", "svg", "camera", "clock", "problem", "robots", "has_time")
 
 def page_of(widget: Any, path: Path, width: int = 820, *, kind: str = "player") -> Path:
     """The page of a player or a panel, written to a file."""
-    files = resources.files("realitygap.playback")
+    files = resources.files("realitygap.playback" if kind == "player" else "realitygap.classroom")
     module = (
         files.joinpath(f"{kind}.js")
         .read_text("utf-8")

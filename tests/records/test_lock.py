@@ -106,7 +106,7 @@ def test_a_file_system_without_locks_gives_a_warning(tmp_path, monkeypatch):
         raise OSError(38, "Function not implemented")
 
     folder = make_folder(tmp_path / "r", 0)
-    monkeypatch.setattr(lock_module, "_lock", refuse)
+    monkeypatch.setattr(lock_module, "lock_descriptor", refuse)
     with pytest.warns(RecordWarning, match="cannot lock"):
         folder.publish("coverage", 0, make_rows(), HASH)
     assert folder.missing("coverage", 3) == []

@@ -6,7 +6,7 @@ import pytest
 import realitygap.classroom.myro as myro
 from realitygap.classroom.myro import MyroError, _joystick, initialize
 from realitygap.classroom.myro._robot import robot_or_none
-from tests.playback.test_panel import tell
+from tests.classroom.test_panel import tell
 
 NAMES = ["joyStick", "Joystick", "joystick", "gamepad"]
 

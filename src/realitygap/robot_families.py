@@ -22,7 +22,7 @@ from typing import Any, NamedTuple, cast
 from realitygap.errors import RobotError
 
 GROUP = "realitygap.robots"
-"""Group of entry points by which packages add families: the name of a family, and its `RobotFamily`."""
+"""Group of entry points by which packages add families. An entry point has a family's name, and its `RobotFamily`."""
 
 
 class Reading(NamedTuple):

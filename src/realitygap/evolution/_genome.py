@@ -364,7 +364,11 @@ class GenomeRecord(TypedDict):
     Attributes:
         hidden: Ids of the hidden nodes, ascending.
         biases: Biases of the outputs, then of the hidden nodes; empty if nodes have none.
-        innovation, source, target, weight, enabled: An entry for each connection gene.
+        innovation: Innovation number of each connection gene.
+        source: Id of the node where each connection begins.
+        target: Id of the node where each connection ends.
+        weight: Weight of each connection.
+        enabled: True for each connection that is used.
     """
 
     hidden: Sequence[int]

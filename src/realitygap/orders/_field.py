@@ -76,8 +76,9 @@ class Limits:
     """Limits of a number.
 
     Attributes:
-        low, high: Smallest and largest number; None if there is none.
-        low_is_allowed: False if the number has to be above `low`.
+        low: Smallest number; None if there is none.
+        high: Largest number; None if there is none.
+        low_is_allowed: False if the number has to be above the smallest one.
         is_whole: True if the number is a whole one.
     """
 

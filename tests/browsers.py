@@ -108,7 +108,7 @@ class Visitors:
             context.set_offline(False)
             self._free[kind].append(context)
         complaints, self.complaints = self.complaints, []
-        assert complaints == []
+        assert complaints == [], complaints
 
     def _context(self, **options: Any) -> Any:
         kind = repr(sorted(options.items()))

@@ -14,6 +14,7 @@ import pytest
 from realitygap.lab._strangers import MOST_BYTES, PATIENCE_S, Strangers, most_strangers
 
 from .conftest import RunningLab
+from .sheets import drive_paths
 
 DESCRIPTORS = 160
 
@@ -79,6 +80,27 @@ def test_connections_without_the_token_get_a_share_of_few_descriptors(monkeypatc
 def connect(lab: RunningLab) -> socket.socket:
     host, port = lab.address.removeprefix("http://").rstrip("/").split(":")
     return socket.create_connection((host, int(port)), timeout=60)
+
+
+@pytest.mark.slow
+def test_a_large_upload_with_the_token_is_taken_on_a_new_connection(tmp_path: Path):
+    """Its first bytes come at once, and are more than a connection without the token may send."""
+    lab = RunningLab(tmp_path / "studies")
+    lab.root.mkdir()
+    drive_paths(lab.root, steps=12)
+    lab.start()
+    n_bytes = 16 * MOST_BYTES
+    head = (
+        f"POST /photos/by-robot?sheet=1&name=a.jpg HTTP/1.1\r\nHost: {lab.address.split('/')[2]}\r\n"
+        f"Cookie: {lab.cookie['name']}={lab.token}\r\nContent-Length: {n_bytes}\r\n\r\n"
+    )
+    try:
+        for _ in range(20):
+            with connect(lab) as upload:
+                upload.sendall(head.encode() + bytes(n_bytes))
+                assert upload.recv(4096).startswith(b"HTTP/1.1 ")  # whatever it says of such a photo
+    finally:
+        lab.stop()
 
 
 @pytest.mark.slow

@@ -78,10 +78,14 @@ def guarded_protocol(strangers: Strangers) -> type[asyncio.Protocol]:
 
         def data_received(self, data: bytes) -> None:
             self.n_heard += len(data)
+            super().data_received(data)
             if self.n_heard > MOST_BYTES and self.transport in strangers:
+                # the first bytes of an upload may be more; the task that reads its token runs before this call
+                asyncio.get_running_loop().call_soon(self.drop_stranger)
+
+        def drop_stranger(self) -> None:
+            if self.transport in strangers:
                 strangers.drop(self.transport)
-            else:
-                super().data_received(data)
 
         def connection_lost(self, error: Exception | None) -> None:
             strangers.forget(self.transport)

@@ -11,7 +11,7 @@ import realitygap.emulator  # noqa: F401  # lets pyserial know emulator://
 from realitygap.errors import RobotError
 from realitygap.world import Pose
 
-from .wire import packet
+from ..families.scribbler.emulator.wire import packet
 
 
 def open_port(url="emulator://s2?fluke=2&speed=off", **given):

@@ -16,7 +16,7 @@ from realitygap.errors import RobotError
 from realitygap.families.scribbler.emulator import Emulator, Faults
 from realitygap.world import Pose
 
-from .wire import packet
+from ..families.scribbler.emulator.wire import packet
 
 
 def robot(**given):

@@ -13,7 +13,8 @@ from realitygap.families.scribbler import Scribbler
 from realitygap.robots import Command, RecordedRobot, Robot, export_mcap, read_recording
 from realitygap.testing import RobotContractError, check_robot
 
-from .peers import FakePort, FakeScribbler, Wire
+from ..families.scribbler.peers import FakePort, FakeScribbler
+from .ports import Wire
 
 
 def record(path: Path, n_steps: int = 3, wire: Wire | None = None) -> FakePort:

@@ -11,7 +11,7 @@ from realitygap.robots import Command, Observation
 from realitygap.testing import RobotContractError, check_robot
 from realitygap.world import load_arena
 
-from ..robots.peers import FakePort, FakeScribbler
+from ..families.scribbler.peers import FakePort, FakeScribbler
 
 
 @pytest.mark.parametrize("setup", ["s1", "s2", "s1+fluke1", "s2+fluke1", "s2+fluke2"])

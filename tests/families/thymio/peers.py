@@ -9,7 +9,7 @@ from realitygap.families.thymio import _messages as messages
 from realitygap.families.thymio._messages import Decoder, Kind, Message
 from realitygap.families.thymio._program import CHECK, DRIVE, OWN, TICK_S
 
-from ..peers import BufferPort, Wire
+from ...robots.ports import BufferPort, Wire
 
 VARIABLES = {
     "_id": 1,

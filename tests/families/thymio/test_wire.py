@@ -11,7 +11,7 @@ from realitygap.families.thymio._link import Description, Link
 from realitygap.families.thymio._messages import Kind, Message
 from realitygap.robots import Command
 
-from ..peers import BufferPort, Wire
+from ...robots.ports import BufferPort, Wire
 from .peers import EVENTS, FIRST_FREE, LEFT, OFFSETS, PROX, VARIABLES, FakePort, FakeThymio, text
 
 STILL = (0, 0)

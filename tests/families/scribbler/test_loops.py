@@ -53,7 +53,7 @@ def test_a_loop_of_senses_and_motors_is_one_write_a_command():
 
 
 def test_the_benchmark_measures_every_set_up_with_every_peer(monkeypatch):
-    path = Path(__file__).parents[2] / "benchmarks" / "robot_loops.py"
+    path = Path(__file__).parents[3] / "benchmarks" / "robot_loops.py"
     spec = importlib.util.spec_from_file_location("robot_loops", path)
     robot_loops = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(robot_loops)

@@ -1,4 +1,4 @@
-"""On a robot: pytest tests/robots --port /dev/rfcomm0. It drives some centimeters; put it on the floor."""
+"""On a robot: pytest tests/families/scribbler --port /dev/rfcomm0. It drives some centimeters; put it on the floor."""
 
 from __future__ import annotations
 

@@ -17,7 +17,8 @@ from realitygap.errors import ProtocolError, RobotError, RobotTimeout
 from realitygap.families.scribbler import Scribbler
 from realitygap.robots import Command
 
-from .peers import INFOS, FakePort, FakeScribbler, ScriptedPort, Wire, greeting, packet
+from ...robots.ports import Wire
+from .peers import INFOS, FakePort, FakeScribbler, ScriptedPort, greeting, packet
 
 SETUPS = ["s1", "s2", "s1+fluke1", "s2+fluke1", "s2+fluke2"]
 LEFT_RIGHT = (0.5, -0.25)

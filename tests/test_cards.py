@@ -13,7 +13,12 @@ from realitygap.evolution import NearestArchive, NoveltyArchive, NoveltySettings
 from realitygap.gap import GapResult, GapSide, Why
 from realitygap.records import ResultsFolder, Trial, TrialRecord
 from realitygap.stats import Estimate
-from realitygap.study import GapBetween, Strategist, TransferResult, load_study
+from realitygap.study import (
+    GapBetween,
+    TransferResult,
+    load_study,
+)
+from realitygap.study._transfer.result import Strategist
 from realitygap.trials import Trajectory
 from realitygap.world import Calibration
 from tests.drawing.test_card import HOSTILE, check_safe

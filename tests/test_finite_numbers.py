@@ -27,7 +27,12 @@ from realitygap.report import audit_distance
 from realitygap.robots import Command, Observation, VirtualClock, check_command, check_observation
 from realitygap.robots.twin import sample_twin
 from realitygap.runs import Condition, Evolution
-from realitygap.stats import controllers_for_margin, equivalence_power, median_interval, plan_margin
+from realitygap.stats import (
+    controllers_for_margin,
+    median_interval,
+    plan_margin,
+)
+from realitygap.stats._planning import equivalence_power
 from realitygap.study import parse_study
 from realitygap.tasks import WallTask
 from realitygap.trials import NoiseKey, TrialPlan, run_trial

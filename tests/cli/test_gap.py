@@ -9,7 +9,8 @@ import warnings
 import pytest
 
 from realitygap.cli import main
-from realitygap.gap import MEASURES, SHOWN
+from realitygap.gap import SHOWN
+from realitygap.gap._result import MEASURES
 from tests.cli.test_commands import realitygap
 
 pytestmark = pytest.mark.slow

@@ -21,7 +21,6 @@ from realitygap.records import (
     write_observations,
 )
 from realitygap.study import (
-    calibrate_from,
     drive_study,
     gap_between,
     observations_head,
@@ -31,6 +30,7 @@ from realitygap.study import (
     sample_controllers,
     trial_of_file,
 )
+from realitygap.study._calibrate.one import calibrate_from
 from realitygap.testing import Film, FilmedCamera, path_through, save_film
 from realitygap.trials import TrialPlan
 from realitygap.vision import Lens, Track, fit_lens, read_lens

@@ -10,14 +10,13 @@ import pytest
 
 from realitygap.errors import RecordError
 from realitygap.evolution import (
-    ConnectionGene,
     Genome,
     NeatSettings,
-    NodeGene,
     Population,
     decode_all,
     genome_from_record,
 )
+from realitygap.evolution._genome import ConnectionGene, NodeGene
 from realitygap.kernels.neat.network import activate
 from tests.kernels.genome_arrays import from_arrays
 from tests.reference.effort import cases

@@ -27,11 +27,11 @@ from realitygap.study import (
     open_target,
     parse_study,
     sample_controllers,
-    study_gap,
     transfer,
     try_on,
     with_ruled_end,
 )
+from realitygap.study._gap.study import study_gap
 from realitygap.trials import Operator, SheetObserver, Target, TrialPlan
 from realitygap.world import Arena, paper_arena
 

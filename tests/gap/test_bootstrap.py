@@ -3,7 +3,12 @@
 import numpy as np
 import pytest
 
-from realitygap.gap import GapSide, bootstrap, mean_difference, shrunk_means
+from realitygap.gap import (
+    GapSide,
+    bootstrap,
+)
+from realitygap.gap._level import mean_difference
+from realitygap.gap._resampling import shrunk_means
 from realitygap.stats import percentile_interval
 
 pytestmark = pytest.mark.slow

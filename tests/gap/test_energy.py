@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from realitygap.gap import energy_distances, energy_test, smallest_energy_p
+from realitygap.gap._behavior import energy_distances, energy_test, smallest_energy_p
 
 
 def by_hand(one, other):

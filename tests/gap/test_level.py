@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from realitygap.gap import mean_difference, rms_of, shares_above, square_differences
+from realitygap.gap import square_differences
+from realitygap.gap._level import mean_difference, rms_of, shares_above
 
 
 def test_level_is_the_mean_of_differences_of_means_target_less_source():

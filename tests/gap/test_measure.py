@@ -5,7 +5,11 @@ import json
 import numpy as np
 import pytest
 
-from realitygap.gap import MEASURES, GapSide, measure_gap
+from realitygap.gap import (
+    GapSide,
+    measure_gap,
+)
+from realitygap.gap._result import MEASURES
 
 
 def sides(c=12, r=8, gap=0.0, spread=0.0, noise=0.06, seed=1, cells=True):

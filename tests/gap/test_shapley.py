@@ -5,7 +5,8 @@ import itertools
 import numpy as np
 import pytest
 
-from realitygap.gap import coalitions, shapley_values
+from realitygap.gap import coalitions
+from realitygap.gap._why import shapley_values
 
 
 def by_orders(worth, n):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from realitygap.lab._gap_plan import NOISE, SPREAD, plan_words
-from realitygap.study import pilot_spreads
+from realitygap.study._gap.plan import pilot_spreads
 
 
 @pytest.mark.slow

@@ -21,7 +21,12 @@ from realitygap.families.thymio.playground._playground import why_not
 from realitygap.platforms import SimPlatform, open_target, platform_of
 from realitygap.records import Ledger
 from realitygap.robots import open_on
-from realitygap.study import calibrate, connect_robot, drive_study, load_study
+from realitygap.study import (
+    calibrate,
+    drive_study,
+    load_study,
+)
+from realitygap.study._robot import connect_robot
 from realitygap.trials import TrialPlan
 from realitygap.world import Arena, Obstacle, Pose, paper_arena
 from tests.commands import run_command

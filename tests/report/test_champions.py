@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from realitygap.platforms import trace_genome
-from realitygap.report import retry_champions
-from realitygap.report._champions import FRESH_TRIALS
+from realitygap.report._champions import FRESH_TRIALS, retry_champions
 from realitygap.runs import Condition, genome_of, replay
 from realitygap.trials import NoiseKey
 from tests.report.results import describe, random_runs, settings, write_results

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from realitygap.playback import measure_divergence, own_divergence
-from realitygap.report import compare_trials, draw_divergence
+from realitygap.report import compare_trials
+from realitygap.report._divergence_figure import draw_divergence
 from realitygap.report._tally import read_tally
 from realitygap.report._trial_figure import choose_trial
 from realitygap.robots.twin import sample_twin

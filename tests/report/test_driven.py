@@ -14,10 +14,10 @@ from realitygap.report import (
     draw_paths,
     draw_trial,
     measure_agreement,
-    retry_champions,
     summarize,
     write_report,
 )
+from realitygap.report._champions import retry_champions
 from realitygap.study import run_study
 from tests.study.physical import Unattended, drive, small_study
 

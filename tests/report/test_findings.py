@@ -11,13 +11,12 @@ import pytest
 
 from realitygap._wording import Basis
 from realitygap.report import (
-    Champions,
-    compare_champions,
     compare_conditions,
-    retry_champions,
     summarize_tasks,
     write_report,
 )
+from realitygap.report._champions import Champions, retry_champions
+from realitygap.report._comparisons import compare_champions
 from realitygap.report._findings import find, leading_conditions
 from realitygap.report._tally import read_tally
 from realitygap.study import load_study, run_study

@@ -10,13 +10,10 @@ import pytest
 from realitygap.errors import RecordError
 from realitygap.gap import Why
 from realitygap.report import (
-    draw_gap_maps,
-    draw_gap_pairs,
-    draw_gap_replay,
-    draw_gap_why,
     refuse_gap_page,
     write_gap_report,
 )
+from realitygap.report._gap_figures import draw_gap_maps, draw_gap_pairs, draw_gap_replay, draw_gap_why
 from realitygap.stats import Estimate
 from realitygap.study import GapBetween, gap_between
 

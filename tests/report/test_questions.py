@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from realitygap.evolution import sorted_cells_distance
-from realitygap.report import chance_of_best, measure_variety
+from realitygap.report import measure_variety
 from realitygap.report._questions import (
     MOST_BEHAVIORS,
+    chance_of_best,
     chances,
     mean_jaccard_distance,
     mean_sorted_distance,

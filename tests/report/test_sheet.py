@@ -9,8 +9,14 @@ import pytest
 from matplotlib.axes import Axes
 from matplotlib.transforms import Bbox
 
-from realitygap.report import NARROW, WIDE, draw_choices, draw_coverage, draw_paths, draw_species
-from realitygap.report.charts.house import house_style
+from realitygap.report import (
+    NARROW,
+    draw_choices,
+    draw_coverage,
+    draw_paths,
+    draw_species,
+)
+from realitygap.report.charts.house import WIDE, house_style
 from realitygap.report.charts.lines import head, line_key, spread, write
 from realitygap.report.charts.rows import stacked
 from realitygap.report.charts.sheet import Sheet, grid

@@ -4,7 +4,12 @@ import re
 
 import pytest
 
-from realitygap.report import compare_champions, compare_conditions, retry_champions, write_report
+from realitygap.report import (
+    compare_conditions,
+    write_report,
+)
+from realitygap.report._champions import retry_champions
+from realitygap.report._comparisons import compare_champions
 from realitygap.report._paper_audit import paper_audit_content
 from realitygap.report._statistics_section import statistics_content
 from realitygap.report._tally import read_tally

@@ -4,7 +4,8 @@ import polars as pl
 import pytest
 
 from realitygap.errors import RecordError
-from realitygap.report import SUMMARY_SCHEMA, summarize
+from realitygap.report import summarize
+from realitygap.report._summary import SUMMARY_SCHEMA
 from realitygap.stats import median_interval, quartiles
 from tests.report.results import describe, random_runs, write_results
 

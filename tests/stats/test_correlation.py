@@ -6,7 +6,11 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from realitygap.stats import attenuated, rank_correlation, spearman
+from realitygap.stats import (
+    rank_correlation,
+    spearman,
+)
+from realitygap.stats._correlation import attenuated
 
 
 def test_spearman_is_that_of_scipy_with_ties():

@@ -3,7 +3,11 @@
 import numpy as np
 import pytest
 
-from realitygap.stats import controllers_for_margin, equivalence_power, prove_equivalence
+from realitygap.stats import (
+    controllers_for_margin,
+    prove_equivalence,
+)
+from realitygap.stats._planning import equivalence_power
 
 
 def test_equivalence_is_shown_where_the_interval_lies_within_the_margin():

@@ -8,7 +8,6 @@ from scipy import stats
 
 from realitygap.gap import GapSide, measure_gap
 from realitygap.stats import (
-    attenuated,
     check_plan,
     detectable_difference,
     plan_correlation,
@@ -17,6 +16,7 @@ from realitygap.stats import (
     spread_of_differences,
     trial_reliability,
 )
+from realitygap.stats._correlation import attenuated
 
 pytestmark = pytest.mark.slow
 

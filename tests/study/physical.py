@@ -7,7 +7,12 @@ from pathlib import Path
 from typing import Any
 
 from realitygap.records import LEDGER_NAME, Ledger
-from realitygap.study import PhysicalResult, Study, drive_study, parse_study
+from realitygap.study import (
+    Study,
+    drive_study,
+    parse_study,
+)
+from realitygap.study._physical import PhysicalResult
 from realitygap.trials import Operator, WitnessObserver
 from tests.trials.fake_robot import FakeRobot
 

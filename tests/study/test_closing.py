@@ -14,8 +14,14 @@ from realitygap.errors import RecordError
 from realitygap.families.thymio import build_enki
 from realitygap.platforms import SimPlatform, SimTarget
 from realitygap.report import goal_table, write_closing_page
-from realitygap.study import PLANS, SMALL, ClosingPlan, choose_condition, closing_the_gap, summarize_closing
-from realitygap.study._closing.plan import adopt_plan
+from realitygap.study import (
+    PLANS,
+    ClosingPlan,
+    choose_condition,
+    closing_the_gap,
+    summarize_closing,
+)
+from realitygap.study._closing.plan import SMALL, adopt_plan
 from realitygap.study._closing.summary import is_met, pooled_fall
 from realitygap.study._closing.twin import ClosingTwin, held_out
 from realitygap.trials import TrialPlan

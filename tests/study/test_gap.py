@@ -10,18 +10,16 @@ from realitygap.gap import GapSide
 from realitygap.platforms import SimPlatform, SimTarget
 from realitygap.records import EndReason, read_observations
 from realitygap.study import (
-    PARTS,
-    Controller,
     gap_between,
     open_target,
-    part_of,
     recorded_spreads,
     sample_controllers,
-    study_gap,
     try_on,
-    why_gap,
 )
+from realitygap.study._controllers import Controller
 from realitygap.study._gap import between as study_gap_between
+from realitygap.study._gap.study import study_gap
+from realitygap.study._gap.why import PARTS, part_of, why_gap
 from realitygap.world import Calibration, paper_arena
 
 pytestmark = pytest.mark.slow

@@ -7,13 +7,12 @@ import pytest
 from realitygap.errors import StudyError
 from realitygap.study import (
     open_target,
-    pilot_spreads,
     plan_gap,
     recorded_spreads,
     sample_controllers,
-    study_gap,
 )
-from realitygap.study._gap.plan import Spreads
+from realitygap.study._gap.plan import Spreads, pilot_spreads
+from realitygap.study._gap.study import study_gap
 from realitygap.world import paper_arena
 
 pytestmark = pytest.mark.slow

@@ -25,8 +25,8 @@ from realitygap.report import (
     draw_individuals,
     draw_paths,
     draw_trial,
-    retry_champions,
 )
+from realitygap.report._champions import retry_champions
 from realitygap.runs import Condition, replay
 from realitygap.study import choose_condition, parse_study, run_study, sample_controllers
 

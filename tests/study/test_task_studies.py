@@ -10,7 +10,8 @@ import polars as pl
 import pytest
 
 from realitygap.cli._study import print_result
-from realitygap.report import TASK_SCHEMA, summarize_tasks
+from realitygap.report import summarize_tasks
+from realitygap.report._task_summary import TASK_SCHEMA
 from realitygap.runs import Condition, replay, run_replicates
 from realitygap.study import load_study, run_study
 from realitygap.tasks import PythonTask

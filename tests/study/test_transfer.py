@@ -8,11 +8,14 @@ import pytest
 from realitygap.errors import DescriptionError, RealityGapError, RecordError, StudyError
 from realitygap.platforms import JyroPlatform, SimPlatform, SimTarget
 from realitygap.records import read_observations
-from realitygap.study import STRATEGIES, choose_condition, transfer
+from realitygap.study import (
+    choose_condition,
+    transfer,
+)
 from realitygap.study._transfer.calibrated import Calibrating, fitted_condition
 from realitygap.study._transfer.result import Transferred, estimate_mean, summarize_transfer
 from realitygap.study._transfer.simulated import evolve_champions
-from realitygap.study._transfer.strategies import CALIBRATE, TransferPlan, _Work
+from realitygap.study._transfer.strategies import CALIBRATE, STRATEGIES, TransferPlan, _Work
 from realitygap.study._transfer.transferability import distances, nsga2_order
 from realitygap.world import Calibration, load_calibration, load_robot, paper_arena
 

@@ -73,7 +73,7 @@ def test_score_observed_refuses_arenas_that_are_sampled_for_each_trial():
 
 
 def test_an_observed_trial_has_no_inputs_of_networks_and_says_so():
-    from realitygap.tasks import observed_trajectories
+    from realitygap.tasks._observed import observed_trajectories
 
     arena = load_arena("paper")
     seen = observed_trajectories(observed(arena), arena)

@@ -22,7 +22,11 @@ from realitygap.families.scribbler.emulator import Emulator
 from realitygap.records import TrialRecord, read_observations, trial_to_dict
 from realitygap.robots import Command
 from realitygap.robots.twin import sample_twin
-from realitygap.study import connect_robot, open_target, try_on
+from realitygap.study import (
+    open_target,
+    try_on,
+)
+from realitygap.study._robot import connect_robot
 from realitygap.trials import OnLost, Pulse, RobotTarget, TrialPlan, WitnessObserver
 from realitygap.trials._target_robot import PacedRobot
 from realitygap.world import Pose, load_arena, paper_arena

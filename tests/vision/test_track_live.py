@@ -9,7 +9,11 @@ import pytest
 from realitygap.errors import RobotError, StudyError, VisionError
 from realitygap.families.scribbler import ScribblerPlatform
 from realitygap.records import LEDGER_NAME, Ledger
-from realitygap.study import CameraObserver, connect_robot, drive_study
+from realitygap.study import (
+    CameraObserver,
+    drive_study,
+)
+from realitygap.study._robot import connect_robot
 from realitygap.testing import Film, FilmedCamera, path_through
 from realitygap.trials import Operator, RobotTarget, TrialPlan, WitnessObserver
 from realitygap.vision import LiveTrack, Marks, Track, Tracked

@@ -12,23 +12,13 @@ from ._distances import (
     pack_behaviors,
 )
 from ._export import to_networkx, to_onnx
-from ._genome import (
-    ConnectionGene,
-    Genome,
-    GenomeRecord,
-    Network,
-    NodeGene,
-    decode_all,
-    genome_from_record,
-    genome_record,
-)
+from ._genome import Genome, GenomeRecord, Network, decode_all, genome_from_record, genome_record
 from ._interface import (
     OUTPUTS,
     PAPER_INPUTS,
     WHEELS,
     Channels,
     ControllerInterface,
-    Sense,
     inputs_of_robot,
     listed,
     paper_interface,
@@ -55,7 +45,6 @@ __all__ = [
     "BehaviorDistance",
     "CellOrder",
     "Channels",
-    "ConnectionGene",
     "ControllerInterface",
     "Genome",
     "GenomeRecord",
@@ -63,12 +52,10 @@ __all__ = [
     "NearestArchive",
     "NeatSettings",
     "Network",
-    "NodeGene",
     "NoveltyArchive",
     "NoveltySettings",
     "PaperArchive",
     "Population",
-    "Sense",
     "archive_members",
     "behavior_distance",
     "decode_all",

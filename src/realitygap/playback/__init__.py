@@ -5,7 +5,7 @@ A `MovingTrial` is what a trial looks like whatever platform it was on; `in_moti
 
 from . import _card  # noqa: F401  # what notebooks show
 from ._divergence import Divergence, measure_divergence, own_divergence
-from ._live import Page, WatchedRobot
+from ._live import WatchedRobot
 from ._movie import WIDTH, save_movie
 from ._moving import MovingTrial, RobotShape, first_visits, in_motion, placed, ray_ends
 from ._player import pack_pen, pack_scene, pack_shape, pack_trials, play, widget_modules
@@ -15,7 +15,6 @@ __all__ = [
     "WIDTH",
     "Divergence",
     "MovingTrial",
-    "Page",
     "RobotShape",
     "TwinDrive",
     "WatchedRobot",

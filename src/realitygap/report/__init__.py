@@ -5,19 +5,10 @@ Only records are read; nothing here runs a study. Trials that are drawn are reco
 SVG with the caption that says what was drawn.
 """
 
-from realitygap.report._agreement import Agreement, measure_agreement
+from realitygap.report._agreement import measure_agreement
 from realitygap.report._archive_figure import draw_archive
-from realitygap.report._audit import (
-    Audit,
-    AuditedCondition,
-    AuditedPair,
-    AuditProgress,
-    DoubtfulValue,
-    audit_notes,
-    audit_results,
-)
-from realitygap.report._champions import Champions, retry_champions
-from realitygap.report._choices_figure import Choice, compare_choices, draw_choices
+from realitygap.report._audit import Audit, AuditProgress, audit_notes, audit_results
+from realitygap.report._choices_figure import compare_choices, draw_choices
 from realitygap.report._closing import (
     FAMILY_HEAD,
     GOAL_HEAD,
@@ -34,18 +25,12 @@ from realitygap.report._closing import (
     write_closing_page,
 )
 from realitygap.report._closing_figures import draw_closing
-from realitygap.report._comparisons import Comparison, compare_champions, compare_conditions
-from realitygap.report._distance_audit import (
-    Confound,
-    DistanceAudit,
-    audit_distance,
-    distance_notes,
-)
+from realitygap.report._comparisons import Comparison, compare_conditions
+from realitygap.report._distance_audit import DistanceAudit, audit_distance, distance_notes
 from realitygap.report._distance_figure import draw_distance, save_distance
-from realitygap.report._divergence_figure import Side, compare_trials, draw_divergence, save_divergence
-from realitygap.report._formats import check_ending, save_drawing, save_picture
+from realitygap.report._divergence_figure import compare_trials, save_divergence
+from realitygap.report._formats import check_ending, save_drawing
 from realitygap.report._frame_file import export_frame
-from realitygap.report._gap_figures import draw_gap_maps, draw_gap_pairs, draw_gap_replay, draw_gap_why
 from realitygap.report._gap_page import refuse_gap_page, write_gap_report
 from realitygap.report._generations_figure import draw_coverage, draw_scores
 from realitygap.report._individual_file import export_individual
@@ -54,18 +39,17 @@ from realitygap.report._lineage_figure import draw_lineage
 from realitygap.report._motion import Each, choose_moving, watch, write_movie
 from realitygap.report._networks_figure import draw_networks
 from realitygap.report._page import write_report
-from realitygap.report._paper_audit import Finding, audit_paper
+from realitygap.report._paper_audit import audit_paper
 from realitygap.report._path_figure import draw_paths
-from realitygap.report._questions import Variety, chance_of_best, measure_variety
+from realitygap.report._questions import measure_variety
 from realitygap.report._sensor_figure import save_sensor_figure
 from realitygap.report._show import Subject, save_arena, save_robot, save_twin, save_view
 from realitygap.report._species_figure import draw_species
-from realitygap.report._summary import SUMMARY_SCHEMA, summarize
+from realitygap.report._summary import summarize
 from realitygap.report._tally import Tally, read_tally
-from realitygap.report._task_summary import TASK_SCHEMA, summarize_tasks
-from realitygap.report._trial_figure import ChosenTrial, choose_trial, draw_trial
-from realitygap.report.charts.house import NARROW, WIDE, Drawing
-from realitygap.stats import interval_ranks, runs_for_a_claim, sign_flip_p, smallest_p
+from realitygap.report._task_summary import summarize_tasks
+from realitygap.report._trial_figure import choose_trial, draw_trial
+from realitygap.report.charts.house import NARROW, Drawing
 
 __all__ = [
     "FAMILY_HEAD",
@@ -73,39 +57,23 @@ __all__ = [
     "NARROW",
     "SELECTION_NOTE",
     "STRATEGY_HEAD",
-    "SUMMARY_SCHEMA",
-    "TASK_SCHEMA",
     "TWIN_HEAD",
     "WHY_HEAD",
-    "WIDE",
-    "Agreement",
     "Audit",
     "AuditProgress",
-    "AuditedCondition",
-    "AuditedPair",
-    "Champions",
-    "Choice",
-    "ChosenTrial",
     "Comparison",
-    "Confound",
     "DistanceAudit",
-    "DoubtfulValue",
     "Drawing",
     "Each",
-    "Finding",
-    "Side",
     "Subject",
     "Tally",
-    "Variety",
     "audit_distance",
     "audit_notes",
     "audit_paper",
     "audit_results",
-    "chance_of_best",
     "check_ending",
     "choose_moving",
     "choose_trial",
-    "compare_champions",
     "compare_choices",
     "compare_conditions",
     "compare_trials",
@@ -115,11 +83,6 @@ __all__ = [
     "draw_closing",
     "draw_coverage",
     "draw_distance",
-    "draw_divergence",
-    "draw_gap_maps",
-    "draw_gap_pairs",
-    "draw_gap_replay",
-    "draw_gap_why",
     "draw_individuals",
     "draw_lineage",
     "draw_networks",
@@ -131,25 +94,19 @@ __all__ = [
     "export_individual",
     "family_table",
     "goal_table",
-    "interval_ranks",
     "measure_agreement",
     "measure_variety",
     "not_counted",
     "read_tally",
     "refuse_gap_page",
-    "retry_champions",
-    "runs_for_a_claim",
     "save_arena",
     "save_distance",
     "save_divergence",
     "save_drawing",
-    "save_picture",
     "save_robot",
     "save_sensor_figure",
     "save_twin",
     "save_view",
-    "sign_flip_p",
-    "smallest_p",
     "strategy_table",
     "summarize",
     "summarize_tasks",

@@ -4,8 +4,8 @@ Arrays in, values out; nothing here reads a file or names a robot. SciPy supplie
 when the first is used.
 """
 
-from ._correlation import attenuated, rank_correlation, spearman
-from ._equivalence import Equivalence, prove_equivalence
+from ._correlation import rank_correlation, spearman
+from ._equivalence import prove_equivalence
 from ._estimate import CONFIDENCE, Ends, Estimate, Method
 from ._means import (
     SMALLEST_N,
@@ -33,7 +33,6 @@ from ._planning import (
     controllers_for_margin,
     detectable_difference,
     detectable_effect,
-    equivalence_power,
     plan_correlation,
     plan_effect,
     plan_margin,
@@ -95,7 +94,6 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     # rank correlation
     "rank_correlation",
     "spearman",
-    "attenuated",
     # resampling
     "bca_interval",
     "bca_intervals",
@@ -119,7 +117,6 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     "lattice",
     "ALPHA",
     "prove_equivalence",
-    "Equivalence",
     # planning
     "Needed",
     "check_plan",
@@ -130,7 +127,6 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     "detectable_effect",
     "runs_needed",
     "controllers_for_margin",
-    "equivalence_power",
     "spread_of_differences",
     "trial_reliability",
     "POWER",

@@ -7,30 +7,27 @@ from . import _cards  # noqa: F401  # what notebooks show
 from ._bench import measure_speed
 from ._calibrate.from_log import calibrate_from_log
 from ._calibrate.from_table import calibrate_from_table
-from ._calibrate.one import calibrate, calibrate_from, save_calibration
+from ._calibrate.one import calibrate, save_calibration
 from ._calibrate.ordered import make_calibration
 from ._calibrate.whole import calibrate_all
-from ._camera_observer import CameraObserver, Looking
+from ._camera_observer import CameraObserver
 from ._camera_spec import marks_of, read_camera, tag_of
-from ._closing.plan import NAME as CLOSING
-from ._closing.plan import PLANS, SMALL, ClosingPlan
+from ._closing.plan import PLANS, ClosingPlan
 from ._closing.study import ClosingProgress, closing_the_gap
 from ._closing.summary import summarize_closing
 from ._code import AllowCode, check_files, python_tasks, task_named
-from ._controllers import Controller, sample_controllers
+from ._controllers import sample_controllers
 from ._duration import estimate_seconds
 from ._file import DEFAULT_NEAT, SECTIONS, load_study, named_studies, parse_study, platform_sections
 from ._gap.between import GapBetween, gap_between
-from ._gap.plan import GapPlan, pilot_spreads, plan_gap, recorded_spreads
-from ._gap.study import MOST_CONTROLLERS, GapStudy, study_gap
-from ._gap.why import PARTS, part_of, why_gap
+from ._gap.plan import GapPlan, plan_gap, recorded_spreads
+from ._gap.study import MOST_CONTROLLERS, GapStudy
 from ._kept_target import StoppedByPerson
 from ._mazes import MAZE_SEEDS, measure_maze
-from ._physical import PhysicalResult, PhysicalStudy, physical_conditions
+from ._physical import physical_conditions
 from ._placing import parse_length, placing_words, with_ruled_end
 from ._problems import StudyFileError
 from ._realism import measure_realism
-from ._robot import connect_robot
 from ._run import Progress, StudyResult, check_has_robot, drive_study, machine_facts, run_study
 from ._study import ConditionNotes, ReportSection, Study, StudySection, TrialsSection
 from ._targets import observations_head
@@ -46,59 +43,45 @@ from ._tracked import (
     trial_of_ledger,
 )
 from ._transfer.ordered import run_transfer
-from ._transfer.result import Strategist, Transferred, TransferResult, estimate_mean
-from ._transfer.strategies import STRATEGIES, TransferPlan, choose_condition, transfer
+from ._transfer.result import TransferResult
+from ._transfer.strategies import choose_condition, transfer
 from ._trial_bags import export_trials
 from ._try_on import try_on
 
 __all__ = [
-    "CLOSING",
     "DEFAULT_NEAT",
     "MAZE_SEEDS",
     "MOST_CONTROLLERS",
-    "PARTS",
     "PLANS",
     "SECTIONS",
-    "SMALL",
-    "STRATEGIES",
     "AllowCode",
     "CameraObserver",
     "ClosingPlan",
     "ClosingProgress",
     "ConditionNotes",
-    "Controller",
     "GapBetween",
     "GapPlan",
     "GapStudy",
-    "Looking",
-    "PhysicalResult",
-    "PhysicalStudy",
     "Progress",
     "ReportSection",
     "StoppedByPerson",
-    "Strategist",
     "Study",
     "StudyFileError",
     "StudyResult",
     "StudySection",
     "TrackedTrial",
-    "TransferPlan",
     "TransferResult",
-    "Transferred",
     "TrialToTrack",
     "TrialsSection",
     "calibrate",
     "calibrate_all",
-    "calibrate_from",
     "calibrate_from_log",
     "calibrate_from_table",
     "check_files",
     "check_has_robot",
     "choose_condition",
     "closing_the_gap",
-    "connect_robot",
     "drive_study",
-    "estimate_mean",
     "estimate_seconds",
     "export_trials",
     "gap_between",
@@ -116,9 +99,7 @@ __all__ = [
     "open_target",
     "parse_length",
     "parse_study",
-    "part_of",
     "physical_conditions",
-    "pilot_spreads",
     "place_trial",
     "placing_words",
     "plan_gap",
@@ -131,7 +112,6 @@ __all__ = [
     "sample_controllers",
     "save_calibration",
     "score_tracked",
-    "study_gap",
     "study_template",
     "summarize_closing",
     "tag_of",
@@ -142,6 +122,5 @@ __all__ = [
     "trial_of_ledger",
     "try_on",
     "usable_processors",
-    "why_gap",
     "with_ruled_end",
 ]

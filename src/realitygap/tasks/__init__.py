@@ -3,7 +3,7 @@
 from ._allowed import is_allowed, remember_allowed, source_hash
 from ._coverage import CoverageTask
 from ._inputs import ControllerSettings
-from ._observed import observed_trajectories, score_observed
+from ._observed import score_observed
 from ._published import CLASSICAL_TASKS, MAZE_TASKS, ClassicalTask, MazeAgent, MazeTask
 from ._python import PYTHON, PythonTask, not_allowed, read_task_file
 from ._step_tasks import WALL_SIDES, AvoidTask, GoalTask, LightTask, WallTask, wall_outlines
@@ -32,7 +32,6 @@ __all__ = [
     "as_task",
     "is_allowed",
     "not_allowed",
-    "observed_trajectories",
     "read_task_file",
     "remember_allowed",
     "score_observed",

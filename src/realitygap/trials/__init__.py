@@ -20,36 +20,27 @@ from ._batch import (
 )
 from ._carry_out import carry_out_on_robot
 from ._draws import Draws
-from ._loop import (
-    Controller,
-    TrialInterrupted,
-    controller_of,
-    drive_trial,
-    run_trial,
-)
+from ._loop import TrialInterrupted, controller_of, drive_trial, run_trial
 from ._maze_scene import maze_exit, maze_rules, maze_scene
-from ._observer import Observer, PortObserver, RobotObserver
+from ._observer import PortObserver, RobotObserver
 from ._operator import Card, Led, Operator, Verdict, start_words
 from ._preflight import Preflight, preflight
 from ._processors import usable_processors
-from ._scene import SceneTrack, simulate_case, simulate_file
+from ._scene import simulate_case, simulate_file
 from ._sheet_observer import SheetObserver
 from ._target import RepeatableTarget, Target, TellTrial, TrialPlan, check_plans
-from ._target_robot import OnLost, PacedRobot, Pulse, RobotTarget
+from ._target_robot import OnLost, Pulse, RobotTarget
 from ._witness_observer import WitnessObserver, own_witness
 
 __all__ = [
     "MOST_TEAMS",
     "REAL",
     "Card",
-    "Controller",
     "Draws",
     "Led",
     "NoiseKey",
-    "Observer",
     "OnLost",
     "Operator",
-    "PacedRobot",
     "PlatformTrials",
     "PortObserver",
     "Preflight",
@@ -58,7 +49,6 @@ __all__ = [
     "ResultsRoom",
     "RobotObserver",
     "RobotTarget",
-    "SceneTrack",
     "SheetObserver",
     "Target",
     "TellTrial",

@@ -16,6 +16,21 @@ from typing import TYPE_CHECKING, Any
 from ._version import __version__
 
 if TYPE_CHECKING:
+    from . import emulator as emulator
+    from . import evolution as evolution
+    from . import gap as gap
+    from . import logs as logs
+    from . import platforms as platforms
+    from . import playback as playback
+    from . import records as records
+    from . import report as report
+    from . import robots as robots
+    from . import runs as runs
+    from . import study as study
+    from . import tasks as tasks
+    from . import trials as trials
+    from . import vision as vision
+    from . import world as world
     from .evolution import Genome, NearestArchive, NeatSettings, PaperArchive, Population
     from .records import ResultsFolder
     from .report import summarize, watch, write_movie, write_report

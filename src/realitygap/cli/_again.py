@@ -11,6 +11,8 @@ import typer
 from realitygap._terminal import echo
 from realitygap.orders import read_order
 
+from ._app import app_for
+
 
 def again(
     file: Annotated[
@@ -38,8 +40,6 @@ def again(
 
     In Python: realitygap.orders.read_order("gap.html")
     """
-    from ._app import app_for
-
     order = read_order(file)
     given = {option.partition("=")[0] for option in options or ()}
     words = [*order.words(leave_out=given), *(options or ())]

@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 
+import realitygap
 from realitygap._terminal import echo
 from realitygap.errors import StudyError
 
@@ -72,10 +73,6 @@ def arena(
 
     In Python: realitygap.vision.save_map(realitygap.world.load_arena("maze-hard"), "maze.yaml")
     """
-    from realitygap.records import write_whole
-    from realitygap.vision import arena_of_map, save_map
-    from realitygap.world import load_arena
-
     if out is None or out.suffix.lower() not in (".toml", *_YAML):
         raise StudyError("Name the file to write with -o: an arena file (.toml) or a map of ROS (.yaml).")
     if Path(source).resolve() == out.resolve():
@@ -90,16 +87,22 @@ def arena(
         raise StudyError(
             f"--resolution is only for a map of ROS (.yaml), but {out} is not one. Leave it out."
         )
-    found = arena_of_map(source, _pose(start), tolerance=tolerance) if is_map else load_arena(source)
+    found = (
+        realitygap.vision.arena_of_map(source, _pose(start), tolerance=tolerance)
+        if is_map
+        else realitygap.world.load_arena(source)
+    )
     if is_to_map:
-        image = save_map(found, out, **({} if resolution is None else {"resolution": resolution}))
+        image = realitygap.vision.save_map(
+            found, out, **({} if resolution is None else {"resolution": resolution})
+        )
         echo(f"Written: {out} and {image.name}")
         return
     try:
         text = found.to_toml()
     except ValueError as error:
         raise StudyError(str(error)) from None
-    write_whole(out, text.encode())
+    realitygap.records.write_whole(out, text.encode())
     x, y, heading = found.start
     echo(
         f"Written: {out} ({len(found.walls)} walls, start {x:.3g}, {y:.3g} m, {math.degrees(heading):.3g} degrees). "

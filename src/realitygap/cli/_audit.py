@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+import realitygap
 from realitygap._terminal import echo
 
 from ._json import print_json
@@ -39,12 +40,9 @@ def audit_results(
 
     In Python: realitygap.report.audit_results("examples/table-2.csv", denominator=72)
     """
-    from realitygap.report import audit_notes
-    from realitygap.report import audit_results as audit_table
-
-    audit = audit_table(table, denominator=denominator, tell=_tell)
+    audit = realitygap.report.audit_results(table, denominator=denominator, tell=_tell)
     if as_json:
-        print_json(audit.to_dict() | {"file": table, "notes": audit_notes(audit)})
+        print_json(audit.to_dict() | {"file": table, "notes": realitygap.report.audit_notes(audit)})
         return
     _print(audit, table)
 
@@ -57,7 +55,6 @@ def _tell(progress: AuditProgress) -> None:
 
 def _print(audit: Audit, path: Path) -> None:
     from realitygap._console import PlainConsole
-    from realitygap.report import audit_notes
 
     from ._audit_tables import conditions_table, doubtful_table, pairs_table
 
@@ -66,5 +63,5 @@ def _print(audit: Audit, path: Path) -> None:
     if audit.doubtful:
         console.print(doubtful_table(audit))
     console.print(pairs_table(audit))
-    for note in audit_notes(audit):
+    for note in realitygap.report.audit_notes(audit):
         echo(note)

@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 
 import typer
 
+import realitygap
 from realitygap._terminal import echo
 from realitygap.errors import RealityGapError
 
@@ -63,21 +64,18 @@ def audit_distance(
 
     In Python: realitygap.report.audit_distance("jaccard", "results/paper")
     """
-    from realitygap.report import audit_distance as audit_named
-    from realitygap.report import check_ending, distance_notes, save_distance
-
     try:
         if out is not None:
-            check_ending(out, (".pdf", ".png", ".svg"))
-        audit = audit_named(name, folder, seed=seed, sort=sort, straight=straight)
-        path = None if out is None else save_distance(audit, out)
+            realitygap.report.check_ending(out, (".pdf", ".png", ".svg"))
+        audit = realitygap.report.audit_distance(name, folder, seed=seed, sort=sort, straight=straight)
+        path = None if out is None else realitygap.report.save_distance(audit, out)
     except ValueError as error:
         raise RealityGapError(str(error)) from error
     if as_json:
-        print_json(audit.to_dict() | {"notes": distance_notes(audit), "file": path})
+        print_json(audit.to_dict() | {"notes": realitygap.report.distance_notes(audit), "file": path})
     else:
         width = min(shutil.get_terminal_size().columns, WIDEST)
-        for note in distance_notes(audit):
+        for note in realitygap.report.distance_notes(audit):
             echo(textwrap.fill(note, width, subsequent_indent="  ", break_on_hyphens=False))
         if path is not None:
             echo(f"Written: {path}")

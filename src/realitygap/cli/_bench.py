@@ -6,6 +6,7 @@ from typing import Annotated, Any
 
 import typer
 
+import realitygap
 from realitygap._limits import parse_toml
 from realitygap._terminal import echo
 from realitygap.errors import StudyError, did_you_mean
@@ -125,9 +126,8 @@ def bench(
 
 
 def _check_task(task: str) -> None:
-    from realitygap.tasks import CLASSICAL_TASKS, MAZE_TASKS
 
-    known = [*CLASSICAL_TASKS, *MAZE_TASKS, "realism"]
+    known = [*realitygap.tasks.CLASSICAL_TASKS, *realitygap.tasks.MAZE_TASKS, "realism"]
     if task not in known:
         near = did_you_mean(task, known)
         meant = f" {near}" if near.startswith("Did") else ""
@@ -159,13 +159,14 @@ def _changed_setting(text: str) -> tuple[str, Any]:
 def _bench_task(
     task: str, settings: str, seeds: int | None, seed: int, changes: dict[str, Any], *, as_json: bool
 ) -> None:
-    from realitygap.study import measure_task
 
     from ._progress import RunsBar
 
     seeds = DEFAULT_SEEDS if seeds is None else seeds
     with RunsBar(quiet=as_json) as bar:
-        figures = measure_task(task, settings, seeds=seeds, seed=seed, changes=changes, tell=bar.show)
+        figures = realitygap.study.measure_task(
+            task, settings, seeds=seeds, seed=seed, changes=changes, tell=bar.show
+        )
     if as_json:
         print_json(figures | {"seed": seed})
         return
@@ -194,15 +195,14 @@ def _bench_task(
 def _bench_maze(
     task: str, settings: str, seeds: int | None, seed: int, changes: dict[str, Any], *, as_json: bool
 ) -> None:
-    from realitygap.study import MAZE_SEEDS, measure_maze
 
     from ._progress import RunsBar
 
     with RunsBar(quiet=as_json) as bar:
-        figures = measure_maze(
+        figures = realitygap.study.measure_maze(
             task,
             settings,
-            seeds=MAZE_SEEDS if seeds is None else seeds,
+            seeds=realitygap.study.MAZE_SEEDS if seeds is None else seeds,
             seed=seed,
             changes=changes,
             tell=bar.show,
@@ -233,9 +233,8 @@ def _shown(key: str, value: float | None) -> str:
 
 
 def _bench_realism(seconds: float, *, as_json: bool) -> None:
-    from realitygap.study import measure_realism
 
-    figures = measure_realism(seconds)
+    figures = realitygap.study.measure_realism(seconds)
     if as_json:
         print_json(figures)
         return
@@ -252,9 +251,8 @@ def _bench_realism(seconds: float, *, as_json: bool) -> None:
 
 
 def _bench_speed(seconds: float, *, as_json: bool) -> None:
-    from realitygap.study import measure_speed
 
-    figures = measure_speed(seconds)
+    figures = realitygap.study.measure_speed(seconds)
     if as_json:
         print_json(figures)
         return

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+import realitygap
 from realitygap._terminal import draw, echo
 from realitygap.errors import StudyError
 from realitygap.orders import CalibrateOrder
@@ -40,16 +41,9 @@ def calibrate(
 ) -> None:
     """Calibrate, print the result, and draw the figure."""
     _check(order, camera, figure)
-    if order.data:
-        from realitygap.study import make_calibration
-
-        made = make_calibration(order)
-    else:
-        made = _measured(order, camera, quiet=as_json)
+    made = realitygap.study.make_calibration(order) if order.data else _measured(order, camera, quiet=as_json)
     if figure is not None:
-        from realitygap.report import save_sensor_figure
-
-        save_sensor_figure(made, figure)
+        realitygap.report.save_sensor_figure(made, figure)
     _print(made, order.out or Path(), figure, as_json=as_json)
 
 
@@ -65,33 +59,28 @@ def _check(order: CalibrateOrder, camera: str | None, figure: Path | None) -> No
         raise StudyError(
             f"There is no folder {figure.parent} for {figure.name}. Make it, or name another file."
         )
-    if order.data:
-        from realitygap.records import is_observations
-
-        if not all(path.exists() and is_observations(path) for path in order.data):
-            raise StudyError("--figure draws the readings of trials, but the data are a table. Leave it out.")
+    if order.data and not all(
+        path.exists() and realitygap.records.is_observations(path) for path in order.data
+    ):
+        raise StudyError("--figure draws the readings of trials, but the data are a table. Leave it out.")
 
 
 def _measured(order: CalibrateOrder, camera: str | None, *, quiet: bool) -> Calibration:
     """Drive the trials, and fit."""
-    from realitygap.platforms import class_of
-    from realitygap.study import make_calibration
-    from realitygap.world import load_arena, load_robot
-
     from ._calibration_operator import CalibrationOperator
     from ._sheet import sheet_observer
 
     robot = order.robot or ""
-    base = order.base or class_of(robot).base_robot
+    base = order.base or realitygap.platforms.class_of(robot).base_robot
     if order.observe is None and camera is not None:
         order = order.model_copy(update={"observe": "track"})
-    where, model = load_arena(order.arena), load_robot(base)
+    where, model = realitygap.world.load_arena(order.arena), realitygap.world.load_robot(base)
     is_led = _is_led(robot, order.witness)
     operator = CalibrationOperator(where, model) if is_led else None
     with _told_how_to_resume(order):
         sheet = sheet_observer(asks_for_start=False) if is_led else None
         with under_camera(camera, where, sheet) as observer:
-            return make_calibration(
+            return realitygap.study.make_calibration(
                 order,
                 observer=observer,
                 operator=operator,
@@ -102,11 +91,9 @@ def _measured(order: CalibrateOrder, camera: str | None, *, quiet: bool) -> Cali
 @contextlib.contextmanager
 def _told_how_to_resume(order: CalibrateOrder) -> Iterator[None]:
     """End the command with a message if the operator stops it."""
-    from realitygap.study import StoppedByPerson
-
     try:
         yield
-    except (StoppedByPerson, KeyboardInterrupt) as error:
+    except (realitygap.study.StoppedByPerson, KeyboardInterrupt) as error:
         is_interrupted = isinstance(error, KeyboardInterrupt)
         kept = "" if order.out is None else order.out.with_suffix(".trials.jsonl")
         again = f"Recorded trials are in {kept}. Run the same command to resume."
@@ -116,9 +103,7 @@ def _told_how_to_resume(order: CalibrateOrder) -> Iterator[None]:
 
 def _is_led(robot: str, witness: str | None) -> bool:
     """Return whether a person at the terminal has to place the robot."""
-    from realitygap.platforms import platform_of
-
-    return witness is None and platform_of(robot).needs_person
+    return witness is None and realitygap.platforms.platform_of(robot).needs_person
 
 
 def _tell(done: int, n: int) -> None:

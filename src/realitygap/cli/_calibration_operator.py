@@ -6,6 +6,7 @@ import sys
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+import realitygap
 from realitygap._terminal import echo
 from realitygap.errors import StudyError
 from realitygap.trials import Operator
@@ -46,9 +47,9 @@ class CalibrationOperator(Operator):
 
     def lead(self, plan: TrialPlan, number: int, n: int) -> Led:
         """Print the place of the robot, and wait for Enter."""
-        from realitygap.study import placing_words
-
-        self._say(f"\nTrial {number + 1} of {n}: {placing_words(plan, self._arena, self._robot)}")
+        self._say(
+            f"\nTrial {number + 1} of {n}: {realitygap.study.placing_words(plan, self._arena, self._robot)}"
+        )
         while True:
             answer = self._ask(_KEYS).lower()
             if not answer:
@@ -65,8 +66,6 @@ class CalibrationOperator(Operator):
 
     def measure(self, plan: TrialPlan, trial: TrialRecord) -> TrialRecord | None:
         """Ask for the end of a path, unless an observer recorded it. None repeats the trial."""
-        from realitygap.study import with_ruled_end
-
         if plan.purpose == "sensors":
             means = "  ".join(f"{value:.2f}" for value in trial.readings.mean(axis=0))
             self._say(f"{len(trial.readings)} readings, on average {means}")
@@ -81,17 +80,15 @@ class CalibrationOperator(Operator):
         if None in answers:
             return None
         ahead, left, turned = (float(answer or 0.0) for answer in answers)
-        return with_ruled_end(trial, ahead, left, turned)
+        return realitygap.study.with_ruled_end(trial, ahead, left, turned)
 
     def _number(self, question: str) -> float | None:
         """Return the measured number; None has the trial driven again."""
-        from realitygap.study import parse_length
-
         while True:
             answer = self._ask(f"{question}(r: drive it again) ").lower()
             if answer in ("r", "redo"):
                 return None
-            value = parse_length(answer)
+            value = realitygap.study.parse_length(answer)
             if value is not None:
                 return value
             self._say(f"{answer!r} is not a number. Expected, for example, 13.75, 13 3/4, or -2.")

@@ -6,6 +6,7 @@ import contextlib
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+import realitygap
 from realitygap._terminal import echo
 from realitygap.errors import StudyError
 
@@ -43,12 +44,10 @@ def under_camera(
             "--camera is only for a robot that an operator places at its start. Simulators, twins, and "
             "emulators report their poses."
         )
-    from realitygap.study import CameraObserver
-    from realitygap.vision import CameraDevice, LiveTrack
 
     number, marks = parse_camera(spec, arena)
-    with LiveTrack(CameraDevice(number), marks) as live:
-        yield CameraObserver(live, arena, observer)
+    with realitygap.vision.LiveTrack(realitygap.vision.CameraDevice(number), marks) as live:
+        yield realitygap.study.CameraObserver(live, arena, observer)
 
 
 @contextlib.contextmanager
@@ -71,13 +70,13 @@ def operated_under_camera(spec: str | None, study: Study, operator: Operator) ->
         raise StudyError(
             "--camera is only for a robot on the floor. Leave it out: an emulator's witness observes its path."
         )
-    from realitygap.study import CameraObserver, physical_conditions
-    from realitygap.vision import CameraDevice, LiveTrack
 
-    arena = physical_conditions(study)[0].arena.arena()
+    arena = realitygap.study.physical_conditions(study)[0].arena.arena()
     number, marks = parse_camera(spec, arena)
-    with LiveTrack(CameraDevice(number), marks) as live:
-        operator.observer = CameraObserver(live, arena, say=lambda text: echo(text, err=True))
+    with realitygap.vision.LiveTrack(realitygap.vision.CameraDevice(number), marks) as live:
+        operator.observer = realitygap.study.CameraObserver(
+            live, arena, say=lambda text: echo(text, err=True)
+        )
         yield operator
 
 
@@ -87,9 +86,7 @@ def parse_camera(spec: str, arena: Arena) -> tuple[int, Marks]:
     Raises:
         StudyError: Something in it cannot be.
     """
-    from realitygap.study import read_camera
-
-    number, marks = read_camera(spec, arena)
+    number, marks = realitygap.study.read_camera(spec, arena)
     if not number.isdecimal():
         raise StudyError(
             f"--camera is {spec!r}, expected a camera's number such as 0, or 0?tag=10&tag-height=0.1."

@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+import realitygap
 from realitygap._terminal import echo
 from realitygap.errors import StudyError, did_you_mean
 
+from ._browser import show_page
 from ._json import print_json
 
 if TYPE_CHECKING:
@@ -103,13 +105,11 @@ def _plan(
     Raises:
         StudyError: A plan, family, budget or observation that there is not.
     """
-    from realitygap.records import CALIBRATES
     from realitygap.robots.twin import FAMILIES
-    from realitygap.study import PLANS
 
-    if name not in PLANS:
-        raise StudyError(f"--plan: unknown {name!r}. {did_you_mean(name, PLANS)}")
-    base = PLANS[name][1 if small else 0]
+    if name not in realitygap.study.PLANS:
+        raise StudyError(f"--plan: unknown {name!r}. {did_you_mean(name, realitygap.study.PLANS)}")
+    base = realitygap.study.PLANS[name][1 if small else 0]
     changes: dict[str, Any] = {}
     if twins is not None:
         changes["twins"] = twins
@@ -118,7 +118,7 @@ def _plan(
     if families is not None:
         changes["families"] = _listed(families, "--families", base.platforms or FAMILIES)
     if observe is not None:
-        changes["observations"] = _listed(observe, "--observe", CALIBRATES)
+        changes["observations"] = _listed(observe, "--observe", realitygap.records.CALIBRATES)
     if budgets is not None:
         try:
             numbers = sorted({0, *(int(word) for word in budgets.split(","))})
@@ -132,9 +132,6 @@ def _plan(
 
 def _run(plan: ClosingPlan, folder: Path, processes: int | None, *, as_json: bool, open_page: bool) -> None:
     """Run the study, or what is missing of it, print its goals, and write its page."""
-    from realitygap.report import write_closing_page
-    from realitygap.study import closing_the_gap
-
     told = [0.0, -1]
 
     def tell(progress: ClosingProgress) -> None:
@@ -147,24 +144,21 @@ def _run(plan: ClosingPlan, folder: Path, processes: int | None, *, as_json: boo
             )
 
     try:
-        summary = closing_the_gap(folder, plan, processes=processes, tell=tell)
+        summary = realitygap.study.closing_the_gap(folder, plan, processes=processes, tell=tell)
     except KeyboardInterrupt:
         echo("Interrupted. Finished parts are saved. Run the same command to resume.", err=True)
         raise typer.Exit(130) from None
-    page = write_closing_page(summary, folder / "report.html")
+    page = realitygap.report.write_closing_page(summary, folder / "report.html")
     if as_json:
         print_json({**summary, "folder": folder, "report": page})
     else:
         _print(summary)
         echo(f"Results: {folder}   report: {page}")
     if open_page:
-        from ._browser import show_page
-
         show_page(page)
 
 
 def _print(summary: dict[str, Any]) -> None:
-    from realitygap.report import SELECTION_NOTE, goal_table, not_counted
 
     of, label = len(summary["twins"]), summary["label"]
     if summary["plan"]["platforms"]:
@@ -175,12 +169,12 @@ def _print(summary: dict[str, Any]) -> None:
             "standard errors"
         )
     echo(f"{'goal':52}{'wanted':>16}{'figure':>9}{'95 % interval':>18}{'n':>9}  verdict")
-    for name, wanted, figure, span, n, verdict in goal_table(summary):
+    for name, wanted, figure, span, n, verdict in realitygap.report.goal_table(summary):
         echo(f"{name:52}{wanted:>16}{figure:>9}{span:>18}{n:>9}  {verdict}")
-    for sentence in not_counted(summary):
+    for sentence in realitygap.report.not_counted(summary):
         echo(sentence)
     if not summary["plan"]["platforms"]:
-        echo(SELECTION_NOTE)
+        echo(realitygap.report.SELECTION_NOTE)
 
 
 def _listed(text: str, option: str, known: Any) -> tuple[str, ...]:

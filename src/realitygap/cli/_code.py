@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+import realitygap
 from realitygap._terminal import echo
 from realitygap.errors import TaskError
 
@@ -21,9 +22,7 @@ ALLOW_CODE_HELP = "Run the Python files of tasks without asking. The answer is n
 
 def _allow_platforms(wanted: bool) -> None:
     if wanted:
-        from realitygap.platforms import allow_code
-
-        allow_code()
+        realitygap.platforms.allow_code()
 
 
 AllowPlatforms = Annotated[
@@ -71,7 +70,6 @@ def _ask(task: PythonTask) -> None:
         TaskError: The file may not run.
     """
     from realitygap.settings import visible
-    from realitygap.tasks import remember_allowed
 
     # `splitlines` also splits at letters that do not end a line of Python.
     lines = task.source.removesuffix("\n").split("\n")
@@ -90,6 +88,6 @@ def _ask(task: PythonTask) -> None:
     if read_line().lower() not in ("y", "yes"):
         raise TaskError(f"{visible(task.file)} may not run. Nothing was run, and nothing was written.")
     try:
-        remember_allowed(task.sha256, task.file)
+        realitygap.tasks.remember_allowed(task.sha256, task.file)
     except (OSError, RuntimeError) as error:
         echo(f"realitygap: note: the answer cannot be saved: {error}.", err=True)

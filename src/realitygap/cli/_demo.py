@@ -14,6 +14,7 @@ from realitygap._terminal import echo
 from realitygap.errors import StudyError
 from realitygap.robot_families import default_family
 
+from ._app import app_for
 from ._browser import show_page
 
 _FAMILY = default_family()
@@ -112,7 +113,5 @@ def _run(words: list[str]) -> None:
     Raises:
         KeyboardInterrupt: Ctrl-C ended the command.
     """
-    from ._app import app_for
-
     if app_for(words)(words, prog_name="realitygap", standalone_mode=False):
         raise KeyboardInterrupt

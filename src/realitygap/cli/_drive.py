@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+import realitygap
 from realitygap._terminal import echo
 from realitygap.robot_families import ports_by_family
 
@@ -88,16 +89,14 @@ def drive(
 
     In Python: realitygap.drive_study("paper-robot", "/dev/rfcomm0", operator=operator)
     """
-    from realitygap.study import check_has_robot, drive_study, load_study
-
     answers = Answers(who, in_flight, score, wait=not no_wait, despite_preflight=despite_preflight)
-    resolved = load_study(study, seed=seed, replicates=replicates, randomize=randomize)
-    check_has_robot(resolved)
+    resolved = realitygap.study.load_study(study, seed=seed, replicates=replicates, randomize=randomize)
+    realitygap.study.check_has_robot(resolved)
     path = out or Path("results") / resolved.about.name
     operator = choose_operator(port, witness, answers, path, quiet=as_json)
     try:
         with operated_under_camera(camera, resolved, operator) as looking:
-            result = drive_study(
+            result = realitygap.study.drive_study(
                 resolved, port, path, operator=looking, allow_code=code_permission(allow_code)
             )
     except KeyboardInterrupt:

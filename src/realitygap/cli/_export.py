@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
+import realitygap
 from realitygap._terminal import echo
 from realitygap.errors import RealityGapError, StudyError
 
@@ -78,13 +79,12 @@ def export(
     """
     if out is None:
         raise StudyError("No output file. Name one with -o, such as -o champion.json.")
-    from realitygap.report import export_frame, export_individual
 
     which = {"condition": condition, "replicate": replicate}
     numbers = {"generation": generation, "individual": individual, "format": format}
     try:
         if what in _FRAMES:
-            path = export_frame(
+            path = realitygap.report.export_frame(
                 _folder(what, name, numbers), cast("DerivedFrame", what), out, **cast("Any", which)
             )
         elif name is not None:
@@ -92,7 +92,7 @@ def export(
                 f"Cannot export {what!r} of {name!r}. Expected species, innovations or lineage first, or only a folder."
             )
         else:
-            path = export_individual(what, out, **cast("Any", which | numbers))
+            path = realitygap.report.export_individual(what, out, **cast("Any", which | numbers))
     except ValueError as error:
         raise RealityGapError(str(error)) from error
     echo(f"Written: {path}")

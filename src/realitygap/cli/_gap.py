@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+import realitygap
 from realitygap._terminal import echo
 from realitygap._wording import bracketed, counted, p_equation, reproduces
 from realitygap.errors import StudyError
@@ -41,23 +42,22 @@ def gap(
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
     """Measure the gap, print the result, and write the page."""
-    from realitygap.study import gap_between
-    from realitygap.world import load_arena
-
     if report is not None:
-        from realitygap.report import refuse_gap_page
-
-        refuse_gap_page(report)
+        realitygap.report.refuse_gap_page(report)
     from ._progress import TrialsBar
 
     try:
         with (
             TrialsBar(quiet=as_json) as bar,
             under_camera(
-                camera, load_arena(order.arena or "paper"), attending_observer(order.target, order.witness)
+                camera,
+                realitygap.world.load_arena(order.arena or "paper"),
+                attending_observer(order.target, order.witness),
             ) as observer,
         ):
-            found = gap_between(order, observer=observer, allow_code=allow_code, tell=bar.show, say=bar.say)
+            found = realitygap.study.gap_between(
+                order, observer=observer, allow_code=allow_code, tell=bar.show, say=bar.say
+            )
     except KeyboardInterrupt:
         kept = (
             f"Finished trials are in {order.results}. Run the same command to resume."
@@ -68,9 +68,7 @@ def gap(
         raise typer.Exit(130) from None
     result = found.study.result
     if report is not None:
-        from realitygap.report import write_gap_report
-
-        write_gap_report(found, report)
+        realitygap.report.write_gap_report(found, report)
         echo(f"Written: {report}", err=True)
     if as_json:
         values: dict[str, Any] = result.to_dict() | {"order": order.record(), "report": report}
@@ -86,14 +84,13 @@ def gap(
 
 
 def _print(result: GapResult, replay: ReplayError | None) -> None:
-    from realitygap.gap import SHOWN
 
     one, other = result.trials
     echo(
         f"The transfer gap from {result.source} ({result.labels[0]}) to {result.target} ({result.labels[1]}): "
         f"{result.level.n} controllers, {one} and {other} trials each, {result.score}"
     )
-    for measure in SHOWN:
+    for measure in realitygap.gap.SHOWN:
         _print_row(measure.row, getattr(result, measure.name))
     if replay is not None:
         _print_row("replays off at their end [m]", replay.at_end)
@@ -179,8 +176,6 @@ def plan(
 
     In Python: realitygap.study.plan_gap("effect", 0.05)
     """
-    from realitygap.study import plan_gap, recorded_spreads, task_named
-
     asked = {"effect": effect, "margin": margin, "correlation": correlation}
     given = {name: value for name, value in asked.items() if value is not None}
     if len(given) != 1:
@@ -189,11 +184,11 @@ def plan(
             "--margin, and --correlation. For example: realitygap plan --effect 0.05"
         )
     ((question, value),) = given.items()
-    scored_by = task_named(task, allow_code=allow_code)
-    found = plan_gap(
+    scored_by = realitygap.study.task_named(task, allow_code=allow_code)
+    found = realitygap.study.plan_gap(
         question,  # type: ignore[arg-type]
         value,
-        spreads=None if data is None else recorded_spreads(str(data), scored_by),
+        spreads=None if data is None else realitygap.study.recorded_spreads(str(data), scored_by),
         task=scored_by,
         arena=arena,
         spread=spread,
@@ -252,12 +247,8 @@ def _print_plan(found: GapPlan, score: str, least: float, power: float) -> None:
             f"controllers with {found.best.trials} each."
         )
     else:
-        from realitygap.study import MOST_CONTROLLERS
-
-        echo(
-            f"`realitygap gap` takes at most {MOST_CONTROLLERS:,} controllers, fewer than each of these plans "
-            "needs."
-        )
+        most = realitygap.study.MOST_CONTROLLERS
+        echo(f"`realitygap gap` takes at most {most:,} controllers, fewer than each of these plans needs.")
     if found.question == "effect":
         echo(
             "The RMS gap and the noise ceiling need at least 2 trials each: noise and gap are not separable "

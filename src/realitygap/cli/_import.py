@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+import realitygap
 from realitygap._terminal import echo
 from realitygap.errors import LogError
 
@@ -112,13 +113,12 @@ def import_log(
 
 
 def _print(mapped: Sequence[MappedLog], out: Path, report: ImportReport) -> None:
-    from realitygap.logs import target_of
 
     log_map = mapped[0].log_map
     origins = dict.fromkeys(log.origin for log in mapped)
     trials = "1 trial" if report.n_trials == 1 else f"{report.n_trials:,} trials"
     seconds = report.n_steps * report.step_s
-    name = target_of([log.path for log in mapped])
+    name = realitygap.logs.target_of([log.path for log in mapped])
     echo(f"{name} ({log_map.label}): {trials}, {report.n_steps:,} steps, {seconds:.4g} s; {report.observe}")
     echo(f"Mapping: {', '.join(origins)}.")
     if any("guessed" in origin for origin in origins):

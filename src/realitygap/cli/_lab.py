@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -51,6 +52,4 @@ def lab(
 
 def _say(line: str) -> None:
     echo(line)
-    import sys
-
     sys.stdout.flush()

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import realitygap
 from realitygap._terminal import draw, echo
 from realitygap.errors import StudyError
 from realitygap.trials import Operator, WitnessObserver
@@ -79,15 +80,14 @@ def choose_operator(
         quiet: True if standard output has another purpose. Then questions go to standard error, and a witness's trials
             are not reported.
     """
-    from realitygap.records import LEDGER_NAME, Ledger
-    from realitygap.robots import is_in_this_program
-
-    if is_in_this_program(port) or witness is not None:
-        from realitygap.emulator import connect_witness
-
+    if realitygap.robots.is_in_this_program(port) or witness is not None:
         from ._telling import TellingOperator
 
-        remote = None if witness is None or is_in_this_program(port) else connect_witness(witness)
+        remote = (
+            None
+            if witness is None or realitygap.robots.is_in_this_program(port)
+            else realitygap.emulator.connect_witness(witness)
+        )
         kind = Operator if quiet else TellingOperator
         return kind(
             WitnessObserver(remote),
@@ -96,7 +96,7 @@ def choose_operator(
         )
 
     def note(text: str, who: str, trial: int | None) -> None:
-        with Ledger.open(folder / LEDGER_NAME) as ledger:
+        with realitygap.records.Ledger.open(folder / realitygap.records.LEDGER_NAME) as ledger:
             ledger.note(text, who, trial)
 
     return PersonOperator(answers, note, to_stderr=quiet)
@@ -241,11 +241,10 @@ class PersonOperator(Operator):
     # inside
 
     def _pick(self, card: Card) -> Score | None:
-        from realitygap.records import Score
 
         self._say(f"\nTrial {card.trial.trial}, {card.title}, pen: {card.pen}")
         cells = pick_cells(card.arena, write=lambda codes: draw(codes, err=self._to_stderr))
-        return None if cells is None else Score(cells, self._answers.name)
+        return None if cells is None else realitygap.records.Score(cells, self._answers.name)
 
     def _ask(self, prompt: str, option: str) -> str:
         """Return a line from the terminal.
@@ -274,8 +273,6 @@ def pick_cells(
 
 def sketch(arena: Arena) -> str:
     """Return the arena from above as text: walls, reachable cells, and the start as an arrow."""
-    from realitygap.trials import start_words
-
     grid, start = arena.grid, arena.start
     left, bottom = min(wall[0] for wall in arena.walls), min(wall[1] for wall in arena.walls)
     n_columns = round((max(wall[2] for wall in arena.walls) - left) / grid.cell)
@@ -294,5 +291,5 @@ def sketch(arena: Arena) -> str:
             text += f" {_ARROWS[way]} " if holds_start else " . " if is_reachable else "   "
         lines.append(f"|{text}|")
     lines.append(lines[0])
-    lines.append(f"Start ({_ARROWS[way]}): {start_words(arena)}")
+    lines.append(f"Start ({_ARROWS[way]}): {realitygap.trials.start_words(arena)}")
     return "\n".join(lines)

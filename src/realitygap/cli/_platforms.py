@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+import realitygap
 from realitygap._terminal import echo
 from realitygap.errors import StudyError
 
@@ -34,14 +35,11 @@ def platforms(
 
     In Python: realitygap.platforms.known_specs()
     """
-    from realitygap.platforms import platform_class, platform_names, platform_of
-
     if check is not None:
         from realitygap.testing import check_platform
-        from realitygap.world import load_arena
 
-        platform = platform_of(check)
-        check_platform(platform, load_arena(arena))
+        platform = realitygap.platforms.platform_of(check)
+        check_platform(platform, realitygap.world.load_arena(arena))
         if as_json:
             print_json({"platform": check, "keeps_contract": True, "robot_driven": not platform.is_physical})
             return
@@ -53,9 +51,9 @@ def platforms(
         echo(f"{check} keeps the contract of a platform.{only}")
         return
     models, problems = [], []
-    for name in platform_names():
+    for name in realitygap.platforms.platform_names():
         try:
-            models.append(platform_class(name))
+            models.append(realitygap.platforms.platform_class(name))
         except StudyError as error:
             problems.append(str(error))
     if as_json:

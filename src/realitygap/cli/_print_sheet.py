@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+import realitygap
 from realitygap._terminal import echo
 from realitygap.errors import RealityGapError
 
@@ -47,13 +48,10 @@ def print_sheet(
 
     In Python: realitygap.vision.sheet_pdf(layout, "a3")
     """
-    from realitygap.records import write_whole
-    from realitygap.vision import sheet_pdf, sheet_tiles
-
     layout = sheet_layout(arena, pens, study)
-    data = sheet_pdf(layout, paper)
-    write_whole(out, data)
-    n_pages = len(sheet_tiles(layout, paper))
+    data = realitygap.vision.sheet_pdf(layout, paper)
+    realitygap.records.write_whole(out, data)
+    n_pages = len(realitygap.vision.sheet_tiles(layout, paper))
     left, lower, right, upper = layout.paper
     pages = "1 page" if n_pages == 1 else f"{n_pages} pages"
     echo(
@@ -67,19 +65,16 @@ def sheet_layout(arena: str, pens: str | None, study: Path | None) -> SheetLayou
     Raises:
         RealityGapError: There is no such arena or study, a sheet does not fit, or the pens are no list.
     """
-    from realitygap.vision import PEN_NAMES, SheetLayout
-    from realitygap.world import load_arena
-
-    names = PEN_NAMES if pens is None else tuple(pen.strip() for pen in pens.split(","))
+    names = realitygap.vision.PEN_NAMES if pens is None else tuple(pen.strip() for pen in pens.split(","))
     if not all(names) or len(set(names)) < len(names):
         raise RealityGapError(f"--pens is {pens!r}, expected different names such as black,red,blue.")
     if study is None:
-        where = load_arena(arena)
+        where = realitygap.world.load_arena(arena)
     else:
         where, of_study = study_sheet(study)
         names = of_study if pens is None else names
     try:
-        return SheetLayout.of(where, names)
+        return realitygap.vision.SheetLayout.of(where, names)
     except ValueError as error:
         raise RealityGapError(f"{error}.") from error
 
@@ -90,14 +85,10 @@ def study_sheet(folder: Path, condition: str | None = None) -> tuple[Arena, tupl
     Raises:
         RealityGapError: The folder holds no results.
     """
-    from realitygap.records import ResultsFolder
-    from realitygap.runs import Condition
-    from realitygap.vision import PEN_NAMES
-
-    description = ResultsFolder.open(folder).description
-    pens = tuple((description.get("trials") or {}).get("pens") or PEN_NAMES)
+    description = realitygap.records.ResultsFolder.open(folder).description
+    pens = tuple((description.get("trials") or {}).get("pens") or realitygap.vision.PEN_NAMES)
     conditions = [
-        Condition.from_settings(each["name"], each["settings"])
+        realitygap.runs.Condition.from_settings(each["name"], each["settings"])
         for each in description["conditions"]
         if condition in (None, each["name"])
     ]

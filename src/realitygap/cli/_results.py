@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+import realitygap
 from realitygap._terminal import echo
 
 from ._browser import show_page
@@ -50,9 +51,8 @@ def written_report(
 ) -> Path:
     """Write a report; print its path and the seconds that it took."""
     started = time.perf_counter()
-    from realitygap.report import write_report
 
-    path = write_report(folder, out, figures=figures)
+    path = realitygap.report.write_report(folder, out, figures=figures)
     echo(f"Written: {path} ({time.perf_counter() - started:.1f} s)", err=to_stderr)
     return path
 
@@ -67,9 +67,7 @@ def digest(folder: Folder) -> None:
 
     In Python: realitygap.ResultsFolder.open("results/paper").digest()
     """
-    from realitygap.records import ResultsFolder
-
-    results = ResultsFolder.open(folder)
+    results = realitygap.records.ResultsFolder.open(folder)
     echo(results.digest())
     if results.missing_note is not None:
         echo(f"realitygap: note: {results.missing_note}", err=True)

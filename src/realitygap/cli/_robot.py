@@ -9,6 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
+import realitygap
 from realitygap._numbers import fixed
 from realitygap._terminal import echo
 from realitygap.errors import RobotError
@@ -54,10 +55,9 @@ def _opened(port: str, record: Path | None) -> Iterator[tuple[Any, Any]]:
         )
     if port.startswith("recording:"):
         raise RobotError(f"{port} is a recording: `realitygap robot show-recording` shows it.")
-    from realitygap.robots import open_on
 
     try:
-        terminal, robot = open_on(port, record)
+        terminal, robot = realitygap.robots.open_on(port, record)
         with robot as opened:
             yield terminal, opened
     except ValueError as error:
@@ -81,9 +81,7 @@ def list_ports(as_json: Json = False) -> None:
 
     In Python: realitygap.robots.list_ports()
     """
-    from realitygap.robots import list_ports as ports
-
-    found = ports()
+    found = realitygap.robots.list_ports()
     if as_json:
         print_json([guess._asdict() for guess in found])
     elif found:
@@ -142,13 +140,11 @@ def drive(
 
     In Python: realitygap.robots.open_on("/dev/rfcomm0")[1].drive(Command(0.5, 0.2))
     """
-    from realitygap.robots import Command
-
     if not 0 <= seconds <= LONGEST_DRIVE_S:
         raise RobotError(f"--seconds is {seconds:g}, expected 0 to {LONGEST_DRIVE_S:g}.")
     with _opened(port, record) as (_, opened):
         opened.step_s = seconds
-        opened.drive(Command(move, turn))
+        opened.drive(realitygap.robots.Command(move, turn))
         opened.stop()
         recoveries = opened.faults.recoveries if hasattr(opened, "faults") else 0
     echo(f"Drove {seconds:g} s with move {move:g} and turn {turn:g}, then stopped.")
@@ -247,9 +243,7 @@ def show_recording(
 
     In Python: realitygap.robots.read_recording("session.jsonl").table()
     """
-    from realitygap.robots import read_recording
-
-    recording = read_recording(file)
+    recording = realitygap.robots.read_recording(file)
     lines = [line for line in recording.lines if wire or line["kind"] != "wire"]
     if as_json:
         print_json({"header": recording.header, "lines": lines, "is_whole": recording.is_whole})
@@ -276,9 +270,7 @@ def export_recording(
 
     In Python: realitygap.robots.export_mcap("session.jsonl", "session.mcap")
     """
-    from realitygap.robots import export_mcap
-
-    echo(f"Written: {out} ({export_mcap(file, out)} messages)")
+    echo(f"Written: {out} ({realitygap.robots.export_mcap(file, out)} messages)")
 
 
 def _row(line: Any) -> tuple[str, str, str, str]:

@@ -10,10 +10,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+import realitygap
 from realitygap._terminal import echo, prompt
 from realitygap.errors import StudyError
 
 from ._json import print_json
+from ._print_sheet import sheet_layout, study_sheet
 
 if TYPE_CHECKING:
     from realitygap.records import Ledger, Score, ScoreRole, Trial
@@ -139,12 +141,10 @@ def score(
         raise StudyError(
             "--pens cannot be combined with --study, because the study names its pens. Leave it out."
         )
-    from realitygap.records import LEDGER_NAME, Ledger
-    from realitygap.vision import trials_on_sheet
 
     role: ScoreRole = "second" if second else "correction" if correct else "score"
-    with Ledger.open(study / LEDGER_NAME) as ledger:
-        on_sheet = trials_on_sheet(
+    with realitygap.records.Ledger.open(study / realitygap.records.LEDGER_NAME) as ledger:
+        on_sheet = realitygap.vision.trials_on_sheet(
             ledger, generation, condition=condition, replicate=run, sheet=sheet, role=role
         )
         _score_trials(
@@ -153,18 +153,14 @@ def score(
 
 
 def _only_show(photo: Path, arena: str, pens: str | None, overlay: Path | None, *, as_json: bool) -> None:
-    from realitygap.records import write_whole
-    from realitygap.vision import overlay_png, photo_bytes, photo_hash, read_photo, score_sheet
 
-    from ._print_sheet import sheet_layout
-
-    data = photo_bytes(photo)
-    found = score_sheet(read_photo(data), sheet_layout(arena, pens, None))
+    data = realitygap.vision.photo_bytes(photo)
+    found = realitygap.vision.score_sheet(realitygap.vision.read_photo(data), sheet_layout(arena, pens, None))
     if overlay is not None:
-        write_whole(overlay, overlay_png(found))
+        realitygap.records.write_whole(overlay, realitygap.vision.overlay_png(found))
     if as_json:
         rows = [_as_json(trace) for trace in found.traces]
-        print_json({"photo": photo_hash(data), "traces": rows, "overlay": overlay})
+        print_json({"photo": realitygap.vision.photo_hash(data), "traces": rows, "overlay": overlay})
         return
     for trace in found.traces:
         echo(f"{trace.pen + 1} {trace.name}: {_told(trace)}")
@@ -207,23 +203,24 @@ def _score_trials(
     yes: bool,
     as_json: bool,
 ) -> None:
-    from realitygap.records import write_whole
-    from realitygap.vision import SheetLayout, overlay_png, photo_bytes, read_photo, score_sheet
 
-    from ._print_sheet import study_sheet
     from ._trials import _Titles
 
     arena, pens = study_sheet(folder, on_sheet.waiting[0].condition)
     titles = _Titles(folder)
-    data = photo_bytes(photo)
-    found = score_sheet(read_photo(data), SheetLayout.of(arena, pens), on_sheet.pens)
+    data = realitygap.vision.photo_bytes(photo)
+    found = realitygap.vision.score_sheet(
+        realitygap.vision.read_photo(data), realitygap.vision.SheetLayout.of(arena, pens), on_sheet.pens
+    )
     traces = {trace.pen: trace for trace in found.traces}
     names = {
         trial.pen: f"{traces[trial.pen].name}, trial {trial.trial}, {trial.code if titles.blind else trial.name}"
         for trial in on_sheet.waiting
     }
     place = overlay or folder / f"sheet-{on_sheet.sheet}.png"
-    write_whole(place, overlay_png(found, names), within=folder if overlay is None else None)
+    realitygap.records.write_whole(
+        place, realitygap.vision.overlay_png(found, names), within=folder if overlay is None else None
+    )
     if not as_json:
         for trial in on_sheet.waiting:
             echo(f"{names[trial.pen]}: {_told(traces[trial.pen])}")
@@ -313,8 +310,8 @@ def _answer(trial: Trial, trace: TraceScore) -> str:
 
 
 def _score_of(trace: TraceScore, cells: tuple[int, ...], photo: Path, data: bytes, who: str) -> Score:
-    from realitygap.records import PhotoCount, Score
-    from realitygap.vision import photo_hash
 
-    count = PhotoCount(photo.name, photo_hash(data), trace.cells, trace.doubtful, is_confirmed=True)
-    return Score(cells, who, photo=count)
+    count = realitygap.records.PhotoCount(
+        photo.name, realitygap.vision.photo_hash(data), trace.cells, trace.doubtful, is_confirmed=True
+    )
+    return realitygap.records.Score(cells, who, photo=count)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
+import realitygap
 from realitygap._terminal import echo
 from realitygap.errors import RealityGapError, StudyError
 
@@ -134,7 +135,6 @@ def show(
     """
     if out is None:
         raise StudyError("No output file. Name one with -o, such as -o run.svg.")
-    from realitygap.report import save_arena, save_robot, save_view
 
     numbers: dict[str, Any] = {
         "condition": condition,
@@ -160,11 +160,13 @@ def show(
             _refuse(what, [f"--{key}" for key in numbers], *numbers.values())
             is_arena = what == "arena"
             path = (
-                save_arena(out, name or "paper", robot=robot) if is_arena else save_robot(out, name or "jyro")
+                realitygap.report.save_arena(out, name or "paper", robot=robot)
+                if is_arena
+                else realitygap.report.save_robot(out, name or "jyro")
             )
         else:
             subject, folder = _subject(what, name, out)
-            path = save_view(folder, out, subject=subject, **numbers)
+            path = realitygap.report.save_view(folder, out, subject=subject, **numbers)
     except ValueError as error:
         raise RealityGapError(str(error)) from error
     echo(f"Written: {path}")
@@ -194,14 +196,15 @@ def _movie(
     speed: float | None,
     numbers: dict[str, Any],
 ) -> Path:
-    from realitygap.report import write_movie
 
     if not names:
         raise StudyError(
             f"No results folder. Name one: realitygap show movie results/paper -o {shlex.quote(str(out))}"
         )
     chosen = cast("Each | None", each)
-    return write_movie(names, out, each=chosen, speed=1.0 if speed is None else speed, **numbers)
+    return realitygap.report.write_movie(
+        names, out, each=chosen, speed=1.0 if speed is None else speed, **numbers
+    )
 
 
 def _divergence(
@@ -211,14 +214,15 @@ def _divergence(
     repeats: int | None,
     numbers: dict[str, Any],
 ) -> Path:
-    from realitygap.report import save_divergence
 
     if name is None or against is None:
         raise StudyError(
             "No results folder, or no second condition or platform. For example: realitygap show divergence "
             f"results/paper --against novelty-10 -o {shlex.quote(str(out))}"
         )
-    return save_divergence(name, out, against=against, repeats=30 if repeats is None else repeats, **numbers)
+    return realitygap.report.save_divergence(
+        name, out, against=against, repeats=30 if repeats is None else repeats, **numbers
+    )
 
 
 def _one_name(what: str, names: list[str] | None) -> str | None:

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+import realitygap
 from realitygap._terminal import echo
 
 
@@ -29,9 +30,7 @@ def simulate(
 
     In Python: realitygap.trials.simulate_file(case, out)
     """
-    from realitygap.trials import simulate_file
-
-    described, track = simulate_file(case, out)
+    described, track = realitygap.trials.simulate_file(case, out)
     for i, robot in enumerate(described.robots):
         blocked = int(track.stalls[:, i].sum())
         echo(f"SIM jyro, {robot.name}: {described.steps} steps, {blocked} of them blocked.")

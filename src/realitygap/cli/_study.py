@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+import realitygap
 from realitygap._how_to_run import launcher
 from realitygap._terminal import echo
 from realitygap.errors import StudyError
@@ -100,7 +101,6 @@ def run(
     """
     if study == CLOSING:
         raise StudyError(f"{CLOSING} is a command: realitygap {CLOSING}")
-    from realitygap.study import load_study, run_study
 
     from ._progress import RunsBar
 
@@ -109,7 +109,7 @@ def run(
             "--threads and --cluster exclude each other. Set the number of threads of a worker when you start "
             "it: `dask worker --nthreads`, or `cores` in the settings of its jobs."
         )
-    resolved = load_study(study, seed=seed, replicates=replicates, randomize=randomize)
+    resolved = realitygap.study.load_study(study, seed=seed, replicates=replicates, randomize=randomize)
     if resolved.n_physical == len(resolved.conditions):
         raise StudyError(
             f"Every condition of study {resolved.about.name!r} is on a robot. Drive it: "
@@ -117,7 +117,7 @@ def run(
         )
     try:
         with RunsBar(quiet=as_json) as bar:
-            result = run_study(
+            result = realitygap.study.run_study(
                 resolved,
                 out,
                 threads=threads,
@@ -158,15 +158,13 @@ def new_study(
 
     In Python: realitygap.study.study_template("my-study")
     """
-    from realitygap.study import named_studies, study_template
-
     if path.suffix != ".toml":
         copy = f" To copy the study {path}: realitygap new-study my-study.toml --from {path}"
         raise StudyError(
             f"{path} does not end in .toml. Expected the name of a study file, such as my-study.toml."
-            + (copy if str(path) in named_studies() else "")
+            + (copy if str(path) in realitygap.study.named_studies() else "")
         )
-    text = study_template(_as_name(path.stem), source)
+    text = realitygap.study.study_template(_as_name(path.stem), source)
     try:
         with path.open("x", encoding="utf-8") as file:
             file.write(text)
@@ -186,15 +184,16 @@ def _as_name(stem: str) -> str:
 
 def print_result(result: StudyResult, *, as_json: bool) -> None:
     """Print the summary of a study, and how many runs are complete."""
-    from realitygap.report import summarize, summarize_tasks
-
     there = result.n_runs or (result.physical is not None and result.physical.n_complete)
     if not there:  # nothing to summarize yet
         if as_json:
             print_json({"folder": str(result.folder.path), **_physical_json(result)})
         _print_physical(result, to_stderr=as_json)
         return
-    summary, tasks = summarize(result.folder), summarize_tasks(result.folder)
+    summary, tasks = (
+        realitygap.report.summarize(result.folder),
+        realitygap.report.summarize_tasks(result.folder),
+    )
     if as_json:
         found = {
             "folder": str(result.folder.path),

@@ -5,6 +5,8 @@ from __future__ import annotations
 import sys
 from typing import TYPE_CHECKING
 
+import realitygap
+
 if TYPE_CHECKING:
     from realitygap.trials import PortObserver
 
@@ -15,9 +17,11 @@ def attending_observer(spec: str, witness: str | None) -> PortObserver | None:
     Raises:
         StudyError: There is no such platform.
     """
-    from realitygap.platforms import platform_of
-
-    if witness is not None or not sys.stdin.isatty() or not platform_of(spec).needs_person:
+    if (
+        witness is not None
+        or not sys.stdin.isatty()
+        or not realitygap.platforms.platform_of(spec).needs_person
+    ):
         return None
     from ._sheet import sheet_observer
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+import realitygap
 from realitygap._numbers import fixed
 from realitygap._terminal import echo
 from realitygap.errors import StudyError
@@ -155,23 +156,25 @@ def track(
 
     In Python: realitygap.vision.track_video(realitygap.vision.VideoFile(path), realitygap.vision.Marks(arena))
     """
-    from realitygap.study import note_of_track, tag_of
-    from realitygap.vision import open_source
-
     wanted = _wanted(study, trials, trial, into)
     if sheet and (corner_size is not None or corner_inset is not None):
         raise StudyError(
             "--sheet defines the positions of the corner tags. Leave --corner-size and --corner-inset out."
         )
-    marks = _marks(arena, wanted, tag_of(tag, tag_size, tag_height, tag_at), lens, corner_size, corner_inset)
+    marks = _marks(
+        arena,
+        wanted,
+        realitygap.study.tag_of(tag, tag_size, tag_height, tag_at),
+        lens,
+        corner_size,
+        corner_inset,
+    )
     _refuse_outputs(out, save_lens, overlay, into, camera)
-    source = open_source(camera)
+    source = realitygap.vision.open_source(camera)
     found = _tracked(source, marks, seconds)
     placed = None
     if wanted is not None:
-        from realitygap.study import place_trial
-
-        placed = place_trial(wanted, found.track, begins, who)
+        placed = realitygap.study.place_trial(wanted, found.track, begins, who)
     _write(found, marks, source, out, save_lens, overlay)
     if wanted is not None and placed is not None:
         _enter(
@@ -180,7 +183,7 @@ def track(
             study,
             trial or 0,
             into,
-            note_of_track(camera, found, placed),
+            realitygap.study.note_of_track(camera, found, placed),
             "second" if second else "score",
         )
     _print(found, placed, _Written(out, save_lens, overlay, into, study), as_json=as_json)
@@ -206,14 +209,12 @@ def print_tags(
 
     In Python: realitygap.vision.print_tags("tags.pdf")
     """
-    from realitygap.study import tag_of
-    from realitygap.vision import print_tags as write
-
     if out.suffix != ".pdf":
         raise StudyError(f"{out} does not end in .pdf. Expected a name such as tags.pdf.")
     _refuse_folder(out)
     try:
-        n = write(out, tag_of(tag, tag_size, 0.1, "0,0,0"), corner_size, paper)  # type: ignore[arg-type]
+        printed = realitygap.study.tag_of(tag, tag_size, 0.1, "0,0,0")
+        n = realitygap.vision.print_tags(out, printed, corner_size, paper)  # type: ignore[arg-type]
     except ValueError as error:
         raise StudyError(str(error)) from None
     echo(f"Written: {out} ({n} pages)")
@@ -240,19 +241,16 @@ def lens(
 
     In Python: realitygap.vision.fit_lens(images, 9, 6, 0.025)
     """
-    from realitygap.vision import fit_lens, open_source
-    from realitygap.vision import gray_of as gray
-
     columns, cross, rows = board.partition("x")
     if not (cross and columns.isdecimal() and rows.isdecimal()):
         raise StudyError(f"--board is {board!r}, expected inner corners across and down, such as 9x6.")
     _refuse_toml(out)
-    source = open_source(camera)
+    source = realitygap.vision.open_source(camera)
     taken = _for_seconds(source, seconds if camera.isdecimal() else None)
     few = max(1, round(source.rate / 3))
     try:
-        images = (gray(image) for k, (_, image) in enumerate(taken) if k % few == 0)
-        made = fit_lens(images, int(columns), int(rows), square)
+        images = (realitygap.vision.gray_of(image) for k, (_, image) in enumerate(taken) if k % few == 0)
+        made = realitygap.vision.fit_lens(images, int(columns), int(rows), square)
     except ValueError as error:
         raise StudyError(str(error)) from None
     finally:
@@ -282,11 +280,10 @@ def _wanted(
         return None
     if trials is not None and into is None:
         raise StudyError("No file for the trial with its poses. Name one with --into, such as tracked.jsonl.")
-    from realitygap.study import trial_of_file, trial_of_ledger
 
     if study is not None:
-        return trial_of_ledger(study, trial)
-    return trial_of_file(trials, trial)  # type: ignore[arg-type]
+        return realitygap.study.trial_of_ledger(study, trial)
+    return realitygap.study.trial_of_file(trials, trial)  # type: ignore[arg-type]
 
 
 def _marks(
@@ -297,15 +294,15 @@ def _marks(
     corner_size: float | None,
     corner_inset: float | None,
 ) -> Marks:
-    from realitygap.study import marks_of
-    from realitygap.world import load_arena
 
-    place = load_arena(arena or "paper") if wanted is None or arena is not None else wanted.arena
+    place = (
+        realitygap.world.load_arena(arena or "paper") if wanted is None or arena is not None else wanted.arena
+    )
     if wanted is not None and place.grid != wanted.arena.grid:
         raise StudyError(
             f"The trial was in arena {wanted.arena.name!r}, and --arena is another. Leave it out."
         )
-    return marks_of(place, tag, lens, corner_size, corner_inset)
+    return realitygap.study.marks_of(place, tag, lens, corner_size, corner_inset)
 
 
 def _refuse_outputs(
@@ -337,10 +334,9 @@ def _refuse_toml(path: Path) -> None:
 
 
 def _tracked(source: Source, marks: Marks, seconds: float | None) -> Tracked:
-    from realitygap.vision import Tracker
 
     try:
-        tracker = Tracker(marks.tag)
+        tracker = realitygap.vision.Tracker(marks.tag)
         try:
             for time, image in _for_seconds(source, seconds):
                 tracker.take(time, image)
@@ -376,15 +372,12 @@ def _write(
     if save_lens is not None:
         _save(save_lens, found.camera.lens.to_toml())
     if overlay is not None:
-        from realitygap.vision import save_overlay
-
-        save_overlay(overlay, source, found, marks.arena, source.rate)
+        realitygap.vision.save_overlay(overlay, source, found, marks.arena, source.rate)
 
 
 def _save(path: Path, text: str) -> None:
-    from realitygap.records import write_whole
 
-    write_whole(path, text.encode())
+    realitygap.records.write_whole(path, text.encode())
 
 
 def _enter(
@@ -396,13 +389,15 @@ def _enter(
     told: str,
     role: ScoreRole,
 ) -> None:
-    from realitygap.records import ObservationsFile
-    from realitygap.study import score_tracked
 
     with contextlib.ExitStack() as stack:  # a file that does not do is refused before the ledger is written
-        file = None if into is None else stack.enter_context(ObservationsFile(into, wanted.head))
+        file = (
+            None
+            if into is None
+            else stack.enter_context(realitygap.records.ObservationsFile(into, wanted.head))
+        )
         if study is not None:
-            score_tracked(study, trial, placed, told, role)
+            realitygap.study.score_tracked(study, trial, placed, told, role)
         if file is not None:
             file.append(placed.trial)
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+import realitygap
 from realitygap._terminal import echo
 from realitygap._wording import between
 from realitygap.orders import TransferOrder
@@ -27,10 +28,8 @@ def transfer(
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
     """Run the transfer, and print the result."""
-    from realitygap.study import run_transfer
-
     try:
-        result = run_transfer(
+        result = realitygap.study.run_transfer(
             order,
             observer=attending_observer(order.to, order.witness),
             allow_code=allow_code,

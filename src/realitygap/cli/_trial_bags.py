@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+import realitygap
 from realitygap._terminal import echo
 from realitygap.errors import StudyError
 
@@ -53,12 +54,9 @@ def export_trials(
 
     In Python: realitygap.study.export_trials("trials.jsonl", "drive.mcap")
     """
-    from realitygap.logs import WHEEL_DIAMETER_MM
-    from realitygap.study import export_trials as write
-
     if out is None:
         raise StudyError("Name the bag to write with -o: a file that ends in .mcap, or a new folder.")
-    diameter = WHEEL_DIAMETER_MM if wheel_diameter_mm is None else wheel_diameter_mm
-    for report in write(source, out, trial or (), wheel_diameter_mm=diameter):
+    diameter = realitygap.logs.WHEEL_DIAMETER_MM if wheel_diameter_mm is None else wheel_diameter_mm
+    for report in realitygap.study.export_trials(source, out, trial or (), wheel_diameter_mm=diameter):
         topics = ", ".join(f"{topic} {n}" for topic, n in report.n_messages.items())
         echo(f"Written: {report.bag} ({topics}); mapping: {report.mapping}")

@@ -9,12 +9,14 @@ from typing import Annotated
 
 import typer
 
+import realitygap
 from realitygap._terminal import echo
-from realitygap.errors import StudyError
+from realitygap.errors import StudyError, did_you_mean
 from realitygap.robot_families import port_platforms
 
 from ._code import AllowPlatforms
 from ._json import print_json
+from ._target import attending_observer
 
 
 def try_genome(
@@ -70,30 +72,27 @@ def try_genome(
 
     In Python: realitygap.study.try_on(target, realitygap.Genome.load("champion.json"), trials=20)
     """
-    from realitygap.errors import did_you_mean
-    from realitygap.evolution import OUTPUTS, ControllerInterface, Genome
-    from realitygap.platforms import open_target
-    from realitygap.records import OBSERVATIONS
-    from realitygap.study import try_on
-    from realitygap.world import load_arena
-
-    from ._target import attending_observer
-
-    if observe not in OBSERVATIONS:
-        raise StudyError(f"Unknown observation {observe!r}. {did_you_mean(observe, OBSERVATIONS)}")
+    if observe not in realitygap.records.OBSERVATIONS:
+        raise StudyError(
+            f"Unknown observation {observe!r}. {did_you_mean(observe, realitygap.records.OBSERVATIONS)}"
+        )
     if genome.is_dir():
         raise StudyError(
             f"{genome} is a folder, expected a genome. Export one: realitygap export {shlex.quote(str(genome))} -o "
             "champion.json"
         )
-    controller = Genome.load(genome)
+    controller = realitygap.evolution.Genome.load(genome)
     if inputs is not None or outputs is not None:
         seen = controller.interface.inputs if inputs is None else _names(inputs)
-        answered = OUTPUTS if outputs is None else _names(outputs)
-        controller = controller.with_interface(ControllerInterface(seen, answered))
+        answered = realitygap.evolution.OUTPUTS if outputs is None else _names(outputs)
+        controller = controller.with_interface(realitygap.evolution.ControllerInterface(seen, answered))
     observer = attending_observer(on, witness)
-    with open_target(on, load_arena(arena), witness=witness, observer=observer, key=seed) as target:
-        tried = try_on(target, controller, trials=trials, steps=steps, observe=observe, out=out)
+    with realitygap.platforms.open_target(
+        on, realitygap.world.load_arena(arena), witness=witness, observer=observer, key=seed
+    ) as target:
+        tried = realitygap.study.try_on(
+            target, controller, trials=trials, steps=steps, observe=observe, out=out
+        )
         n_cells = target.arena.grid.n_cells
         coverage = [len(trial.cells) / n_cells for trial in tried]
         mean = statistics.fmean(coverage)

@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 
+import realitygap
 from realitygap._terminal import echo
 from realitygap.errors import RealityGapError
 from realitygap.robot_families import load, robot_families
@@ -106,7 +107,6 @@ def sample(
 
     In Python: realitygap.robots.twin.sample_twin("worn", 1).to_toml()
     """
-    from realitygap.records import write_whole
     from realitygap.robots.twin import sample_twin
 
     try:
@@ -116,7 +116,7 @@ def sample(
     if out is None:
         echo(text, nl=False)
         return
-    write_whole(out, text.encode("utf-8"))
+    realitygap.records.write_whole(out, text.encode("utf-8"))
     echo(f"Written: {out}")
 
 
@@ -133,10 +133,8 @@ def show_twin(
 
     In Python: realitygap.report.save_twin("worn-1.svg", "worn-1.toml")
     """
-    from realitygap.report import save_twin
-
     try:
-        path = save_twin(out, file)
+        path = realitygap.report.save_twin(out, file)
     except ValueError as error:
         raise RealityGapError(str(error)) from error
     echo(f"Written: {path}")
@@ -177,13 +175,13 @@ def render(
 
     In Python: realitygap.playback.save_twin_trial(realitygap.playback.TwinDrive(model, arena), "worn-1.mp4")
     """
-    from realitygap.playback import TwinDrive, save_twin_trial
     from realitygap.robots.twin import load_twin
-    from realitygap.world import load_arena
 
     try:
-        trial = TwinDrive(load_twin(file), load_arena(arena), steps, number)
-        path = save_twin_trial(trial, out, view=view, speed=speed)  # type: ignore[arg-type]  # checked there
+        trial = realitygap.playback.TwinDrive(
+            load_twin(file), realitygap.world.load_arena(arena), steps, number
+        )
+        path = realitygap.playback.save_twin_trial(trial, out, view=view, speed=speed)  # type: ignore[arg-type]  # checked there
     except ValueError as error:
         raise RealityGapError(str(error)) from error
     echo(f"Written: {path}")

@@ -30,7 +30,7 @@ def test_a_single_condition_is_not_called_the_highest():
 
 
 def test_too_few_runs_name_no_highest_and_state_how_many_would():
-    claim = wording.undecided_median([0.1, 0.2], "SIM, 5 runs each", 6)
+    claim = wording.undecided_highest("median score", [0.1, 0.2], "SIM, 5 runs each", 6)
     assert "highest median" not in claim
     assert "6 runs" in claim
 

@@ -150,19 +150,63 @@ def highest_median(
     return f"{joined(names)} {'has' if len(names) == 1 else 'have'} the highest median {of}: {' and '.join(medians)}"
 
 
-def undecided_median(medians: Sequence[float], about: str, needed: int, of: str = "best coverage") -> str:
-    """Return the medians of conditions with too few runs to name the highest, without a period.
+def highest_mean(names: Sequence[str], means: Sequence[str], *, n_conditions: int = 2) -> str:
+    """Return which conditions have the best networks with the highest mean coverage, without a period.
 
     Args:
-        medians: The medians of all conditions.
+        names: All conditions that have it.
+        means: Their means in words, of the first two.
+        n_conditions: Number of conditions with a mean. A single one is not called the highest.
+    """
+    if n_conditions == 1:
+        return f"the mean coverage of the best networks of {names[0]} is {means[0]}"
+    return f"the best networks of {joined(names)} have the highest mean coverage: {' and '.join(means)}"
+
+
+def undecided_highest(score: str, values: Sequence[float], about: str, needed: int) -> str:
+    """Return the values of conditions with too few runs to name the highest, without a period.
+
+    Args:
+        score: Name of the values, such as `median best coverage`.
+        values: The values of all conditions.
         about: Their labels and n, in words.
         needed: Smallest number of runs of each condition that can show a difference.
-        of: Score.
     """
     return (
-        f"the median {of} of {counted(len(medians), 'condition')} is {values_between(medians)} ({about}); at least "
+        f"the {score} of {counted(len(values), 'condition')} is {values_between(values)} ({about}); at least "
         f"{counted(needed, 'run')} of each are needed to name the highest"
     )
+
+
+def no_difference(runs: str) -> str:
+    """Return that these runs support no difference between conditions, without a period."""
+    return f"no difference in coverage between conditions is supported by {runs} each"
+
+
+def changes_supported(n_shown: int, n: int) -> str:
+    """Return how many changes against a baseline are supported, without a period."""
+    if not n_shown:
+        return f"none of the {counted(n, 'change')} against a baseline is supported"
+    return (
+        f"{n_shown} of {counted(n, 'change')} against a baseline {'is' if n_shown == 1 else 'are'} supported"
+    )
+
+
+def effect_of_noise(span: str, score: str, searches: str, raises: bool | None, *, is_shown: bool) -> str:
+    """Return the effect of more noise on a score, without a period.
+
+    Args:
+        span: The levels of noise in words, such as ` from 10 % to 80 %`, or empty.
+        score: Score.
+        searches: The kinds of search in words, such as ` of novelty search`, or empty.
+        raises: True if the score rises with noise, False if it falls, None if it rises in some conditions only.
+        is_shown: True if an effect is supported.
+    """
+    if not is_shown:
+        return f"no effect of noise{span} on the {score}{searches} is supported"
+    if raises is None:
+        return f"more noise{span} raises the {score} in some conditions and lowers it in others"
+    return f"more noise{span} {'raises' if raises else 'lowers'} the {score}{searches}"
 
 
 def few_runs_verdict(needed: int, detail: str = "") -> str:

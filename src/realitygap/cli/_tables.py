@@ -47,8 +47,8 @@ def summary_table(summary: pl.DataFrame, title: str) -> Table:
             median, q25, q75, low, high = (
                 _number(row[f"{measure}_{name}"]) for name in ("median", "q25", "q75", "low", "high")
             )
-            interval = f"[{low}, {high}]" if low != "-" else FEW_RUNS
-            cells.append("not seen" if median == "-" and row["n"] else f"{median} {interval}\n{q25} to {q75}")
+            is_unseen = median == "-" and row["n"]
+            cells.append("not seen" if is_unseen else _spread(median, (low, high), (q25, q75)))
         if published:
             cells.append(" ".join(_number(value) for value in row["published"] or []))
         table.add_row(*cells)
@@ -72,10 +72,16 @@ def task_table(summary: pl.DataFrame, title: str) -> Table:
         first, last, median, q25, q75, low, high = (
             _number(row[name]) for name in ("first", "last", "median", "q25", "q75", "low", "high")
         )
-        interval = f"[{low}, {high}]" if low != "-" else FEW_RUNS
-        cells = [row["condition"], f"{row['n']:,}", first, last, f"{median} {interval}\n{q25} to {q75}"]
-        table.add_row(*cells)
+        spread = _spread(median, (low, high), (q25, q75))
+        table.add_row(row["condition"], f"{row['n']:,}", first, last, spread)
     return table
+
+
+def _spread(median: str, ends: tuple[str, str], middle: tuple[str, str]) -> str:
+    """Return a median with its interval, and the quartiles below. Without an interval, they have their name."""
+    if ends[0] != "-":
+        return f"{median} [{ends[0]}, {ends[1]}]\n{middle[0]} to {middle[1]}"
+    return f"{median} {FEW_RUNS}\nQ1–Q3 {middle[0]}–{middle[1]}" if median != "-" else median
 
 
 def calibration_table(calibration: Calibration) -> Table:

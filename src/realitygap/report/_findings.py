@@ -6,11 +6,27 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from realitygap._wording import Basis, counted, highest, highest_median, joined, p_equation, with_interval
+import numpy as np
+import numpy.typing as npt
+
+from realitygap._wording import (
+    Basis,
+    changes_supported,
+    counted,
+    effect_of_noise,
+    highest,
+    highest_mean,
+    highest_median,
+    no_difference,
+    p_equation,
+    undecided_highest,
+    values_between,
+    with_interval,
+)
 from realitygap.report._champions import Champions
 from realitygap.report._comparisons import Comparison, same_but_for
 from realitygap.report._tally import Tally, label_of, score_text, settings_of, task_of
-from realitygap.stats import median_interval, quartiles
+from realitygap.stats import median_interval, quartiles, runs_for_a_claim
 
 MOST_FINDINGS = 3
 
@@ -135,23 +151,50 @@ def leading_conditions(tally: Tally) -> list[str]:
 
 
 def _best(study: _Study, champions: Sequence[Champions]) -> Finding:
-    leaders = leading_conditions(study.tally)
-    medians = []
-    for name in leaders[:2]:
-        values = study.tally.run_bests(name, study.tally.measure)
-        medians.append(with_interval(median_interval(values)))
-    with_runs = [each for each in study.tally.conditions if len(study.tally.replicates(each["name"]))]
-    recorded = highest_median(leaders, medians, n_conditions=len(with_runs))
+    tally = study.tally
+    bests = {str(each["name"]): tally.run_bests(each["name"], tally.measure) for each in tally.conditions}
+    bests = {name: values for name, values in bests.items() if len(values)}
+    needed = _needed(study, [len(values) for values in bests.values()])
+    if needed is not None:
+        return _undecided(study, bests, champions, needed)
+    leaders = leading_conditions(tally)
+    medians = [with_interval(median_interval(bests[name])) for name in leaders[:2]]
+    recorded = highest_median(leaders, medians, n_conditions=len(bests))
     if not study.basis.is_fresh:
         return study.find(recorded, _rank(study, leaders[0]), None if study.compared else ("results",))
     by_name = {each.condition: each for each in champions}
     best = highest({name: float(each.expected.mean()) for name, each in by_name.items()})
     means = [with_interval(by_name[name].expected_mean) for name in best[:2]]
-    if len(by_name) == 1:
-        claim = f"the mean coverage of the best networks of {best[0]} is {means[0]}"
-    else:
-        claim = f"the best networks of {joined(best)} have the highest mean coverage: {' and '.join(means)}"
+    claim = highest_mean(best, means, n_conditions=len(by_name))
     evidence = f"{_rank(study, best[0])} As recorded, {recorded}.".strip()
+    return study.find(claim, evidence, (*(study.tables if study.compared else ("champions",)), "results"))
+
+
+def _needed(study: _Study, n_runs: Sequence[int]) -> int | None:
+    """Return how many runs of each condition would name the highest; None if there are enough, or one condition."""
+    if study.compared:
+        few = not any(each.can_claim for each in study.compared)
+        return max(each.runs_for_a_claim for each in study.compared) if few else None
+    return _needed_without_comparison(n_runs)
+
+
+def _needed_without_comparison(n_runs: Sequence[int]) -> int | None:
+    needed = runs_for_a_claim(len(n_runs) - 1, paired=True) if len(n_runs) > 1 else 0
+    return needed if min(n_runs, default=0) < needed else None
+
+
+def _undecided(
+    study: _Study, bests: Mapping[str, npt.NDArray[np.float64]], champions: Sequence[Champions], needed: int
+) -> Finding:
+    """Return the range of coverage over conditions that have too few runs to name the highest."""
+    about = f"{_runs(len(values) for values in bests.values())} each"
+    medians = [quartiles(values).median for values in bests.values()]
+    if not study.basis.is_fresh:
+        claim = undecided_highest("median best coverage", medians, about, needed)
+        return study.find(claim, "", None if study.compared else ("results",))
+    means = [float(each.expected.mean()) for each in champions]
+    claim = undecided_highest("mean coverage of the best networks", means, about, needed)
+    evidence = f"As recorded, their median best coverage is {values_between(medians)}."
     return study.find(claim, evidence, (*(study.tables if study.compared else ("champions",)), "results"))
 
 
@@ -180,21 +223,27 @@ def _best_scores(tasks: Sequence[Mapping[str, Any]]) -> list[Finding]:
     for task in dict.fromkeys(str(row["task"]) for row in tasks):
         rows = {row["condition"]: row for row in tasks if row["task"] == task and row["median"] is not None}
         leaders = highest({name: float(row["median"]) for name, row in rows.items()})
+        if not leaders:
+            continue
         medians = []
+        needed = _needed_without_comparison([int(row["n"]) for row in rows.values()])
         for row in (rows[name] for name in leaders[:2]):
             ends = "" if row["low"] is None else f" [{score_text(row['low'])}, {score_text(row['high'])}]"
             medians.append(f"{score_text(row['median'])}{ends}")
-        if leaders:
+        if needed is None:
             claim = highest_median(leaders, medians, f"score of {task}", n_conditions=len(rows))
-            basis = Basis(f"the report tries no network again for its score of {task}")
-            findings.append(Finding(basis, claim, "", ("scores",)))
+        else:
+            values = [float(row["median"]) for row in rows.values()]
+            about = f"{_runs(int(row['n']) for row in rows.values())} each"
+            claim = undecided_highest(f"median score of {task}", values, about, needed)
+        basis = Basis(f"the report tries no network again for its score of {task}")
+        findings.append(Finding(basis, claim, "", ("scores",)))
     return findings
 
 
 def _nothing(study: _Study) -> Finding:
     compared = study.compared
-    runs = _runs(each.n for each in compared)
-    claim = f"no difference in coverage between conditions is supported by {runs} each"
+    claim = no_difference(_runs(each.n for each in compared))
     if any(each.can_claim for each in compared):
         largest = max(compared, key=lambda each: abs(each.size))
         evidence = f"The largest is between {largest.one} and {largest.other}: {_difference([largest])}."
@@ -285,13 +334,10 @@ def _of_noise(study: _Study) -> Finding | None:
     shown = [each for each, _ in extremes if each.is_shown]
     quoted = max(shown or [each for each, _ in extremes], key=lambda each: abs(each.size))
     score = "coverage" if study.basis.is_fresh else "best coverage"
-    what = f"the {score}{_with_searches(tally, shown or [each for each, _ in extremes])}"
-    if not shown:
-        claim = f"no effect of noise{span} on {what} is supported"
-    elif all(each.size > 0 for each in shown) or all(each.size < 0 for each in shown):
-        claim = f"more noise{span} {'raises' if quoted.size > 0 else 'lowers'} {what}"
-    else:
-        claim = f"more noise{span} raises the {score} in some conditions and lowers it in others"
+    searches = _with_searches(tally, shown or [each for each, _ in extremes])
+    directions = {each.size > 0 for each in shown}
+    raises = directions.pop() if len(directions) == 1 else None
+    claim = effect_of_noise(span, score, searches, raises, is_shown=bool(shown))
     evidence = f"{quoted.one} less {quoted.other}: {_difference([quoted])}."
     if not study.basis.is_fresh:
         return study.find(claim, evidence)
@@ -319,15 +365,9 @@ def _of_changes(study: _Study) -> Finding | None:
     if not changes:
         return None
     if not shown:
-        return study.find(
-            f"none of the {counted(len(changes), 'change')} against a baseline is supported", ""
-        )
+        return study.find(changes_supported(0, len(changes)), "")
     named = "; ".join(f"{each.one} {_difference([each])}" for each in shown[:2])
-    return study.find(
-        f"{len(shown)} of {counted(len(changes), 'change')} against a baseline "
-        f"{'is' if len(shown) == 1 else 'are'} supported",
-        f"Largest: {named}.",
-    )
+    return study.find(changes_supported(len(shown), len(changes)), f"Largest: {named}.")
 
 
 # limits

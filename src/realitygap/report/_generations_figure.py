@@ -428,7 +428,7 @@ def _say_runs(panels: list[Panel]) -> str:
             f"Gray: one line a run; only the first runs are drawn where all would be too many ({drawn}); "
             "medians and intervals are of all runs."
         )
-    return "Gray: every run; a piece of line that several runs share is stronger."
+    return "Gray: every run. Lines are more opaque where runs overlap."
 
 
 def _say_interval(panels: list[Panel]) -> str:

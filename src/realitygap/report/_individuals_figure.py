@@ -325,4 +325,4 @@ def _which(tally: Tally, condition: str, *, typical: bool) -> str:
         return "It is the only run."
     if not typical:
         return "The run was chosen by number."
-    return f"It is the typical run and not a picked one: its best coverage is the median of the {n:,} runs."
+    return f"This is the typical run: its best coverage is the median of the {n:,} runs."

@@ -240,7 +240,7 @@ def _caption(
         "every generation" if len(paths) == n_generations else f"{len(paths)} of {n_generations} generations"
     )
     why = (
-        f"It is the typical run and not a picked one: its best {worth}, {best:.3f}, is the median of the "
+        f"This is the typical run: its best {worth}, {best:.3f}, is the median of the "
         f"{len(bests)} runs (the lower middle one, the first of several alike)."
         if typical
         else f"The run was chosen by number; its best {worth} is {best:.3f}."

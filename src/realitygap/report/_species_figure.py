@@ -110,7 +110,7 @@ def draw_species(
     condition = tally.name_of(condition)
     described = tally.condition(condition)
     of_runs = species.counts.filter(pl.col("condition") == condition)
-    picked = replicate is None
+    is_chosen = replicate is None
     if replicate is None:
         most = of_runs.group_by("replicate", maintain_order=True).agg(pl.col("species").sum())
         if most.is_empty():
@@ -121,8 +121,8 @@ def draw_species(
     means = species.mean_by_selection(tally)
     n_runs = tally.runs.height
     why = (
-        "picked because it has most species (the first of several alike) and so most to see"
-        if picked
+        "chosen because it has the most species (the first of several alike)"
+        if is_chosen
         else "chosen by number"
     )
     numbered = (

@@ -10,7 +10,7 @@ from nicegui import app, events, run, ui
 from starlette.exceptions import HTTPException
 from starlette.responses import FileResponse, PlainTextResponse, Response
 
-from realitygap._wording import Basis, counted, highest, highest_median, undecided_median
+from realitygap._wording import Basis, counted, highest, highest_median, undecided_highest
 from realitygap.drawing import themed_file
 from realitygap.errors import RealityGapError, StudyError
 from realitygap.lab._access import FOREIGN_HEADERS
@@ -389,7 +389,9 @@ class _Page:
         needed = runs_for_a_claim(len(rows) - 1, paired=True)
         if len(rows) > 1 and min(row["n"] for row in rows.values()) < needed:
             medians = [row["line_median"] for row in rows.values()]
-            return _BASIS.claim(undecided_median(medians, _about(list(rows.values())), needed, score))
+            return _BASIS.claim(
+                undecided_highest(f"median {score}", medians, _about(list(rows.values())), needed)
+            )
         of_leaders = [rows[name] for name in leaders]
         estimates = [_estimate(row) for row in of_leaders[:2]]
         claim = highest_median(leaders, estimates, score, n_conditions=len(rows))

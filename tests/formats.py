@@ -259,9 +259,18 @@ def _valid_memory() -> bytes:
 
 
 def _transfer(path: Path) -> Any:
-    from realitygap.study._transfer.strategies import TransferPlan, _adopt
+    from realitygap.study._transfer.strategies import _adopt
 
-    return _adopt(path.parent, TransferPlan(**json.loads(_TRANSFER)))
+    return _adopt(path.parent, transfer_plan())
+
+
+def transfer_plan() -> Any:
+    """Return the plan of `_TRANSFER`."""
+    from realitygap.orders import TransferOrder
+    from realitygap.study._transfer.strategies import TransferPlan
+
+    order = TransferOrder(study="sim-paper", to="twin:worn.toml")
+    return TransferPlan(order, "objective", {"a": 1}, "twin:worn.toml", "abc")
 
 
 _TRANSFER = json.dumps(

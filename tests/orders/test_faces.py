@@ -95,6 +95,15 @@ def test_function_has_the_fields_with_their_defaults_and_help(name):
         assert f"    {field.name}: " in function.__doc__, field.name
 
 
+def test_transfer_to_an_open_target_has_the_fields_of_its_order():
+    parameters = inspect.signature(realitygap.study.transfer).parameters
+    fields = {field.name: field for field in ORDERS["transfer"].fields()}
+    assert set(fields) - set(parameters) == {"to", "strategy", "processes", "witness"}
+    for key in set(fields) & set(parameters) - {"study", "budget", "out"}:
+        assert parameters[key].default == fields[key].default, key
+        assert f"    {key}: " in realitygap.study.transfer.__doc__, key
+
+
 def test_form_has_every_other_field(name):
     without = {field.name for field in ORDERS[name].fields() if not field.face.label}
     assert name not in NOT_IN_THE_FORM or without == NOT_IN_THE_FORM[name]
@@ -131,6 +140,13 @@ def test_missing_unknown_and_several_wrong_values_are_all_named(name):
     assert {*required, "sead"} == set(error.value.problems)
     assert error.value.problems["sead"].endswith("Did you mean 'seed'?")
     assert all(error.value.problems[key] == MISSING for key in required)
+
+
+def test_seed_fits_into_64_bits(name):
+    largest = {**SMALLEST[name], "seed": 2**63 - 1}
+    assert ORDERS[name](**largest).seed == 2**63 - 1
+    with pytest.raises(OrderError, match="seed is 9223372036854775808, expected at most"):
+        ORDERS[name](**{**largest, "seed": 2**63})
 
 
 def other_value(field):

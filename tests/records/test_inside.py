@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import shutil
 from collections.abc import Callable
@@ -24,8 +23,8 @@ from realitygap.records import (
     write_whole,
 )
 from realitygap.study._closing.plan import SMALL, adopt_plan
-from realitygap.study._transfer.strategies import TransferPlan, _adopt
-from tests.formats import FORMATS
+from realitygap.study._transfer.strategies import _adopt
+from tests.formats import FORMATS, transfer_plan
 from tests.records.rows import DESCRIPTION, HASH, make_rows
 from tests.records.test_ledger import new_ledger
 
@@ -195,10 +194,6 @@ def test_temporary_file_cannot_be_guessed(tmp_path, elsewhere, monkeypatch):
         Memory("s2", tmp_path / "memory.json").save()
     assert len(set(names)) == len(names) >= 6
     assert names_in(tmp_path) == ["a.txt", "elsewhere", "memory.json"]
-
-
-def transfer_plan() -> TransferPlan:
-    return TransferPlan(**json.loads(FORMATS["transfer.json"].valid))
 
 
 @pytest.mark.parametrize("kind", KINDS)

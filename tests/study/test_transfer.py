@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from realitygap.errors import DescriptionError, RealityGapError, RecordError, StudyError
+from realitygap.orders import TransferOrder
 from realitygap.platforms import JyroPlatform, SimPlatform, SimTarget
 from realitygap.records import read_observations
 from realitygap.study import (
@@ -383,7 +384,8 @@ def test_intervals_of_few_replicates_cover_as_often_as_they_say():
 def test_calibrations_of_another_seed_are_other_ones(tmp_path):
     seeds = []
     for seed in (1, 2):
-        plan = TransferPlan("sim-paper", "", {}, "other", "", (6,), seed=seed)
+        order = TransferOrder(study="sim-paper", to="other", budget=(6,), seed=seed)
+        plan = TransferPlan(order, "", {}, "other", "")
         work = _Work(plan, choose_condition("sim-paper", None, seed), CountingTarget(), tmp_path, print)
         seeds += [work._calibration(replicate).seed for replicate in (0, 1)]
     assert len(set(seeds)) == 4

@@ -14,7 +14,7 @@ import typer
 import realitygap
 from realitygap._terminal import draw, echo
 from realitygap.errors import StudyError
-from realitygap.orders import CalibrateOrder
+from realitygap.orders import ONLY_ROBOTS, CalibrateOrder
 
 from ._camera import CAMERA_HELP, under_camera
 from ._code import AllowPlatforms
@@ -28,7 +28,9 @@ if TYPE_CHECKING:
 @command_of(CalibrateOrder)
 def calibrate(
     order: CalibrateOrder,
-    camera: Annotated[str | None, typer.Option(metavar="CAMERA", help=CAMERA_HELP)] = None,
+    camera: Annotated[
+        str | None, typer.Option(metavar="CAMERA", help=CAMERA_HELP, rich_help_panel=ONLY_ROBOTS)
+    ] = None,
     figure: Annotated[
         Path | None,
         typer.Option(

@@ -12,7 +12,7 @@ import realitygap
 from realitygap._terminal import echo
 from realitygap._wording import bracketed, counted, p_equation, reproduces
 from realitygap.errors import StudyError
-from realitygap.orders import GapOrder
+from realitygap.orders import ONLY_ROBOTS, GapOrder
 
 from ._camera import CAMERA_HELP, under_camera
 from ._code import AllowPlatforms
@@ -24,9 +24,6 @@ if TYPE_CHECKING:
     from realitygap.gap import GapResult, ReplayError, Why
     from realitygap.stats import Estimate
     from realitygap.study import GapPlan
-
-
-ONLY_ROBOTS = "Only for robots"
 
 
 @command_of(GapOrder)

@@ -5,13 +5,15 @@ A command, a function, a form of the lab, the message to a worker, and the recor
 
 from ._calibrate import CalibrateOrder
 from ._field import Limits, OrderField
-from ._function import takes_order
+from ._function import takes_order, with_fields
 from ._gap import GapOrder
 from ._order import Order, OrderError
 from ._record import ORDER_FILE, ORDERS, read_order
+from ._shared import ONLY_ROBOTS
 from ._transfer import TransferOrder
 
 __all__ = [
+    "ONLY_ROBOTS",
     "ORDERS",
     "ORDER_FILE",
     "CalibrateOrder",
@@ -23,4 +25,5 @@ __all__ = [
     "TransferOrder",
     "read_order",
     "takes_order",
+    "with_fields",
 ]

@@ -10,6 +10,7 @@ from realitygap.robot_families import default_family, port_platforms
 
 from ._field import argument, option
 from ._order import Order
+from ._shared import Seed, Witness, arena_option
 
 
 class CalibrateOrder(Order):
@@ -133,14 +134,9 @@ class CalibrateOrder(Order):
         label="Robot model",
         refers="file",
     )
-    seed: int = option(0, help="Seed of the trials and samples.", at_least=0, label="Seed")
-    arena: str = option("paper", help="Arena by name or file.", metavar="ARENA", label="Arena", refers="file")
-    witness: str | None = option(
-        None,
-        help="Witness of an emulator in another program. It places the robot and observes its path.",
-        metavar="HOST:PORT",
-        label="Witness",
-    )
+    seed: Seed = 0
+    arena: str = arena_option()
+    witness: Witness = None
 
     def conflicts(self) -> Iterator[tuple[str, str]]:
         """Yield the field and the message for each setting that others exclude."""

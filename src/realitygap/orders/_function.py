@@ -7,7 +7,7 @@ import inspect
 import os
 import re
 import textwrap
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from typing import Any, Concatenate, ParamSpec, TypeVar
 
 from ._field import OrderField
@@ -55,6 +55,36 @@ def takes_order(
     return decorate
 
 
+def with_fields(
+    model: type[Order], *, without: Collection[str] = ()
+) -> Callable[[Callable[P, R]], Callable[P, R]]:
+    """Show the fields of an order in place of `**options` in the signature and the docstring of a function.
+
+    Args:
+        model: The order.
+        without: Fields that the function has as parameters of other names, or that it does not need.
+    """
+
+    def decorate(function: Callable[P, R]) -> Callable[P, R]:
+        signature = inspect.signature(function)
+        *own, _ = signature.parameters.values()
+        names = {parameter.name for parameter in own} | set(without)
+        fields = [field for field in model.fields() if field.name not in names]
+        parameters = [*own, *(field.parameter for field in fields)]
+        function.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
+        before, heading, after = inspect.cleandoc(function.__doc__ or "").partition("\n\nRaises:")
+        function.__doc__ = "\n".join([before, *map(_argument, fields)]) + heading + after
+        return function
+
+    return decorate
+
+
+def _argument(field: OrderField) -> str:
+    """Return the entry of a field in the arguments of a docstring."""
+    text = f"{field.name}: {_help(field)}"
+    return textwrap.fill(text, 116, initial_indent="    ", subsequent_indent="        ")
+
+
 def _parameter(field: OrderField) -> inspect.Parameter:
     """Return the parameter of a field. Those of arguments of the command are positional."""
     place = inspect.Parameter.POSITIONAL_OR_KEYWORD
@@ -65,12 +95,7 @@ def _docstring(model: type[Order], own: str) -> str:
     """Return the function's docstring with the paragraphs and the fields of the order."""
     paragraphs = model.help_text().split("\n\n")
     about = [text for text in paragraphs[1:] if not text.startswith(("Example:", "In Python:"))]
-    arguments = [
-        textwrap.fill(
-            f"{field.name}: {_help(field)}", 116, initial_indent="    ", subsequent_indent="        "
-        )
-        for field in model.fields()
-    ]
+    arguments = map(_argument, model.fields())
     before, _, after = own.partition("Args:\n")
     return "\n\n".join([before.strip(), *about, "Args:\n" + "\n".join([*arguments, after])])
 

@@ -10,10 +10,7 @@ from realitygap.robot_families import port_platforms
 
 from ._field import argument, option
 from ._order import Order
-
-ONLY_TWINS = "Only for twins"
-ONLY_ROBOTS = "Only for robots"
-MOST_SEED = 2**31
+from ._shared import Processes, Seed, Witness, arena_option, task_option
 
 
 class GapOrder(Order):
@@ -55,14 +52,7 @@ class GapOrder(Order):
     n_controllers: int = option(
         30, help="Number of controllers.", at_least=2, at_most=1024, label="Controllers"
     )
-    task: str | None = option(
-        None,
-        help="Task that scores trials: coverage, avoid, light, wall, goal or python:FILE.py:function.",
-        default_is="the task of the controllers; coverage for random ones",
-        metavar="KIND",
-        label="Task",
-        refers="file",
-    )
+    task: str | None = task_option(None, default_is="the task of the controllers; coverage for random ones")
     trials: int = option(
         10,
         help="Trials per controller and platform.",
@@ -83,14 +73,7 @@ class GapOrder(Order):
         default_is="what the task needs",
         label="Observation level",
     )
-    arena: str | None = option(
-        None,
-        help="Arena by name or file.",
-        default_is="that of the controllers",
-        metavar="NAME",
-        label="Arena",
-        refers="file",
-    )
+    arena: str | None = arena_option(None, default_is="that of the controllers")
     noise: float | None = option(
         None,
         help="Noise level a of the paper, on simulators.",
@@ -123,21 +106,9 @@ class GapOrder(Order):
         names=("-o", "--out"),
         is_output=True,
     )
-    processes: int | None = option(
-        None,
-        help="Number of twin trials to run in parallel.",
-        default_is="all processors",
-        at_least=1,
-        panel=ONLY_TWINS,
-    )
-    witness: str | None = option(
-        None,
-        help="Witness of an emulated robot in another program.",
-        metavar="HOST:PORT",
-        panel=ONLY_ROBOTS,
-        label="Witness",
-    )
-    seed: int = option(1, help="Seed of all random numbers.", at_least=0, at_most=MOST_SEED, label="Seed")
+    processes: Processes = None
+    witness: Witness = None
+    seed: Seed = 1
 
     def conflicts(self) -> Iterator[tuple[str, str]]:
         """Yield the field and the message for each setting that others exclude."""

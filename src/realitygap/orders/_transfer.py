@@ -11,6 +11,7 @@ from realitygap.robot_families import port_platforms
 
 from ._field import argument, option
 from ._order import Order
+from ._shared import Processes, Seed, Witness
 
 
 class TransferOrder(Order):
@@ -81,9 +82,7 @@ class TransferOrder(Order):
     )
     runs: int = option(100, help="Evolutions in simulation per replicate.", at_least=1)
     repeats: int = option(8, help="Trials per individual in simulation.", at_least=1)
-    seed: int = option(
-        1, help="Seed of all random numbers except a twin's own.", at_least=0, at_most=2**63 - 1
-    )
+    seed: Seed = 1
     out: Path | None = option(
         None,
         help="Folder for trials and result.",
@@ -92,10 +91,13 @@ class TransferOrder(Order):
         names=("-o", "--out"),
         is_output=True,
     )
-    processes: int | None = option(
-        None, help="Number of twin trials to run in parallel.", default_is="all processors", at_least=1
-    )
-    witness: str | None = option(None, help="Witness of an emulator in another program.", metavar="HOST:PORT")
+    processes: Processes = None
+    witness: Witness = None
+
+    @property
+    def budgets(self) -> tuple[int, ...]:
+        """Trials that each strategy may spend on the target: one transfer for each number."""
+        return self.budget or (20,)
 
     @property
     def folder(self) -> Path:

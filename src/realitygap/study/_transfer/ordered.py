@@ -10,7 +10,7 @@ from realitygap.records import write_whole
 from realitygap.trials import PortObserver
 
 from .result import TransferResult
-from .strategies import choose_condition, strategy_names, transfer
+from .strategies import choose_condition, strategy_names, transfer_to
 
 
 @takes_order(TransferOrder)
@@ -34,7 +34,7 @@ def run_transfer(
         StudyError: There is no such study, condition, strategy, or platform, or the target shows too little.
         RealityGapError: The robot failed, or files cannot be read or written.
     """
-    names = strategy_names(order.strategy or "all")
+    strategy_names(order.strategy or "all")
     arena = choose_condition(order.study, order.condition, order.seed).arena.arena()
     with open_target(
         order.to,
@@ -44,22 +44,6 @@ def run_transfer(
         processes=order.processes,
         key=order.seed,
     ) as target:
-        result = transfer(
-            order.study,
-            target,
-            names,
-            order.budget or (20,),
-            out=order.folder,
-            condition=order.condition,
-            replicates=order.replicates,
-            fresh_trials=order.fresh_trials,
-            runs=order.runs,
-            repeats=order.repeats,
-            observe=order.observe,
-            calibration=order.calibration,
-            seed=order.seed,
-            allow_code=allow_code,
-            tell=tell,
-        )
+        result = transfer_to(target, order, order.study, allow_code=allow_code, tell=tell)
     write_whole(order.folder / ORDER_FILE, order.to_toml().encode(), within=order.folder)
     return result

@@ -5,16 +5,16 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from realitygap.errors import RecordError, StudyError, did_you_mean, whole_number
+from realitygap.errors import RecordError, StudyError, did_you_mean
 from realitygap.evolution import ControllerInterface, Genome
+from realitygap.orders import TransferOrder, with_fields
 from realitygap.records import (
-    CALIBRATES,
     OBSERVATIONS,
     Observe,
     not_compared,
@@ -78,38 +78,48 @@ class TransferPlan:
     """The plan of a transfer; a folder belongs to one plan.
 
     Attributes:
-        study: Name or file.
+        order: The order.
         condition: Condition of the study.
         settings: Settings of that condition, as resolved.
         target: Name of the target.
         identity: Identity of the target, whatever its name; empty if it has only a name.
-        budgets: Trials on the target, one transfer each.
-        replicates: Number of repetitions of everything, each with its own evolution.
-        fresh_trials: Fresh trials of each champion.
-        runs: Number of evolutions in simulation in a replicate.
-        repeats: Trials of each individual in simulation.
-        observe: Observation level of calibrations.
-        calibration: File of an existing calibration; empty to calibrate on the budget.
-        fit: SHA-256 of the content of that file, which may be elsewhere the next time.
-        seed: Seed of all random numbers.
+        fit: SHA-256 of the content of the order's calibration, which may be elsewhere the next time; empty without one.
     """
 
-    study: str
+    order: TransferOrder
     condition: str
-    settings: dict[str, Any]
+    settings: Mapping[str, object]
     target: str
     identity: str
-    budgets: tuple[int, ...]
-    replicates: int = 1
-    fresh_trials: int = 20
-    runs: int = 100
-    repeats: int = 8
-    observe: Observe = "cells"
-    calibration: str = ""
     fit: str = ""
-    seed: int = 1
+
+    @property
+    def runs(self) -> int:
+        """Evolutions in simulation of each replicate, at least the largest budget."""
+        return max(self.order.runs, *self.order.budgets)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain values, as a folder has them."""
+        order = self.order
+        return {
+            "study": order.study,
+            "condition": self.condition,
+            "settings": self.settings,
+            "target": self.target,
+            "identity": self.identity,
+            "budgets": list(order.budgets),
+            "replicates": order.replicates,
+            "fresh_trials": order.fresh_trials,
+            "runs": self.runs,
+            "repeats": order.repeats,
+            "observe": order.observe,
+            "calibration": "" if order.calibration is None else str(order.calibration),
+            "fit": self.fit,
+            "seed": order.seed,
+        }
 
 
+@with_fields(TransferOrder, without=("to", "strategy", "processes", "witness"))
 def transfer(
     study: Study | str | Path,
     target: Target,
@@ -117,16 +127,9 @@ def transfer(
     budget: int | Sequence[int] = 20,
     *,
     out: str | Path,
-    condition: str | None = None,
-    replicates: int = 1,
-    fresh_trials: int = 20,
-    runs: int = 100,
-    repeats: int = 8,
-    observe: Observe = "cells",
-    calibration: str | Path | None = None,
-    seed: int = 1,
     allow_code: bool = False,
     tell: Callable[[str], None] | None = None,
+    **options: Any,
 ) -> TransferResult:
     """Evolve in simulation, spend a budget of trials on a target, and try what each strategy chose on fresh trials.
 
@@ -140,65 +143,60 @@ def transfer(
         strategies: Names in `STRATEGIES`; all of them when 'all'.
         budget: Trials on the target that each strategy may spend; several are carried out one by one.
         out: Folder for trials and result.
-        condition: Condition of the study. Default: the first one that selects for the score, preferably on `sim`.
-        replicates: Number of repetitions of everything, each with its own evolution.
-        fresh_trials: Trials that judge each champion. They don't count toward the budget.
-        runs: Evolutions in simulation of each replicate, at least the largest budget.
-        repeats: Trials of each individual in simulation.
-        observe: Observation level of calibrations.
-        calibration: File of a calibration; its trials count as spent. Without one, calibrating spends of the budget.
-        seed: Seed of all random numbers.
         allow_code: True to run the Python file of a task that the user has not allowed before.
         tell: Called with the progress in words.
 
     Raises:
-        StudyError: No such study, condition or strategy, or so much cannot be seen of the target.
+        StudyError: No such study, condition or strategy, a number out of its range, or so much cannot be seen of the
+            target.
         ControllerError: The target lacks what controllers see.
         TaskError: The task cannot be scored in the target's arena, or its Python file is not allowed.
         DescriptionError: The calibration is none, or of no robot that can be.
         RecordError: The folder belongs to another transfer.
         RobotError: The target failed; what was tried is safe.
-        TypeError, ValueError: A number that is none, or out of its range.
     """
-    budgets = _budgets(budget)
-    seen = _known_observation(observe)
-    refuse_more_than_is_seen(target, seen)
-    plan = TransferPlan(
+    order = TransferOrder(
         study=study.about.name if isinstance(study, Study) else str(study),
-        condition="",
-        settings={},
-        target=target.name,
-        identity=target.identity,
-        budgets=budgets,
-        replicates=whole_number("replicates", replicates, 1, 1000),
-        fresh_trials=whole_number("fresh_trials", fresh_trials, 1, NUMBERS // 2),
-        runs=max(whole_number("runs", runs, 1), *budgets),
-        repeats=whole_number("repeats", repeats, 1),
-        observe=seen,
-        calibration="" if calibration is None else str(calibration),
-        fit="" if calibration is None else _fit_of(calibration),
-        seed=whole_number("seed", seed, 0, 2**63 - 1),
+        to=target.name,
+        strategy=[strategies] if isinstance(strategies, str) else strategies,
+        budget=[budget] if isinstance(budget, int) else budget,
+        out=out,
+        **options,
     )
-    chosen = allowed_task(choose_condition(study, condition, plan.seed), allow_code)
+    return transfer_to(target, order, study, allow_code=allow_code, tell=tell)
+
+
+def transfer_to(
+    target: Target,
+    order: TransferOrder,
+    study: Study | str | Path,
+    *,
+    allow_code: bool = False,
+    tell: Callable[[str], None] | None = None,
+) -> TransferResult:
+    """Transfer to an open target, as ordered."""
+    refuse_more_than_is_seen(target, order.observe)
+    chosen = allowed_task(choose_condition(study, order.condition, order.seed), allow_code)
     chosen = _at_the_pace_of(target, chosen)
-    plan = replace(plan, condition=chosen.name, settings=chosen.settings())
-    names = strategy_names(strategies)
-    folder = Path(out)
+    fit = "" if order.calibration is None else _fit_of(order.calibration)
+    plan = TransferPlan(order, chosen.name, chosen.settings(), target.name, target.identity, fit)
+    names = strategy_names(order.strategy or "all")
+    folder = order.folder
     work = _Work(plan, chosen, target, folder, tell or (lambda _: None))
     work.refuse(names)
     _adopt(folder, plan)
     champions = [
-        work.carry_out(name, n, r) for name in names for n in budgets for r in range(plan.replicates)
+        work.carry_out(name, n, r) for name in names for n in order.budgets for r in range(order.replicates)
     ]
     task = chosen.task_of_trials
     rows, best = summarize_transfer(champions, work.known(), task.score_range)
     result = TransferResult(
-        plan.study,
-        plan.condition,
+        order.study,
+        chosen.name,
         target.name,
         target.label,
-        plan.replicates,
-        plan.fresh_trials,
+        order.replicates,
+        order.fresh_trials,
         rows,
         best,
         tuple(champions),
@@ -274,7 +272,7 @@ class _Work:
     simulation: Simulation = field(init=False)
 
     def __post_init__(self) -> None:
-        self.simulation = Simulation(self.plan.runs, self.plan.repeats)
+        self.simulation = Simulation(self.plan.runs, self.plan.order.repeats)
 
     def refuse(self, strategies: Sequence[str]) -> None:
         """Raise an error if any strategy cannot run on this target.
@@ -292,14 +290,14 @@ class _Work:
             if strategy in NEED_SIM:
                 needs_sim(self.condition, strategy)
             if strategy in CALIBRATE:
-                for budget in self.plan.budgets:
+                for budget in self.plan.order.budgets:
                     self._calibration(0).refuse(self.condition, budget)
 
     def carry_out(self, strategy: str, budget: int, replicate: int) -> Transferred:
         """Return the champion of a strategy, with its fresh trials."""
         spends = strategy not in WITHOUT_TRIALS
         name = f"{strategy}-{budget if spends else 0}-{replicate}"
-        self.tell(f"{strategy}, {budget} trials, replicate {replicate + 1} of {self.plan.replicates}")
+        self.tell(f"{strategy}, {budget} trials, replicate {replicate + 1} of {self.plan.order.replicates}")
         first = replicate * NUMBERS
         path = self.folder / "trials" / f"{name}.jsonl"
         observe = self._looks_at(strategy)
@@ -327,17 +325,15 @@ class _Work:
         return [
             float(np.mean(score_observed(self.condition.task_of_trials, trials, self.target.arena)))
             for trials in tried
-            if len(trials) >= self.plan.fresh_trials
+            if len(trials) >= self.plan.order.fresh_trials
         ]
 
     def _calibration(self, replicate: int) -> Calibrating:
         """Return the source of the replicate's calibrations."""
-        file = Path(self.plan.calibration) if self.plan.calibration else None
-        first, observe = replicate * NUMBERS, self.plan.observe
-        seed = (SEED_STRIDE * self.plan.seed + replicate) % 2**53
-        return Calibrating(
-            self.target, self.folder / "calibrations", first, replicate, seed, observe, file, self.tell
-        )
+        order, first = self.plan.order, replicate * NUMBERS
+        seed = (SEED_STRIDE * order.seed + replicate) % 2**53
+        folder, file = self.folder / "calibrations", order.calibration
+        return Calibrating(self.target, folder, first, replicate, seed, order.observe, file, self.tell)
 
     def _looks_at(self, strategy: str) -> Observe:
         """Return the least that a strategy has to see of a trial on the target."""
@@ -349,7 +345,7 @@ class _Work:
 
     def _fresh(self, genome: Genome, name: str, first: int) -> tuple[float, ...]:
         """Return the scores of a champion in fresh trials."""
-        n, task = self.plan.fresh_trials, self.condition.task_of_trials
+        n, task = self.plan.order.fresh_trials, self.condition.task_of_trials
         path = self.folder / "fresh" / f"{name}.jsonl"
         with allow_trials(self.target, path, n, first, observe=task.observe) as fresh:
             trials = fresh.carry_out(plans_of(self.condition, [genome] * n, 0, "fresh"), task.observe)
@@ -367,7 +363,7 @@ def _adopt(folder: Path, plan: TransferPlan) -> None:
     refuse_links_in(folder, *_PARTS)
     if path.exists():
         there = read_object(path)
-        now = json.loads(json.dumps(asdict(plan)))
+        now = json.loads(json.dumps(plan.to_dict()))
         extends = ("replicates", "budgets", "fresh_trials", "calibration", not_compared(there, now))
         different = [key for key in now if key not in extends and now[key] != there.get(key)]
         if different:
@@ -380,7 +376,7 @@ def _adopt(folder: Path, plan: TransferPlan) -> None:
             )
     for part in _PARTS:
         (folder / part).mkdir(parents=True, exist_ok=True)
-    write_whole(path, json.dumps(asdict(plan), indent=2).encode(), within=folder)
+    write_whole(path, json.dumps(plan.to_dict(), indent=2).encode(), within=folder)
 
 
 def _fit_of(calibration: str | Path) -> str:
@@ -395,17 +391,3 @@ def _fit_of(calibration: str | Path) -> str:
     said["robot"] = load_robot(made.robot).to_dict()
     load_robot(calibration)  # refuses one that no robot can be
     return hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()
-
-
-def _budgets(budget: int | Sequence[int]) -> tuple[int, ...]:
-    given = [budget] if isinstance(budget, int) else list(budget)
-    if not given:
-        raise ValueError("No budget is given, expected at least one number of trials.")
-    return tuple(whole_number("budget", each, 0, NUMBERS // 2 - 1) for each in given)
-
-
-def _known_observation(observe: str) -> Observe:
-    for known in CALIBRATES:
-        if observe == known:
-            return known
-    raise StudyError(f"Unknown observation {observe!r}. {did_you_mean(observe, CALIBRATES)}")

@@ -1,0 +1,73 @@
+"""Fields that several orders have, each with its type, range, and help."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from pydantic import AfterValidator
+from pydantic_core import PydanticKnownError
+
+from ._field import option
+
+ONLY_ROBOTS = "Only for robots"
+ONLY_TWINS = "Only for twins"
+
+_MOST_SEED = 2**63 - 1
+"""Integers of kernels and of TOML have 64 bits. No help text shows this limit, because it has 19 digits."""
+
+
+def _refuse_long(seed: int) -> int:
+    if seed > _MOST_SEED:
+        raise PydanticKnownError("less_than_equal", {"le": _MOST_SEED})
+    return seed
+
+
+Seed = Annotated[
+    int,
+    option(help="Seed of all random numbers.", at_least=0, label="Seed"),
+    AfterValidator(_refuse_long),
+]
+
+Witness = Annotated[
+    str | None,
+    option(
+        help="Witness of an emulator in another program. It places the robot and observes its path.",
+        metavar="HOST:PORT",
+        panel=ONLY_ROBOTS,
+        label="Witness",
+    ),
+]
+
+Processes = Annotated[
+    int | None,
+    option(
+        help="Number of twin trials to run in parallel.",
+        default_is="all processors",
+        at_least=1,
+        panel=ONLY_TWINS,
+    ),
+]
+
+
+def arena_option(default: str | None = "paper", *, default_is: str = "") -> Any:
+    """Return the field of an arena."""
+    return option(
+        default,
+        help="Arena by name or file.",
+        default_is=default_is,
+        metavar="ARENA",
+        label="Arena",
+        refers="file",
+    )
+
+
+def task_option(default: str | None = "coverage", *, default_is: str = "") -> Any:
+    """Return the field of the task that scores trials."""
+    return option(
+        default,
+        help="Task that scores trials: coverage, avoid, light, wall, goal or python:FILE.py:function.",
+        default_is=default_is,
+        metavar="KIND",
+        label="Task",
+        refers="file",
+    )

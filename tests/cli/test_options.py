@@ -56,6 +56,7 @@ PRINTED_BY = {
     "orders/_calibrate.py": ("calibrate",),
     "orders/_gap.py": ("gap",),
     "orders/_order.py": ("calibrate", "gap", "transfer"),
+    "orders/_plan.py": ("plan",),
     "orders/_record.py": ("calibrate", "gap", "transfer"),
     "orders/_transfer.py": ("transfer",),
     "platforms/_python.py": (

@@ -2,6 +2,7 @@
 
 import inspect
 import json
+import math
 from pathlib import Path
 
 import pytest
@@ -14,10 +15,16 @@ from realitygap.lab._problem import Mistakes
 from realitygap.orders import ORDERS, OrderError, read_order
 from realitygap.settings import MISSING
 
-FUNCTIONS = {"calibrate": "make_calibration", "gap": "gap_between", "transfer": "run_transfer"}
+FUNCTIONS = {
+    "calibrate": "make_calibration",
+    "gap": "gap_between",
+    "plan": "plan_gap",
+    "transfer": "run_transfer",
+}
 SMALLEST = {
     "calibrate": {"what": "path", "robot": "sim", "out": "fit.toml"},
     "gap": {"sim": "sim", "target": "jyro"},
+    "plan": {"effect": 0.1},
     "transfer": {"study": "sim-paper", "to": "jyro"},
 }
 """Values of the smallest order."""
@@ -31,6 +38,7 @@ WITH = {
         "out": {"out": "there.toml"},
     },
     "gap": {},
+    "plan": {"margin": {"effect": None}, "correlation": {"effect": None, "correlation": 0.9}},
     "transfer": {},
 }
 """Values that a field needs with it."""
@@ -38,6 +46,7 @@ WITH = {
 ONLY_IN_THE_COMMAND = {
     "calibrate": {"camera", "figure", "allow_code", "as_json"},
     "gap": {"camera", "report", "allow_code", "as_json"},
+    "plan": {"allow_code", "as_json"},
     "transfer": {"allow_code", "as_json"},
 }
 """Options of a command that choose how its result is shown, or who is at the robot."""
@@ -135,10 +144,10 @@ def test_every_face_refuses_the_same_values(name, tmp_path):
 
 def test_missing_unknown_and_several_wrong_values_are_all_named(name):
     with pytest.raises(OrderError) as error:
-        ORDERS[name](sead=1)
+        ORDERS[name](seedd=1)
     required = {field.name for field in ORDERS[name].fields() if field.is_required}
-    assert {*required, "sead"} == set(error.value.problems)
-    assert error.value.problems["sead"].endswith("Did you mean 'seed'?")
+    assert {*required, "seedd"} == set(error.value.problems)
+    assert error.value.problems["seedd"].endswith("Did you mean 'seed'?")
     assert all(error.value.problems[key] == MISSING for key in required)
 
 
@@ -156,7 +165,7 @@ def other_value(field):
     if field.choices:
         return next(choice for choice in field.choices if choice != field.default)
     if field.kind in (int, float):
-        near = field.kind(field.limits.low or 0) + 1
+        near = min(field.kind(field.limits.low or 0) + 1, field.limits.high or math.inf)
         return near if near != field.default else near + 1
     return Path("there.toml") if field.kind is Path else "there"
 

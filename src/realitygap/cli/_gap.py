@@ -11,8 +11,7 @@ import typer
 import realitygap
 from realitygap._terminal import echo
 from realitygap._wording import bracketed, counted, p_equation, reproduces
-from realitygap.errors import StudyError
-from realitygap.orders import ONLY_ROBOTS, GapOrder
+from realitygap.orders import ONLY_ROBOTS, GapOrder, PlanOrder
 
 from ._camera import CAMERA_HELP, under_camera
 from ._code import AllowPlatforms
@@ -22,7 +21,7 @@ from ._target import attending_observer
 
 if TYPE_CHECKING:
     from realitygap.gap import GapResult, ReplayError, Why
-    from realitygap.stats import Estimate
+    from realitygap.stats import Estimate, Needed
     from realitygap.study import GapPlan
 
 
@@ -121,115 +120,55 @@ def _print_why(why: Why) -> None:
     echo(why.advice)
 
 
+@command_of(PlanOrder)
 def plan(
-    effect: Annotated[
-        float | None, typer.Option(metavar="D", help="Detect a mean difference D in score.")
-    ] = None,
-    margin: Annotated[
-        float | None, typer.Option(metavar="M", help="Show equivalence within a margin M of scores.")
-    ] = None,
-    correlation: Annotated[
-        float | None, typer.Option(metavar="R", help="Show that a correlation R is above --least.")
-    ] = None,
-    least: Annotated[float, typer.Option(help="Lower bound for --correlation.")] = 0.5,
-    spread: Annotated[
-        float | None,
-        typer.Option(
-            min=0,
-            help="Standard deviation of true differences between platforms over controllers. [default: half of the "
-            "standard deviation of the controllers]",
-        ),
-    ] = None,
-    power: Annotated[
-        float,
-        typer.Option(min=0.05, max=0.999, help="Statistical power: the probability of detecting the effect."),
-    ] = 0.8,
-    data: Annotated[
-        Path | None,
-        typer.Option(
-            "--from",
-            metavar="FILE",
-            help="Recorded trials to estimate the noise from (.jsonl). [default: a pilot on sim]",
-        ),
-    ] = None,
-    task: Annotated[str, typer.Option(metavar="KIND", help="Task that scores trials.")] = "coverage",
-    arena: Annotated[str, typer.Option(metavar="NAME", help="Arena of the pilot.")] = "paper",
+    order: PlanOrder,
     allow_code: AllowPlatforms = False,
-    seed: Annotated[
-        int, typer.Option(min=0, max=2**31, help="Seed of the pilot and the simulated studies.")
-    ] = 1,
     as_json: Annotated[bool, typer.Option("--json", help="Print the plan as JSON.")] = False,
 ) -> None:
-    """Estimate how many controllers and trials you need.
-
-    Numbers come from normal formulas. Simulated studies of that size give the power. For a correlation, controllers
-    are added until the simulated power reaches --power.
-
-    Example: realitygap plan --effect 0.05
-
-    Example: realitygap plan --margin 0.05 --spread 0.03
-
-    Example: realitygap plan --effect 0.05 --task light --arena light
-
-    In Python: realitygap.study.plan_gap("effect", 0.05)
-    """
-    asked = {"effect": effect, "margin": margin, "correlation": correlation}
-    given = {name: value for name, value in asked.items() if value is not None}
-    if len(given) != 1:
-        raise StudyError(
-            f"Got {', '.join('--' + name for name in given) or 'no question'}, expected one of --effect, "
-            "--margin, and --correlation. For example: realitygap plan --effect 0.05"
-        )
-    ((question, value),) = given.items()
-    scored_by = realitygap.study.task_named(task, allow_code=allow_code)
-    found = realitygap.study.plan_gap(
-        question,  # type: ignore[arg-type]
-        value,
-        spreads=None if data is None else realitygap.study.recorded_spreads(str(data), scored_by),
-        task=scored_by,
-        arena=arena,
-        spread=spread,
-        least=least,
-        power=power,
-        seed=seed,
-    )
+    """Plan, and print the table."""
+    found = realitygap.study.plan_gap(order, allow_code=allow_code)
     if as_json:
-        asked_for = {"power": power, "score": scored_by.score_name}
-        asked_for |= {"least": least} if question == "correlation" else {}
-        print_json(_plan_json(found) | asked_for)
+        print_json(_plan_json(found))
     else:
-        _print_plan(found, scored_by.score_name, least, power)
+        _print_plan(found)
 
 
 def _plan_json(found: GapPlan) -> dict[str, Any]:
-    return {
-        "question": found.question,
-        "value": found.value,
+    order = found.order
+    values = {
+        "question": order.question,
+        "value": order.value,
         "spread": found.spread,
         "noise": found.spreads.noise,
         "controllers_spread": found.spreads.controllers,
         "from": found.spreads.origin,
         "rows": [_needed_json(row) for row in found.needed],
         "best": None if found.best is None else _needed_json(found.best),
+        "power": order.power,
+        "score": found.score,
+        "order": order.record(),
     }
+    return values | ({"least": order.least} if order.question == "correlation" else {})
 
 
-def _needed_json(row: Any) -> dict[str, Any]:
+def _needed_json(row: Needed) -> dict[str, Any]:
     return {**vars(row), "trials_on_target": row.on_target}
 
 
-def _print_plan(found: GapPlan, score: str, least: float, power: float) -> None:
+def _print_plan(found: GapPlan) -> None:
+    order = found.order
     question = {
-        "effect": f"to detect a mean difference of {found.value:g}",
-        "margin": f"to show equivalence within ±{found.value:g} if there is no difference",
-        "correlation": f"to show that a correlation of {found.value:g} is above {least:g}",
-    }[found.question]
-    echo(f"Controllers {question} in {100 * power:g} of 100 studies, in {score}")
+        "effect": f"to detect a mean difference of {order.value:g}",
+        "margin": f"to show equivalence within ±{order.value:g} if there is no difference",
+        "correlation": f"to show that a correlation of {order.value:g} is above {order.least:g}",
+    }[order.question]
+    echo(f"Controllers {question} in {100 * order.power:g} of 100 studies, in {found.score}")
     echo(
         f"Trials of one controller vary by {found.spreads.noise:.3f}, controllers by "
         f"{found.spreads.controllers:.3f} (standard deviations of {found.spreads.origin})"
     )
-    if found.question != "correlation":
+    if order.question != "correlation":
         echo(f"Assumed: true differences of controllers vary by {found.spread:.3f} (--spread)")
     echo(f"{'trials each':>12}{'controllers':>13}{'on the target':>15}{'detected in simulations':>30}")
     for row in found.needed:
@@ -246,12 +185,12 @@ def _print_plan(found: GapPlan, score: str, least: float, power: float) -> None:
     else:
         most = realitygap.study.MOST_CONTROLLERS
         echo(f"`realitygap gap` takes at most {most:,} controllers, fewer than each of these plans needs.")
-    if found.question == "effect":
+    if order.question == "effect":
         echo(
             "The RMS gap and the noise ceiling need at least 2 trials each: noise and gap are not separable "
             "with one."
         )
-    if found.question == "correlation":
+    if order.question == "correlation":
         echo(
             "A correlation is shown if it is above --least, one-sided at 5 %. `realitygap gap` prints the correlation "
             "without noise if each controller has at least 2 trials."

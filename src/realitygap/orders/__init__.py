@@ -8,6 +8,7 @@ from ._field import Limits, OrderField
 from ._function import takes_order, with_fields
 from ._gap import GapOrder
 from ._order import Order, OrderError
+from ._plan import PlanOrder, Question
 from ._record import ORDER_FILE, ORDERS, read_order
 from ._shared import ONLY_ROBOTS
 from ._transfer import TransferOrder
@@ -22,6 +23,8 @@ __all__ = [
     "Order",
     "OrderError",
     "OrderField",
+    "PlanOrder",
+    "Question",
     "TransferOrder",
     "read_order",
     "takes_order",

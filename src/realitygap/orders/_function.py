@@ -27,7 +27,6 @@ def takes_order(
     it gets the values that are no text: an arena by name belongs to the order, an `Arena` does not.
     """
     fields = {field.name: field for field in model.fields()}
-    places = [field.name for field in fields.values() if field.face.is_argument]
 
     def decorate(function: Callable[Concatenate[OrderT, P], R]) -> Callable[..., R]:
         _, *others = inspect.signature(function).parameters.values()
@@ -37,7 +36,7 @@ def takes_order(
         def call(*args: Any, **values: Any) -> R:
             if args and isinstance(args[0], model):
                 return function(*args, **values)
-            values |= zip(places, args, strict=False)
+            values |= model.by_place(*args) if args else {}
             rest = {
                 name: values.pop(name)
                 for name in own & set(values)

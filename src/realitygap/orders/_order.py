@@ -79,6 +79,12 @@ class Order(Settings):
             name: os.fspath(value) if isinstance(value, Path) else value for name, value in values.items()
         }
 
+    @classmethod
+    def by_place(cls, *values: object) -> dict[str, object]:
+        """Return the fields for values without names, which a function of the order takes first."""
+        places = [field.name for field in cls.fields() if field.face.is_argument]
+        return dict(zip(places, values, strict=False))
+
     def conflicts(self) -> Iterator[tuple[str, str]]:
         """Yield the field and the message for each setting that others exclude."""
         yield from ()

@@ -14,9 +14,12 @@ from realitygap.errors import StudyError, did_you_mean
 from ._calibrate import CalibrateOrder
 from ._gap import GapOrder
 from ._order import Order
+from ._plan import PlanOrder
 from ._transfer import TransferOrder
 
-ORDERS: dict[str, type[Order]] = {model.command: model for model in (CalibrateOrder, GapOrder, TransferOrder)}
+ORDERS: dict[str, type[Order]] = {
+    model.command: model for model in (CalibrateOrder, GapOrder, PlanOrder, TransferOrder)
+}
 """Orders by the name of their command."""
 
 ORDER_FILE = "order.toml"
@@ -67,6 +70,6 @@ def _record_in(path: Path) -> Mapping[str, Any]:
     if not isinstance(record, Mapping):
         raise StudyError(
             f"{path} does not state how it was made. Expected the report of a gap (.html), a calibration (.toml), the "
-            f"folder of a transfer, or the result of {' or '.join(f'`realitygap {name} --json`' for name in ORDERS)}."
+            f"folder of a transfer, or what one of these commands prints with --json: {', '.join(ORDERS)}."
         )
     return record

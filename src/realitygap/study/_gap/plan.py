@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from realitygap.errors import StudyError, whole_number
+from realitygap.orders import PlanOrder, takes_order
 from realitygap.platforms import open_target
 from realitygap.records import read_observations, those_that_count
-from realitygap.stats import Needed, check_plan, plan_correlation, plan_effect, plan_margin, trial_reliability
+from realitygap.stats import Needed, plan_correlation, plan_effect, plan_margin, trial_reliability
 from realitygap.tasks import CoverageTask, Task, score_observed
 from realitygap.world import Arena, load_arena
 
+from .._code import task_named
 from .._controllers import sample_controllers
 from .._targets import check_task
 from .study import MOST_CONTROLLERS, plans_of, side_of
@@ -26,8 +26,6 @@ TRIALS = (1, 2, 5, 10, 20, 50)
 
 PILOT = (30, 20)
 """Controllers and trials of each in a pilot in simulation."""
-
-Question = Literal["effect", "margin", "correlation"]
 
 
 @dataclass(frozen=True)
@@ -50,15 +48,15 @@ class GapPlan:
     """A plan: the number of controllers needed for each number of trials.
 
     Attributes:
-        question: effect, margin or correlation.
-        value: Value of the effect, the margin, or the correlation.
+        order: The question and its settings.
+        score: Name of the score, in whose units the numbers are.
         spread: Standard deviation of true differences over controllers that was assumed.
         spreads: Spreads of trials that were assumed.
         needed: A row for each number of trials.
     """
 
-    question: Question
-    value: float
+    order: PlanOrder
+    score: str
     spread: float
     spreads: Spreads
     needed: tuple[Needed, ...]
@@ -118,70 +116,53 @@ def _spreads(values: NDArray[np.float64], origin: str) -> Spreads:
     return Spreads(noise, float(np.sqrt(max(between, 0.0))), origin)
 
 
+@takes_order(PlanOrder)
 def plan_gap(
-    question: Question,
-    value: float,
+    order: PlanOrder,
     *,
-    spreads: Spreads | None = None,
     task: Task | None = None,
-    arena: str | Arena = "paper",
-    spread: float | None = None,
-    least: float = 0.5,
-    power: float = 0.8,
+    arena: Arena | None = None,
+    spreads: Spreads | None = None,
     trials: Sequence[int] = TRIALS,
-    seed: int = 1,
+    allow_code: bool = False,
 ) -> GapPlan:
-    """Find how many controllers a question takes, for several numbers of trials of each.
+    """Find how many controllers a question takes, for several numbers of trials of each; as `realitygap plan`.
+
+    The task may also be a `Task`, and the arena an `Arena`. `plan_gap("effect", 0.05)` is short for
+    `plan_gap(effect=0.05)`.
 
     Args:
-        question: `effect`: to find a mean difference; `margin`: to show equivalence within it; `correlation`: to show
-            that the correlation over controllers, which is `value`, is above `least`.
-        value: Value in units of the score; a correlation has no unit.
-        spreads: Spreads of trials. Default: those of a pilot on `sim`.
-        task: Scores the trials of the pilot; coverage if not given.
-        arena: Arena of the pilot.
-        spread: Standard deviation of true differences over controllers, in units of the score; half the spread of
-            controllers when not given.
-        least: Correlation that is to be exceeded.
-        power: Statistical power: the probability of detecting the effect.
+        spreads: Spreads of trials, instead of those of recorded trials or a pilot.
         trials: Number of trials of each controller on each platform.
-        seed: Seed of simulated studies.
+        allow_code: True to run the Python file of a task that the user has not allowed before.
 
     Raises:
         StudyError: A number is out of range; no pilot is made then.
     """
-    _refuse_unanswerable(question, value, spread, least, power, trials)
-    known = spreads or pilot_spreads(seed, arena, task)
-    apart = known.controllers / 2 if spread is None else spread
-    rows = []
     try:
-        for r in trials:
-            if question == "correlation":
-                reliability = trial_reliability(known.controllers, known.noise, r)
-                rows.append(
-                    plan_correlation(
-                        value, least=least, reliability=reliability, trials=r, power=power, seed=seed
-                    )
-                )
-            else:
-                planned = plan_effect if question == "effect" else plan_margin
-                rows.append(planned(value, spread=apart, noise=known.noise, trials=r, power=power, seed=seed))
-    except ValueError as error:
-        raise StudyError(str(error)) from None
-    return GapPlan(question, value, apart, known, tuple(rows))
-
-
-def _refuse_unanswerable(
-    question: Question, value: float, spread: float | None, least: float, power: float, trials: Sequence[int]
-) -> None:
-    """Refuse a question before a pilot is made for it."""
-    if question not in get_args(Question):
-        raise StudyError(f"question is {question!r}, expected one of {', '.join(get_args(Question))}.")
-    if spread is not None and not 0 <= spread < math.inf:
-        raise StudyError(f"spread is {spread}, expected a number from 0 on, in units of the score.")
-    try:
-        check_plan(power, **{question: value}, least=least)
         for r in trials:
             whole_number("trials", r, 1)
+        scored_by = task or task_named(order.task, allow_code=allow_code)
+        known = spreads or _spreads_of(order, scored_by, arena)
+        apart = known.controllers / 2 if order.spread is None else order.spread
+        rows = tuple(_needed(order, known, apart, r) for r in trials)
     except ValueError as error:
         raise StudyError(str(error)) from None
+    return GapPlan(order, scored_by.score_name, apart, known, rows)
+
+
+def _spreads_of(order: PlanOrder, task: Task, arena: Arena | None) -> Spreads:
+    if order.data is not None:
+        return recorded_spreads(str(order.data), task)
+    return pilot_spreads(order.seed, arena or order.arena, task)
+
+
+def _needed(order: PlanOrder, spreads: Spreads, apart: float, trials: int) -> Needed:
+    value, power, seed = order.value, order.power, order.seed
+    if order.question == "correlation":
+        reliability = trial_reliability(spreads.controllers, spreads.noise, trials)
+        return plan_correlation(
+            value, least=order.least, reliability=reliability, trials=trials, power=power, seed=seed
+        )
+    planned = plan_effect if order.question == "effect" else plan_margin
+    return planned(value, spread=apart, noise=spreads.noise, trials=trials, power=power, seed=seed)

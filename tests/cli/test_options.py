@@ -54,6 +54,7 @@ PRINTED_BY = {
     "logs/_round_robot.py": ("calibrate",),
     "logs/_table_map.py": ("calibrate",),
     "orders/_calibrate.py": ("calibrate",),
+    "orders/_closing.py": ("closing-the-gap",),
     "orders/_gap.py": ("gap",),
     "orders/_order.py": ("calibrate", "gap", "transfer"),
     "orders/_plan.py": ("plan",),

@@ -17,12 +17,14 @@ from realitygap.settings import MISSING
 
 FUNCTIONS = {
     "calibrate": "make_calibration",
+    "closing-the-gap": "closing_the_gap",
     "gap": "gap_between",
     "plan": "plan_gap",
     "transfer": "run_transfer",
 }
 SMALLEST = {
     "calibrate": {"what": "path", "robot": "sim", "out": "fit.toml"},
+    "closing-the-gap": {},
     "gap": {"sim": "sim", "target": "jyro"},
     "plan": {"effect": 0.1},
     "transfer": {"study": "sim-paper", "to": "jyro"},
@@ -37,6 +39,7 @@ WITH = {
         "drop_bad_rows": {"what": "motion"},
         "out": {"out": "there.toml"},
     },
+    "closing-the-gap": {"budgets": {"budgets": "0,20"}},
     "gap": {},
     "plan": {"margin": {"effect": None}, "correlation": {"effect": None, "correlation": 0.9}},
     "transfer": {},
@@ -45,6 +48,7 @@ WITH = {
 
 ONLY_IN_THE_COMMAND = {
     "calibrate": {"camera", "figure", "allow_code", "as_json"},
+    "closing-the-gap": {"as_json", "open_page"},
     "gap": {"camera", "report", "allow_code", "as_json"},
     "plan": {"allow_code", "as_json"},
     "transfer": {"allow_code", "as_json"},

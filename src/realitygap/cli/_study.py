@@ -13,9 +13,9 @@ import realitygap
 from realitygap._how_to_run import launcher
 from realitygap._terminal import echo
 from realitygap.errors import StudyError
+from realitygap.orders import ClosingOrder
 
 from ._browser import show_page
-from ._closing import CLOSING
 from ._code import ALLOW_CODE_HELP, code_permission
 from ._json import print_json
 from ._results import written_report
@@ -99,8 +99,8 @@ def run(
 
     In Python: realitygap.run_study("paper", replicates=1000)
     """
-    if study == CLOSING:
-        raise StudyError(f"{CLOSING} is a command: realitygap {CLOSING}")
+    if study == ClosingOrder.command:
+        raise StudyError(f"{study} is a command: realitygap {study}")
 
     from ._progress import RunsBar
 

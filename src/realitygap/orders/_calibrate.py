@@ -10,7 +10,7 @@ from realitygap.robot_families import default_family, port_platforms
 
 from ._field import argument, option
 from ._order import Order
-from ._shared import Seed, Witness, arena_option
+from ._shared import Seed, Witness, arena_option, seed_option
 
 
 class CalibrateOrder(Order):
@@ -134,7 +134,7 @@ class CalibrateOrder(Order):
         label="Robot model",
         refers="file",
     )
-    seed: Seed = 0
+    seed: Seed = seed_option(0)
     arena: str = arena_option()
     witness: Witness = None
 

@@ -194,7 +194,7 @@ def _parts(annotation: Any) -> tuple[Any, tuple[str, ...], bool, bool]:
     """Return the type of a value, its choices, whether it may be None, and whether there are several."""
     if get_origin(annotation) in (typing.Union, types.UnionType):
         (rest,) = (each for each in get_args(annotation) if each is not type(None))
-        kind, choices, _, is_list = _parts(rest)
+        kind, choices, _, is_list = _parts(get_args(rest)[0] if get_origin(rest) is Annotated else rest)
         return kind, choices, True, is_list
     if get_origin(annotation) is Literal:
         return str, get_args(annotation), False, False

@@ -10,7 +10,7 @@ from realitygap.robot_families import port_platforms
 
 from ._field import argument, option
 from ._order import Order
-from ._shared import Processes, Seed, Witness, arena_option, task_option
+from ._shared import Processes, Seed, Witness, arena_option, seed_option, task_option
 
 
 class GapOrder(Order):
@@ -108,7 +108,7 @@ class GapOrder(Order):
     )
     processes: Processes = None
     witness: Witness = None
-    seed: Seed = 1
+    seed: Seed = seed_option()
 
     def conflicts(self) -> Iterator[tuple[str, str]]:
         """Yield the field and the message for each setting that others exclude."""

@@ -8,7 +8,7 @@ from typing import ClassVar, Literal, get_args
 
 from ._field import option
 from ._order import Order, OrderError
-from ._shared import Seed, arena_option, task_option
+from ._shared import Seed, arena_option, seed_option, task_option
 
 Question = Literal["effect", "margin", "correlation"]
 
@@ -56,7 +56,7 @@ class PlanOrder(Order):
     )
     task: str = task_option()
     arena: str = arena_option()
-    seed: Seed = 1
+    seed: Seed = seed_option()
 
     @classmethod
     def by_place(cls, *values: object) -> dict[str, object]:

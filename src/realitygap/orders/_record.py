@@ -12,18 +12,19 @@ from realitygap._limits import MOST_TABLE_BYTES, parse_json, parse_toml, read_fi
 from realitygap.errors import StudyError, did_you_mean
 
 from ._calibrate import CalibrateOrder
+from ._closing import ClosingOrder
 from ._gap import GapOrder
 from ._order import Order
 from ._plan import PlanOrder
 from ._transfer import TransferOrder
 
 ORDERS: dict[str, type[Order]] = {
-    model.command: model for model in (CalibrateOrder, GapOrder, PlanOrder, TransferOrder)
+    model.command: model for model in (CalibrateOrder, ClosingOrder, GapOrder, PlanOrder, TransferOrder)
 }
 """Orders by the name of their command."""
 
 ORDER_FILE = "order.toml"
-"""Name of the file with its order in the folder of a transfer."""
+"""Name of the file with its order in a folder of results."""
 
 _ON_PAGE = re.compile(r'<pre id="order"[^>]*>(.*?)</pre>', re.DOTALL)
 

@@ -22,11 +22,7 @@ def _refuse_long(seed: int) -> int:
     return seed
 
 
-Seed = Annotated[
-    int,
-    option(help="Seed of all random numbers.", at_least=0, label="Seed"),
-    AfterValidator(_refuse_long),
-]
+Seed = Annotated[int, AfterValidator(_refuse_long)]
 
 Witness = Annotated[
     str | None,
@@ -58,6 +54,25 @@ def arena_option(default: str | None = "paper", *, default_is: str = "") -> Any:
         metavar="ARENA",
         label="Arena",
         refers="file",
+    )
+
+
+def seed_option(
+    default: int | None = 1, *, default_is: str = "", help: str = "Seed of all random numbers."
+) -> Any:
+    """Return the field of a seed."""
+    return option(default, help=help, default_is=default_is, at_least=0, label="Seed")
+
+
+def folder_option(default_is: str) -> Any:
+    """Return the field of a folder for results."""
+    return option(
+        None,
+        help="Folder for the results.",
+        default_is=default_is,
+        metavar="DIR",
+        names=("-o", "--out"),
+        is_output=True,
     )
 
 

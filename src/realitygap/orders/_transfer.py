@@ -11,7 +11,7 @@ from realitygap.robot_families import port_platforms
 
 from ._field import argument, option
 from ._order import Order
-from ._shared import Processes, Seed, Witness
+from ._shared import Processes, Seed, Witness, folder_option, seed_option
 
 
 class TransferOrder(Order):
@@ -82,15 +82,8 @@ class TransferOrder(Order):
     )
     runs: int = option(100, help="Evolutions in simulation per replicate.", at_least=1)
     repeats: int = option(8, help="Trials per individual in simulation.", at_least=1)
-    seed: Seed = 1
-    out: Path | None = option(
-        None,
-        help="Folder for trials and result.",
-        default_is="results/transfer",
-        metavar="DIR",
-        names=("-o", "--out"),
-        is_output=True,
-    )
+    seed: Seed = seed_option()
+    out: Path | None = folder_option("results/transfer")
     processes: Processes = None
     witness: Witness = None
 

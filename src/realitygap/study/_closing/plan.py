@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
 from pydantic import TypeAdapter, ValidationError
 
-from realitygap.errors import RecordError
-from realitygap.records import Observe, read_object, refuse_links, refuse_links_in, write_whole
+from realitygap.errors import RecordError, StudyError, did_you_mean
+from realitygap.orders import ClosingOrder
+from realitygap.records import CALIBRATES, Observe, read_object, refuse_links, refuse_links_in, write_whole
+from realitygap.robots.twin import FAMILIES
 
-NAME = "closing-the-gap"
+NAME = ClosingOrder.command
 
 CONTROLLERS_SEED = 20_250_101
 """Seed of the held-out controllers of twins. No other evolution and no calibration uses it."""
@@ -196,6 +198,36 @@ PLANS = {
     "playground": (PLAYGROUND, replace(PLAYGROUND, controllers_seed=1, **_FEW)),
 }
 """The plans by name: at full size, and small."""
+
+
+def plan_of(order: ClosingOrder) -> ClosingPlan:
+    """Return the plan of an order.
+
+    Raises:
+        StudyError: There is no such family or observation level.
+    """
+    base = PLANS[order.plan][1 if order.small else 0]
+    changes: dict[str, Any] = {}
+    if order.twins is not None:
+        changes["twins"] = order.twins
+    if order.seed is not None:
+        changes["seed"] = order.seed
+    if order.families is not None:
+        changes["families"] = _listed(order.families, "--families", base.platforms or FAMILIES)
+    if order.observe is not None:
+        changes["observations"] = _listed(order.observe, "--observe", CALIBRATES)
+    if order.budgets is not None:
+        changes["budgets"] = tuple(sorted({0, *map(int, order.budgets.split(","))}))
+    return replace(base, **changes)
+
+
+def _listed(text: str, option: str, known: Collection[str]) -> tuple[str, ...]:
+    names = tuple(dict.fromkeys(word.strip() for word in text.split(",")))
+    for name in names:
+        if name not in known:
+            raise StudyError(f"{option}: unknown {name!r}. {did_you_mean(name, known)}")
+    return names
+
 
 EXTENDED = ("families", "twins", "budgets")
 """Parts of a plan that may differ between calls on one folder."""

@@ -14,14 +14,15 @@ from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from typing import Any
 
-from realitygap.errors import RealityGapError, RobotError, from_extra, whole_number
+from realitygap.errors import RealityGapError, RobotError, from_extra
+from realitygap.orders import ORDER_FILE, ClosingOrder, takes_order
 from realitygap.platforms import Opening, TwinTarget, platform_of
 from realitygap.records import write_whole
 from realitygap.trials import Target, usable_processors
 
 from .._calibrate.whole import calibrate_all
 from .._transfer.strategies import choose_condition
-from .plan import ClosingPlan, TwinName, adopt_plan
+from .plan import ClosingPlan, TwinName, adopt_plan, plan_of
 from .summary import summarize_closing
 from .twin import ClosingTwin
 
@@ -41,38 +42,47 @@ class ClosingProgress:
     seconds: float
 
 
+@takes_order(ClosingOrder)
 def closing_the_gap(
-    out: str | Path,
-    plan: ClosingPlan | None = None,
+    order: ClosingOrder,
     *,
-    processes: int | None = None,
+    plan: ClosingPlan | None = None,
     tell: Callable[[ClosingProgress], None] | None = None,
 ) -> dict[str, Any]:
-    """Run the study, or the missing parts of it, and summarize it.
+    """Run the study, or the missing parts of it, and summarize it; as `realitygap closing-the-gap`.
 
     Each twin is drawn from its family into a file, which only the process that simulates it reads. The held-out
     controllers are tried on it; the simulator is calibrated by each budget of trials and way to observe, and judged by
     these controllers; and what evolves in it is transferred to the twin. Each of these is a file of its own, written
     whole: interrupt it at any moment, and the same call goes on.
 
+    The plan may also be a `ClosingPlan`, which replaces the other settings of the plan. `closing_the_gap("folder",
+    plan)` is short for `closing_the_gap(out="folder", plan=plan)`.
+
     Args:
-        out: Folder for the results.
-        plan: Plan of the study. Default: its full size. `realitygap.study.SMALL` takes minutes.
-        processes: Number of twins in parallel. Default: the number of processors.
         tell: Called with the progress, now and then.
 
     Returns:
         The summary, which is in `summary.json` of the folder as well: see `summarize_closing`.
 
     Raises:
+        StudyError: There is no such plan, family, or observation level, or a number is out of its range.
         RecordError: The folder holds another plan.
         MissingExtraError: MuJoCo is not installed.
-        ValueError: There is no such family, or a number out of its range.
     """
-    plan = plan or ClosingPlan()
-    processes = usable_processors() if processes is None else whole_number("processes", processes, 1)
-    folder = Path(out)
-    adopt_plan(folder, plan)
+    folder = order.folder
+    processes = order.processes or usable_processors()
+    chosen = plan or plan_of(order)
+    adopt_plan(folder, chosen)
+    if plan is None:
+        write_whole(folder / ORDER_FILE, order.to_toml().encode(), within=folder)
+    return _run(folder, chosen, processes, tell)
+
+
+def _run(
+    folder: Path, plan: ClosingPlan, processes: int, tell: Callable[[ClosingProgress], None] | None
+) -> dict[str, Any]:
+    """Run what is missing in a folder."""
     _write_twins(folder, plan)
     since = time.perf_counter()
 

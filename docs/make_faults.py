@@ -15,7 +15,7 @@ TITLES = {
     "interrupts": "Ctrl-C, twice in a row, in long commands",
     "simulated-kills": "SIGKILL of simulated studies",
     "physical-kills": "SIGKILL of studies on an emulated robot",
-    "trial-kills": "SIGKILL of `gap`, `calibrate`, `transfer`, and `try`",
+    **{f"{command}-kills": f"SIGKILL of `{command}`" for command in ("gap", "calibrate", "transfer", "try")},
     "wire": "faults on the wire to an emulated robot",
     "cluster": "Dask workers and schedulers killed",
     "full-disk": "disks that fill during a command",

@@ -25,7 +25,7 @@ from realitygap.records import LEDGER_NAME, Ledger, ResultsFolder, Score, _ledge
 from realitygap.report import summarize
 from realitygap.report._driven import describe_driven, driven_paths, read_driven
 from realitygap.study import run_study
-from realitygap.study._trial_bags import _driven, _trial
+from realitygap.study._trial_export import _driven, _trial
 from tests.commands import run_command
 from tests.study.physical import drive, small_study
 

@@ -6,12 +6,15 @@ import json
 import re
 from pathlib import Path
 
+import numpy as np
+import polars as pl
 import pytest
 from typer.testing import CliRunner
 
 from realitygap.cli import app
 from realitygap.evolution import NeatSettings, Population
 from realitygap.records import read_observations
+from tests.study.physical import drive, small_study
 
 
 def run(*arguments: object) -> str:
@@ -70,3 +73,50 @@ def test_folder_with_several_files_of_trials_names_one(tried, tmp_path):
     (tmp_path / "r" / "trials" / "select-8-0.jsonl").write_bytes(Path(tried[-1]).read_bytes())
     assert "select-8-0.jsonl" in run("trials", "list", tmp_path / "r")
     assert "There is no ledger" in run("trials", "list", tmp_path / "none")
+
+
+@pytest.fixture
+def driven(tmp_path: Path) -> Path:
+    """Results of a small study on an emulated robot."""
+    drive(small_study(), tmp_path / "study")
+    return tmp_path / "study"
+
+
+@pytest.mark.parametrize("kind", ["tried", "driven"])
+def test_trial_of_any_store_is_shown_with_its_record_and_notes(kind, request):
+    source = request.getfixturevalue(kind)
+    source = source if kind == "driven" else source[-1]
+    run("trials", "note", source, 1, "--text", "a new pen", "--who", "anna")
+    words = run("trials", "show", source, 1)
+    assert "state: scored" in words
+    assert "a new pen" in words
+    shown = json.loads(run("trials", "show", source, 1, "--json"))
+    assert shown["record"]["number"] == shown["trial"] == 1
+    assert len(shown["record"]["commands"]) > 0
+    assert shown["notes"][0]["who"] == "anna"
+    assert "a trial is missing" in run("trials", "show", source)
+
+
+@pytest.mark.parametrize("kind", ["tried", "driven"])
+def test_trials_of_any_store_are_exported_as_lines_and_rows(kind, request, tmp_path):
+    source = request.getfixturevalue(kind)
+    source = source if kind == "driven" else source[-1]
+    n = len(json.loads(run("trials", "list", source, "--json")))
+    assert f"{n} trials" in run("trials", "export", source, "-o", tmp_path / "all.jsonl")
+    copies = read_observations(tmp_path / "all.jsonl")
+    assert len(copies.trials) == n
+    run("trials", "export", source, 2, "-o", tmp_path / "one.parquet")
+    (trial,) = [trial for trial in copies.trials if trial.number == 2]
+    rows = pl.read_parquet(tmp_path / "one.parquet").head(len(trial.commands))
+    assert rows["trial"].unique().to_list() == [2]
+    np.testing.assert_array_equal(rows.select("move", "turn").to_numpy(), trial.commands)
+    np.testing.assert_array_equal(np.array(rows["readings"].to_list()), trial.readings)
+    if len(trial.poses):
+        np.testing.assert_array_equal(rows.select("x", "y", "heading").to_numpy(), trial.poses[:-1])
+
+
+def test_export_never_replaces_a_file(tried, tmp_path):
+    before = Path(tried[-1]).read_bytes()
+    assert "exists already" in run("trials", "export", tried[-1], "-o", tried[-1])
+    assert Path(tried[-1]).read_bytes() == before
+    assert "-o" in run("trials", "export", tried[-1])

@@ -23,11 +23,12 @@ LONGEST_EXAMPLE = 1500
 
 
 class Kind(NamedTuple):
-    """A kind of fault: its module, the number of faults that a release needs, and their number in a batch."""
+    """A kind of fault: its module, the numbers of faults for a release and in a batch, and the killed command."""
 
     module: str
     n: int
     batch: int
+    command: str = ""
 
 
 KINDS: Mapping[str, Kind] = MappingProxyType(
@@ -35,7 +36,10 @@ KINDS: Mapping[str, Kind] = MappingProxyType(
         "interrupts": Kind("interrupts", 64, 8),
         "simulated-kills": Kind("simulated_kills", 1000, 50),
         "physical-kills": Kind("physical_kills", 200, 20),
-        "trial-kills": Kind("trial_kills", 200, 20),
+        "gap-kills": Kind("trial_kills", 200, 20, "gap"),
+        "calibrate-kills": Kind("trial_kills", 200, 20, "calibrate"),
+        "transfer-kills": Kind("trial_kills", 200, 20, "transfer"),
+        "try-kills": Kind("trial_kills", 200, 20, "try"),
         "wire": Kind("wire", 10_000, 500),
         "cluster": Kind("cluster_kills", 20, 4),
         "full-disk": Kind("full_disk", 600, 30),
@@ -46,9 +50,11 @@ KINDS: Mapping[str, Kind] = MappingProxyType(
 
 def strike(kind: str, seed: int, n: int) -> list[str]:
     """Inject n faults of a kind in this process; return what did not hold after each, empty if everything did."""
+    command = [KINDS[kind].command] if KINDS[kind].command else []
+    inject = import_module(f"tests.faults.{KINDS[kind].module}").inject
     with tempfile.TemporaryDirectory(prefix="faults-") as folder:
         problems: list[str] = []
-        for problem in import_module(f"tests.faults.{KINDS[kind].module}").inject(seed, n, Path(folder)):
+        for problem in inject(seed, n, Path(folder), *command):
             problems.append(problem)
             if len(problems) >= n:
                 break

@@ -77,7 +77,10 @@ def test_mutations_are_equal_for_equal_seeds_and_change_the_file():
     assert sum(each != data for each in first) > 150
 
 
-@pytest.mark.parametrize(("kind", "n"), [("wire", 40), ("trial-kills", 4)])
+DRIVING = ("physical-kills", "gap-kills", "calibrate-kills", "transfer-kills", "try-kills")
+
+
+@pytest.mark.parametrize(("kind", "n"), [("wire", 40), *((kind, 2) for kind in DRIVING)])
 def test_few_faults_of_kinds_that_are_cheap_break_no_promise(kind, n):
     with ProcessPoolExecutor(1, mp_context=fork_context()) as pool:  # without the threads of this process
         assert not [problem for problem in pool.submit(strike, kind, 0, n).result() if problem]

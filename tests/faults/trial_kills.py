@@ -169,18 +169,13 @@ def _short(genome: str) -> str:
     return hashlib.sha256(genome.encode()).hexdigest()[:8]
 
 
-def inject(seed: int, n: int, folder: Path) -> Iterator[str]:
-    """Yield what did not hold after each of n kills."""
+def inject(seed: int, n: int, folder: Path, command: str) -> Iterator[str]:
+    """Yield what did not hold after each of n kills of a command."""
     draw = random.Random(seed)
-    whole: dict[str, _Whole] = {}
-    names = draw.sample(sorted(WORKS), len(WORKS))
-    most = min(MOST_KILLS, -(-n // len(names)))
+    whole = _Whole(command, folder / "whole")
     left, number = n, 0
     while left:
-        name = names[number % len(names)]
-        if name not in whole:
-            whole[name] = _Whole(name, folder / f"whole-{name}")
-        problems = list(_injected(whole[name], folder / f"{name}-{number}", draw, min(left, most)))
+        problems = list(_injected(whole, folder / f"{command}-{number}", draw, min(left, MOST_KILLS)))
         yield from problems
         left -= len(problems)
         number += 1

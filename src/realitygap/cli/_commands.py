@@ -55,8 +55,8 @@ SECTIONS: dict[str, tuple[Command, ...]] = {
         Command("export", "Export a network as JSON, ONNX, C, Aseba, or a graph.", "_export", "export"),
         Command(
             "export-trials",
-            "Write driven trials as bags of ROS 2 or as MCAP.",
-            "_trial_bags",
+            "Write driven trials as JSON, Parquet, MCAP, or bags.",
+            "_export_trials",
             "export_trials",
         ),
         Command("digest", "Print the hash of a study's results.", "_results", "digest"),
@@ -76,7 +76,7 @@ SECTIONS: dict[str, tuple[Command, ...]] = {
         Command("robot", "Connect to a robot and send it commands.", "_robot", "robot"),
         Command("emulate", "Emulate a robot on a pseudo-terminal or TCP port.", "_emulate", "emulate"),
         Command("platforms", "List the platforms that can run trials.", "_platforms", "platforms"),
-        Command("trials", "List, score, and annotate trials.", "_trials", "trials"),
+        Command("trials", "List, show, score, annotate, and export trials.", "_trials", "trials"),
     ),
     "Score physical trials": (
         Command(

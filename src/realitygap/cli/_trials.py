@@ -3,24 +3,28 @@
 from __future__ import annotations
 
 import getpass
+import math
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+import realitygap
 from realitygap._limits import MOST_TABLE_BYTES, read_file
 from realitygap._terminal import echo
 from realitygap.errors import LedgerError, StudyError, did_you_mean
 
+from ._export_trials import export
 from ._json import print_json
 
 if TYPE_CHECKING:
     from realitygap.records import Ledger, LoggedTrial, ScoreRole, Trial, TrialLog
     from realitygap.world import Arena
 
-_WHAT = ("list", "score", "undo", "void", "note", "agreement")
-_READING = ("list", "agreement")
+_WHAT = ("list", "show", "score", "undo", "void", "note", "export", "agreement")
+_READING = ("list", "show", "export", "agreement")
+_PRINTING = ("list", "show", "agreement")
 """Actions that change nothing."""
 
 
@@ -29,7 +33,10 @@ _ONLY_SCORE = "Only for score"
 
 def trials(
     what: Annotated[
-        str, typer.Argument(metavar="WHAT", help="Action: list, score, undo, void, note or agreement.")
+        str,
+        typer.Argument(
+            metavar="WHAT", help="Action: list, show, score, undo, void, note, export or agreement."
+        ),
     ],
     source: Annotated[
         Path,
@@ -81,9 +88,19 @@ def trials(
             rich_help_panel="Only for note and void",
         ),
     ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "-o",
+            "--out",
+            metavar="NAME",
+            help="File that ends in .jsonl, .parquet, or .mcap, or folder of a new bag.",
+            rich_help_panel="Only for export",
+        ),
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
-    """List, score, and annotate trials.
+    """List, show, score, annotate, and export trials.
 
     TRIALS is the folder of a study with trials on a robot, or a file in which gap, calibrate, transfer, or try saved
     theirs.
@@ -107,6 +124,10 @@ def trials(
 
     Example: realitygap trials void gap.jsonl 4194305 --text "it was pushed"
 
+    Example: realitygap trials show gap.jsonl 4194305
+
+    Example: realitygap trials export results/paper-robot -o trials.parquet
+
     Example: realitygap trials agreement results/paper-robot
 
     In Python: realitygap.records.Ledger.open("results/paper-robot/ledger.sqlite").trials()
@@ -121,12 +142,18 @@ def trials(
         raise StudyError(f"--cells, --file, --second and --correct go with score, not with {what}.")
     if file is not None and trial is not None:
         raise StudyError("--file names its trials itself. Leave the trial out.")
-    if as_json and what not in _READING:
-        raise StudyError(f"--json is only for {' and '.join(_READING)}, not for {what}. Leave it out.")
+    if as_json and what not in _PRINTING:
+        raise StudyError(f"--json is only for {', '.join(_PRINTING)}, not for {what}. Leave it out.")
+    if out is not None and what != "export":
+        raise StudyError(f"--out is only for export, not for {what}. Leave it out.")
     name = who or getpass.getuser()
     with _open(source, writable=what not in _READING) as opened:
         if what == "list":
             _list(opened, as_json=as_json)
+        elif what == "show":
+            _show(opened, _number(opened, _needed(trial, "a trial")), as_json=as_json)
+        elif what == "export":
+            export(source, out, () if trial is None else [_number(opened, trial)])
         elif what == "agreement":
             _agreement(_of_study(opened, what).path.parent, as_json=as_json)
         elif what == "score":
@@ -357,6 +384,35 @@ def _list(opened: Ledger | TrialLog, *, as_json: bool) -> None:
     states = [trial.state for trial in trials]
     counts = ", ".join(f"{states.count(state)} {state}" for state in dict.fromkeys(states))
     echo(f"{len(trials)} trials: {counts}." if trials else "No trial is planned yet.")
+
+
+def _show(opened: Ledger | TrialLog, number: int, *, as_json: bool) -> None:
+    """Print the facts of a trial, or as JSON all that was recorded."""
+    trial, record, notes = opened.trial(number), opened.record(number), opened.notes(number)
+    is_hidden = number in _hidden(opened)
+    if as_json:
+        facts = {
+            name: None if is_hidden and name in _BLINDED else value for name, value in vars(trial).items()
+        }
+        print_json({**facts, "record": realitygap.records.trial_to_dict(record), "notes": notes})
+        return
+    cells = "not counted" if trial.cells is None else ", ".join(map(str, trial.cells)) or "none"
+    lines = {
+        "description": "" if is_hidden else trial.name,
+        "state": f"{trial.state}: {trial.reason}" if trial.reason else trial.state,
+        "end": f"{record.end}: {record.problem}" if record.problem else record.end,
+        "steps": f"{len(record.commands)} of {record.step_s:g} s" if len(record.commands) else "none",
+        "observed": record.observe,
+        "blocked steps": str(record.n_stalls),
+        "cells": cells,
+        "battery": "" if math.isnan(record.battery_v) else f"{record.battery_v:.2f} V",
+    }
+    echo(f"Trial {number}")
+    for name, text in lines.items():
+        if text:
+            echo(f"  {name}: {text}")
+    for note in notes:
+        echo(f"  note by {note['who']} ({note['time']}): {note['text']}")
 
 
 _BLINDED = ("condition", "replicate", "generation", "individual")

@@ -45,7 +45,7 @@ from ._tracked import (
 from ._transfer.ordered import run_transfer
 from ._transfer.result import TransferResult
 from ._transfer.strategies import choose_condition, transfer
-from ._trial_bags import export_trials
+from ._trial_export import export_trials, write_trials
 from ._try_on import try_on
 
 __all__ = [
@@ -123,4 +123,5 @@ __all__ = [
     "try_on",
     "usable_processors",
     "with_ruled_end",
+    "write_trials",
 ]

@@ -15,6 +15,7 @@ from ._home import add_home
 from ._new import add_new
 from ._photos import add_photos
 from ._robot import add_robot
+from ._saved import add_saved
 from ._stop import add_stop
 from ._study import add_study
 from ._trials import add_trials
@@ -28,6 +29,16 @@ def add_pages(lab: Lab) -> None:
     playback = resources.files("realitygap.playback")
     app.add_static_file(local_file=str(playback / "player.js"), url_path="/lab-player/player.js")
     app.add_static_file(local_file=str(playback / "player.css"), url_path="/lab-player/player.css")
-    pages = (add_home, add_new, add_trials, add_photos, add_robot, add_study, add_gap, add_calibrate)
+    pages = (
+        add_home,
+        add_new,
+        add_trials,
+        add_photos,
+        add_robot,
+        add_study,
+        add_gap,
+        add_calibrate,
+        add_saved,
+    )
     for add in (*pages, add_stop, add_error_pages):
         add(lab)

@@ -99,6 +99,7 @@ class _Page:
             self._asked.show()
             self._made()
             self._plot()
+        ui.link("Saved trials", "/saved")
         self._again = ui.button("New calibration", on_click=self._begin_again).props("outline no-caps")
         self._fold_form()
         watching(self._lab, self._look)

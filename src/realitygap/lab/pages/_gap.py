@@ -93,6 +93,7 @@ class _Page:
         with ui.column().classes("lab-cards"):
             parts[-1].show()
         parts.append(unfinished)
+        ui.link("Saved trials", "/saved")
         if self._reports:
             section("Saved reports")
         for name in self._reports:

@@ -65,7 +65,7 @@ def test_trials_of_a_ledger_have_the_path_of_the_witness(tmp_path):
 def test_missing_trials_and_files_give_one_message(trials, tmp_path):
     with pytest.raises(StudyError, match="has no trial 8; it has 7, 9"):
         export(trials, "--trial", 8, "-o", tmp_path / "a.mcap")
-    with pytest.raises(StudyError, match="Name the bag to write with -o"):
+    with pytest.raises(StudyError, match="with -o: a file"):
         export(trials)
     (tmp_path / "taken").mkdir()
     with pytest.raises(StudyError, match=r"taken has no trials of a robot\. For those of a simulation"):

@@ -1,0 +1,96 @@
+"""Files in which gaps, calibrations, transfers, and `try` saved their trials."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from realitygap.errors import RecordError
+from realitygap.records import LoggedTrial, Score, TrialLog, is_observations
+from realitygap.world import Arena
+
+from ._files import last_change, plain_files
+
+LONGEST_TEXT = 1000
+"""Largest length of a reason or note [letters]."""
+
+
+def saved_files(root: Path) -> dict[str, Path]:
+    """Return the files of trials in a folder and the folders in it, by their path from it."""
+    folders = [root]
+    with contextlib.suppress(OSError):
+        folders += sorted(path for path in root.iterdir() if path.is_dir() and not path.is_symlink())
+    files: dict[str, Path] = {}
+    for folder in folders:
+        for path in plain_files(folder, (".jsonl",)):
+            with contextlib.suppress(RecordError):
+                if is_observations(path):
+                    files[path.relative_to(root).as_posix()] = path
+    return files
+
+
+@dataclass(frozen=True)
+class SavedTrials:
+    """The trials of a file at one moment, and the notes on each by its number."""
+
+    arena: Arena
+    trials: tuple[LoggedTrial, ...]
+    notes: Mapping[int, str]
+
+    def trial(self, number: int | None) -> LoggedTrial | None:
+        """Return a trial by its number."""
+        return next((trial for trial in self.trials if trial.trial == number), None)
+
+
+class SavedFile:
+    """A file of trials that visitors list, correct, void, and annotate. All methods wait for the disk.
+
+    Raises:
+        RecordError: From any method: the file is damaged, in use, or cannot be written, or has no such trial.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self.changed_s: float | None = None
+
+    def read(self) -> SavedTrials:
+        """Return the trials."""
+        self.changed_s = last_change(self._path)
+        with TrialLog.open(self._path, writable=False) as log:
+            trials = tuple(log.trials())
+            notes = {
+                trial.trial: "; ".join(f"{note['who']}: {note['text']}" for note in log.notes(trial.trial))
+                for trial in trials
+            }
+            return SavedTrials(log.arena, trials, notes)
+
+    def has_changed(self) -> bool:
+        """Return whether the file has changed since it was read."""
+        return last_change(self._path) != self.changed_s
+
+    def score(self, number: int, cells: Sequence[int], who: str) -> None:
+        """Enter the cells of a trial in place of those of before."""
+        who = _named(who)
+        with TrialLog.open(self._path) as log:
+            log.score_all({number: Score(cells, who)})
+
+    def void(self, number: int, reason: str, who: str) -> None:
+        """Declare a trial void; its command drives it again."""
+        who = _named(who)
+        with TrialLog.open(self._path) as log:
+            log.void(number, reason[:LONGEST_TEXT])
+            log.note("void", who, number)
+
+    def note(self, number: int, text: str, who: str) -> None:
+        """Save a note about a trial."""
+        who = _named(who)
+        with TrialLog.open(self._path) as log:
+            log.note(text[:LONGEST_TEXT], who, number)
+
+
+def _named(who: str) -> str:
+    if not who.strip():
+        raise RecordError("Enter your name first. It is saved with each entry.")
+    return who.strip()

@@ -1,0 +1,155 @@
+"""Saved trials: those that gaps and calibrations saved in files, to list, correct, void, and annotate."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from nicegui import run, ui
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
+
+from realitygap._wording import counted
+from realitygap.errors import RealityGapError
+from realitygap.lab._lab import Lab
+from realitygap.lab._saved import SavedFile, SavedTrials, saved_files
+
+from ._fields import Form
+from ._frame import LONGEST_NAME, framed, hint, remember_who, section, text_of, visitor_of
+from ._grid import CellGrid
+from ._notices import attempt
+
+_COLUMNS = {"number": "Trial", "name": "Description", "state": "State", "cells": "Cells", "said": "Notes"}
+
+
+def add_saved(lab: Lab) -> None:
+    """Add the list of files, and the page of each."""
+
+    @ui.page("/saved", response_timeout=30)
+    async def files() -> None:
+        names = await run.io_bound(saved_files, lab.root) or {}
+        with framed(lab, "Saved trials", ""):
+            hint("Trials of studies are on the page of each study.")
+            for name in names:
+                ui.link(name, f"/saved/{name}")
+            if not names:
+                ui.label("No saved trials yet. A gap or a calibration saves its trials.")
+
+    @ui.page("/saved/{name:path}", response_timeout=30)
+    async def trials(name: str, request: Request) -> None:
+        path = (await run.io_bound(saved_files, lab.root) or {}).get(name)
+        if path is None:
+            raise HTTPException(404, name)
+        file = SavedFile(path)
+        try:
+            found = await run.io_bound(file.read)
+        except RealityGapError as error:
+            with framed(lab, name, "", above=[("Saved trials", "/saved")]):
+                ui.label(str(error)).classes("lab-problem")
+            return
+        if found is not None:
+            with framed(lab, name, "", above=[("Saved trials", "/saved")]):
+                _Page(file, found, visitor_of(request).who).show()
+
+
+class _Page:
+    def __init__(self, file: SavedFile, found: SavedTrials, who: str) -> None:
+        self._file, self._found, self._who = file, found, who
+        self._chosen: int | None = None
+        self._cells: list[int] = []
+
+    def show(self) -> None:
+        hint("The command that saved these trials uses your changes when it resumes. It repeats void trials.")
+        name = Form().text("who", "Your name", self._who, explanation="Your name is saved with each entry.")
+        name.props(f"debounce=400 maxlength={LONGEST_NAME}")
+        name.on_value_change(lambda event: self._named(text_of(event)))
+        self._table, self._card = ui.refreshable(self._show_table), ui.refreshable(self._show_card)
+        self._table()
+        self._card()
+        ui.timer(1.0, self._look)  # a command may save trials
+
+    def _named(self, who: str) -> None:
+        self._who = who[:LONGEST_NAME]
+        remember_who(self._who)
+
+    async def _look(self) -> None:
+        if await run.io_bound(self._file.has_changed):
+            await self._reload()
+
+    async def _reload(self) -> None:
+        try:
+            found = await run.io_bound(self._file.read)
+        except RealityGapError:  # it is being written; the next look reads it again
+            self._file.changed_s = None
+            return
+        if found is not None:
+            self._found = found
+            self._table.refresh()
+
+    def _show_table(self) -> None:
+        ui.label(counted(len(self._found.trials), "trial"))
+        rows: list[dict[str, Any]] = [
+            {
+                "number": trial.trial,
+                "name": trial.name,
+                "state": f"{trial.state}: {trial.reason}" if trial.reason else trial.state,
+                "cells": "" if trial.cells is None else str(len(trial.cells)),
+                "said": self._found.notes[trial.trial],
+            }
+            for trial in self._found.trials
+        ]
+        columns = [
+            {"name": key, "label": label, "field": key, "align": "left"} for key, label in _COLUMNS.items()
+        ]
+        table = ui.table(rows=rows, columns=columns, row_key="number", pagination=20, selection="single")
+        table.classes("lab-table").props("flat bordered dense wrap-cells")
+        table.on_select(lambda event: self._choose([row["number"] for row in event.selection]))
+
+    def _choose(self, numbers: list[int]) -> None:
+        self._chosen = numbers[0] if numbers else None
+        self._card.refresh()
+
+    def _show_card(self) -> None:
+        trial = self._found.trial(self._chosen)
+        if trial is None:
+            ui.label("Select a trial to correct its cells, void it, or add a note.")
+            return
+        number = trial.trial
+        section(f"Trial {number}: {trial.name}")
+        if trial.state in ("driven", "scored"):
+            self._cells = list(trial.cells or ())
+            with ui.element("div").classes("lab-wide"):
+                CellGrid(
+                    self._found.arena, cells=self._cells, name=f"Cells of trial {number}", change=self._marked
+                )
+            ui.button("Save cells", on_click=lambda: self._score(number)).props("unelevated no-caps")
+        text = ui.input("Note or reason").props("outlined dense").classes("lab-wide")
+        with ui.row().classes("lab-row"):
+            ui.button("Save note", on_click=lambda: self._note(number, text_of(text))).props(
+                "outline no-caps"
+            )
+            ui.button("Void trial", on_click=lambda: self._void(number, text_of(text))).props(
+                "outline no-caps"
+            ).set_enabled(trial.state != "void")
+
+    def _marked(self, cells: list[int]) -> None:
+        self._cells = cells
+
+    async def _score(self, number: int) -> None:
+        cells, who = sorted(self._cells), self._who
+        done = f"Trial {number}: {counted(len(cells), 'cell')} saved."
+        await self._enter(lambda: self._file.score(number, cells, who), done)
+
+    async def _note(self, number: int, text: str) -> None:
+        who = self._who
+        await self._enter(lambda: self._file.note(number, text, who), "Note saved.")
+
+    async def _void(self, number: int, reason: str) -> None:
+        who = self._who
+        done = f"Trial {number} is void. It will be repeated."
+        await self._enter(lambda: self._file.void(number, reason, who), done)
+
+    async def _enter(self, act: Callable[[], None], done: str) -> None:
+        if await attempt(act, done):
+            await self._reload()
+            self._card.refresh()

@@ -38,15 +38,30 @@ def fitted(trials, seed=0):
     return numbers_of(prior, found.values, PLATFORM.robot)
 
 
-@pytest.fixture(scope="module", params=["cells", "encoders"])
-def trials(request):
+def driven(observe, n_steps):
+    """Trials of a robot that has the numbers of `TRUTH`, cut to so many steps each."""
     with SimTarget(SimPlatform(robot="thymio", step_s=0.5, set=TRUTH), ARENA, key=3) as target:
-        return target.carry_out(all_plans(ARENA, PLATFORM.robot, 10, 1), request.param)
+        trials = target.carry_out(all_plans(ARENA, PLATFORM.robot, len(n_steps), 1), observe)
+    return [
+        replace(
+            trial,
+            commands=trial.commands[:n],
+            readings=trial.readings[:n],
+            stalled=trial.stalled[:n],
+            wheels=trial.wheels[: n + 1],
+        )
+        for trial, n in zip(trials, n_steps, strict=True)
+    ]
 
 
 @pytest.mark.slow
-def test_a_robot_is_found_from_whole_trials_without_poses(trials):
-    numbers = fitted(trials)
+@pytest.mark.parametrize(
+    ("observe", "n_steps"),
+    [("cells", 10 * [100]), ("encoders", [100, 30, 100, 100, 60, 100, 100, 100, 5, 100])],
+    ids=["cells", "encoders of different lengths"],
+)
+def test_a_robot_is_found_from_whole_trials_without_poses(observe, n_steps):
+    numbers = fitted(driven(observe, n_steps))
     middle = {name: np.median(value) for name, value in numbers.items()}
     for side, gain in (("left", 0.8), ("right", 0.84)):
         moved = numbers[f"drive.gain_{side}"] * (1 - numbers["drive.slip"])
@@ -58,25 +73,9 @@ def test_a_robot_is_found_from_whole_trials_without_poses(trials):
 
 @pytest.mark.slow
 def test_slip_that_nothing_shows_keeps_its_prior():
-    with SimTarget(SimPlatform(robot="thymio", step_s=0.5, set=TRUTH), ARENA, key=3) as target:
-        numbers = fitted(target.carry_out(all_plans(ARENA, PLATFORM.robot, 4, 1), "cells"))
+    numbers = fitted(driven("cells", 4 * [100]))
     low, middle, high = np.quantile(numbers["drive.slip"], [0.05, 0.5, 0.95])
     # evenly in 0 to 0.25, less where it would take the gain to an end of its prior
     assert low < 0.05
     assert 0.08 < middle < 0.17
     assert high > 0.2
-
-
-@pytest.mark.slow
-def test_trials_of_different_lengths_are_fitted_together(trials):
-    cut = [
-        replace(
-            trial,
-            commands=trial.commands[:n],
-            readings=trial.readings[:n],
-            stalled=trial.stalled[:n],
-            wheels=trial.wheels[: n + 1],
-        )
-        for trial, n in zip(trials, (100, 30, 100, 100, 60, 100, 100, 100, 5, 100), strict=True)
-    ]
-    assert np.median(fitted(cut)["drive.track"]) == pytest.approx(0.104, rel=0.03)

@@ -68,7 +68,9 @@ def lines():
 @pytest.fixture(scope="module")
 def photo(tmp_path_factory, lines):
     path = tmp_path_factory.mktemp("photo") / "sheet.jpg"
-    path.write_bytes(photograph_sheet(SheetLayout.of(paper_arena(), ("red", "blue")), lines, 1).jpeg)
+    path.write_bytes(
+        photograph_sheet(SheetLayout.of(paper_arena(), ("red", "blue")), lines, 1, size=(1600, 1200)).jpeg
+    )
     return path
 
 
@@ -168,7 +170,7 @@ def test_a_photo_of_something_else_enters_nothing(driven, tmp_path, command):
 
 def _bytes_of(kind: str, photo) -> bytes:
     if kind == "torn":
-        return photo.read_bytes()[:200_000]
+        return photo.read_bytes()[: photo.stat().st_size // 2]
     if kind == "gray":
         from PIL import Image
 

@@ -76,7 +76,7 @@ def photo_of(lines: list[np.ndarray]) -> bytes:
 @cache
 def _photograph(*lines: bytes) -> bytes:
     paths = [np.frombuffer(line).reshape(-1, 2) for line in lines]
-    return photograph_sheet(SheetLayout.of(paper_arena(), PENS), paths, 1).jpeg
+    return photograph_sheet(SheetLayout.of(paper_arena(), PENS), paths, 1, size=(1600, 1200)).jpeg
 
 
 def true_cells(line: np.ndarray) -> set[int]:

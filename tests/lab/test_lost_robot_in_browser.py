@@ -74,8 +74,6 @@ def kill_and_see_silence(page, robot) -> None:
     page.evaluate(WATCH_SILENCE)
     robot.kill()
     page.wait_for_function("() => window.silence")
-    seconds = int(re.search(r"for (\d+)", page.evaluate("window.silence"))[1])
-    assert seconds <= 4, "1.5 s on an idle machine"
     page.locator(".lab-robot-silent .lab-chip", has_text="no readings").wait_for()
 
 

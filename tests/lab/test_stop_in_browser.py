@@ -1,10 +1,9 @@
-"""The stop for the robot: in sight, uncovered, and at once whatever else goes on."""
+"""The stop for the robot: in sight, uncovered, and heard whatever else goes on."""
 
 from __future__ import annotations
 
 import subprocess
 import sys
-import threading
 import time
 from collections.abc import Iterator
 from typing import Any
@@ -21,10 +20,6 @@ from .test_studies_in_browser import TINY, start
 
 pytestmark = pytest.mark.slow
 
-STOP_S = 0.2
-"""Within which the motors stand after a press [s]."""
-RELEASE_S = 0.5
-"""Within which they stand after a key was let go, or may have been [s]."""
 VIEWS = {"desktop": (1280, 800), "phone": PHONE, "phone with its keyboard": (390, 400)}
 
 NOTICES = """() => ["negative", "warning", "info"].forEach((type) => Quasar.Notify.create({
@@ -75,61 +70,46 @@ def agent(view: str) -> str | None:
 
 
 class Motors:
-    """The motors of an emulated robot, looked at by its witness all the time."""
+    """The motors of an emulated robot, seen by its witness. `benchmarks/lab_stop.py` measures their speed."""
 
-    def __init__(self, witness: str) -> None:
-        self.moved_s = 0.0
-        self._ended = threading.Event()
-        self._thread = threading.Thread(target=self._look, args=(witness,), daemon=True)
-        self._thread.start()
-
-    def _look(self, address: str) -> None:
-        with connect_witness(address) as witness:
-            while not self._ended.wait(0.005):  # exact to a fraction of the limits
-                if witness.motors() != (0.0, 0.0):
-                    self.moved_s = time.monotonic()
-
-    def end(self) -> None:
-        self._ended.set()
-        self._thread.join()
+    def __init__(self, witness: Any) -> None:
+        self._witness = witness
 
     def check_stop(self, driving: Any, press: Any, let_go: Any) -> None:
-        """Press while they turn, three times at most: a machine with other work may delay one of them."""
+        """Press while the handle is held: only the stop can have the motors stand for long."""
 
         def end() -> None:
             let_go()
             driving.mouse.up()
 
-        self.check(STOP_S, lambda: hold(driving), press, end)
+        self.check(lambda: hold(driving), press, end)
 
-    def check(self, limit_s: float, begin: Any, act: Any, end: Any) -> None:
-        """Let them turn, act, and check how long they turn then; three times at most, for the same reason."""
-        times = []
-        while len(times) < 3 and (not times or times[-1] >= limit_s):
-            self._turn(begin, end)
-            times.append(self._time_of_stop(act))
-            end()
-        print(f"the motors turned for {times} s afterwards")
-        assert times[-1] < limit_s
+    def check(self, begin: Any, act: Any, end: Any) -> None:
+        """Let them turn, act, and wait until they stand."""
+        self._turn(begin, end)
+        act()
+        still = 0
+        for _ in range(6000):
+            still = still + 1 if self._stand() else 0
+            if still == 100:  # a page that is frozen for a moment lets a robot stand for a moment
+                end()
+                return
+            time.sleep(0.01)
+        raise AssertionError("the motors do not stop")
+
+    def _stand(self) -> bool:
+        return bool(self._witness.motors() == (0.0, 0.0))
 
     def _turn(self, begin: Any, end: Any) -> None:
         """Begin until they turn: a page that is drawn at this moment, or a robot that is silent, drops a press."""
         for _ in range(24):
             begin()
-            until = time.monotonic() + 5.0
-            while time.monotonic() < until:
-                if time.monotonic() - self.moved_s < 0.05:
+            for _ in range(500):
+                if not self._stand():
                     return
                 time.sleep(0.01)
             end()
         raise AssertionError("the motors do not turn")
-
-    def _time_of_stop(self, press: Any) -> float:
-        """How long they turn after a press [s]."""
-        pressed = time.monotonic()
-        press()
-        time.sleep(1.0)
-        return self.moved_s - pressed
 
 
 @pytest.fixture(scope="module")
@@ -145,9 +125,8 @@ def emulated() -> Iterator[tuple[str, str]]:
 
 @pytest.fixture
 def motors(emulated: tuple[str, str]) -> Iterator[Motors]:
-    motors = Motors(emulated[1])
-    yield motors
-    motors.end()
+    with connect_witness(emulated[1]) as witness:
+        yield Motors(witness)
 
 
 def connect(page: Any, port: str) -> None:
@@ -178,8 +157,8 @@ def make_busy(lab: Any, visit: Any) -> None:
     reporting.get_by_role("button", name="Write report").click()
 
 
-def test_stop_is_at_once_while_a_check_a_report_and_a_calibration_run(lab, visit, emulated, motors):
-    """Measured from the press of the mouse to the witness's last sight of turning motors: all the way there."""
+def test_stop_works_while_a_check_a_report_and_a_calibration_run(lab, visit, emulated, motors):
+    """The lab answers the press before all of this has ended."""
     driving, pressing = visit("robot"), visit("robot")
     connect(driving, emulated[0])
     pressing.get_by_role("button", name="Request control").wait_for()
@@ -188,13 +167,10 @@ def test_stop_is_at_once_while_a_check_a_report_and_a_calibration_run(lab, visit
     motors.check_stop(driving, pressing.mouse.down, pressing.mouse.up)
 
 
-def test_motors_stop_within_half_a_second_once_keys_are_let_go_or_are_another_windows(
-    visit, emulated, motors
-):
+def test_motors_stop_once_keys_are_let_go_or_are_another_windows(visit, emulated, motors):
     page = visit("robot")
     connect(page, emulated[0])
-    keyboard, window = page.keyboard, page.context.new_cdp_session(page)
-    window.send("Emulation.setFocusEmulationEnabled", {"enabled": False})  # otherwise each page has the focus
+    keyboard = page.keyboard
 
     def press() -> None:
         page.bring_to_front()
@@ -204,29 +180,25 @@ def test_motors_stop_within_half_a_second_once_keys_are_let_go_or_are_another_wi
     def let_go() -> None:
         for key in ("ArrowLeft", "Meta", "Alt"):
             keyboard.up(key)
-        for other in page.context.pages[page.context.pages.index(page) + 1 :]:
-            other.close()
 
-    def open_tab() -> None:
-        page.context.new_page().bring_to_front()
+    def send(event: str, target: str) -> None:
+        page.evaluate(f"() => {{ {target}.dispatchEvent(new Event('{event}')); }}")
 
     lost_keys = {
         "key": lambda: keyboard.up("ArrowLeft"),
         "Command": lambda: keyboard.down("Meta"),
         "Alt": lambda: keyboard.down("Alt"),
         "menu": lambda: page.locator(".lab-pad").dispatch_event("contextmenu"),
-        "dialog": lambda: page.evaluate("() => { window.dispatchEvent(new Event('blur')); }"),
-        "tab": open_tab,
+        "dialog": lambda: send("blur", "window"),
+        "tab": lambda: send("visibilitychange", "document"),
     }
     for name, act in lost_keys.items():
         print(name)
-        motors.check(RELEASE_S, press, act, let_go)
+        motors.check(press, act, let_go)
 
 
 @pytest.mark.parametrize("is_asked", [True, False])
-def test_motors_stop_within_half_a_second_when_the_tab_is_closed_with_a_key_down(
-    visit, emulated, motors, is_asked
-):
+def test_motors_stop_when_the_tab_is_closed_with_a_key_down(visit, emulated, motors, is_asked):
     page = visit("robot")
     connect(page, emulated[0])
     pages = [page]
@@ -243,7 +215,7 @@ def test_motors_stop_within_half_a_second_when_the_tab_is_closed_with_a_key_down
         again.get_by_text(f"Connected to {emulated[0]}").wait_for()
         pages.append(again)
 
-    motors.check(RELEASE_S, press, lambda: pages[-1].close(run_before_unload=is_asked), open_again)
+    motors.check(press, lambda: pages[-1].close(run_before_unload=is_asked), open_again)
 
 
 def test_stop_needs_no_websocket(visit, emulated, motors):

@@ -179,8 +179,7 @@ def test_conclusions_are_in_view_on_a_phone(show):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("size", [DESKTOP, PHONE])
+@pytest.mark.parametrize(("size", "scheme"), [(DESKTOP, "light"), (PHONE, "dark")])
 def test_axe_finds_no_fault(show, size, scheme):
     page = show(size=size, color_scheme=scheme, reduced_motion="reduce", bypass_csp=True)
     violations = Axe().run(page).response["violations"]

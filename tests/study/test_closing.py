@@ -9,7 +9,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
+from realitygap.cli import app
 from realitygap.errors import RecordError
 from realitygap.families.thymio import build_enki
 from realitygap.platforms import SimPlatform, SimTarget
@@ -330,6 +332,28 @@ def test_folder_made_before_plans_of_other_platforms_opens(right, tmp_path):
     path.write_text(json.dumps(plan))
     assert summarize_closing(tmp_path / "old")["goals"] == summarize_closing(folder)["goals"]
     adopt_plan(tmp_path / "old", PLAN)
+
+
+def test_command_judges_and_calibrates_a_twin_and_drives_what_is_transferred(tmp_path, monkeypatch):
+    pytest.importorskip("mujoco", reason="twins need the extra twin")
+    sizes = {
+        "controllers": 4,
+        "trials": 2,
+        "budgets": (0, 2),
+        "observations": ("track",),
+        "transfer_budget": 4,
+    }
+    few = replace(SMALL, families=("worn",), fresh_trials=2, runs=4, repeats=2, **sizes)
+    monkeypatch.setitem(PLANS, "twins", (few, few))
+    words = ["closing-the-gap", "--small", "--processes", "1", "--out", str(tmp_path / "out")]
+    done = CliRunner().invoke(app, words, catch_exceptions=False)
+    assert done.exit_code == 0
+    summary = summarize_closing(tmp_path / "out")
+    assert summary["n_done"] == summary["n_units"] == 4
+    assert summary["label"] == "TWIN"
+    for row in goal_table(summary):
+        assert row[0] in done.output
+    assert "transfer" in (tmp_path / "out" / "report.html").read_text("utf-8")
 
 
 @needs_enki

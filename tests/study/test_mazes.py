@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import statistics
-import subprocess
-import sys
 import threading
 
 import numpy as np
@@ -16,6 +14,7 @@ from realitygap.runs import MazeRun
 from realitygap.study import Progress, measure_maze
 from realitygap.study._mazes import summarize_maze_runs
 from realitygap.tasks import MAZE_TASKS
+from tests.commands import run_command
 from tests.reference.effort import COMPILED, cases
 
 pytestmark = pytest.mark.slow
@@ -89,13 +88,11 @@ def test_novelty_needs_fewer_evaluations_than_the_objective_in_the_medium_maze()
 
 def test_the_command_prints_both_beside_the_published_ones() -> None:
     words = ["bench", "maze-hard", "--seeds", "1", "--change", "population=3", "--change", "generations=2"]
-    command = [sys.executable, "-m", "realitygap", *words]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)
+    done = run_command(*words)
     lines = done.stdout.splitlines()
     assert lines[0] == "maze-hard, default population=3 generations=2, seed 1; at most 6 evaluations a run"
     assert lines[1].split() == ["novelty", "published", "objective", "published"]
     assert lines[4].split() == ["mean", "evaluations", "6", "35,109", "6", "-"]
-    done = subprocess.run([*command, "--json"], capture_output=True, text=True, timeout=120, check=True)
-    figures = json.loads(done.stdout)
+    figures = json.loads(run_command(*words, "--json").stdout)
     assert figures["novelty"]["mean_evaluations"] == figures["objective"]["mean_evaluations"] == 6
     assert figures["novelty"]["published"] == dict(MAZE_TASKS["maze-hard"].published["novelty"])

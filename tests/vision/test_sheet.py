@@ -137,7 +137,7 @@ def test_a_view_is_the_same_after_being_told_in_numbers():
 @pytest.mark.parametrize("seed", [1, 2])
 def test_a_drawn_line_lies_where_it_was_drawn(seed):
     """Perspective, lens and waves of the paper are taken out to within a millimeter."""
-    image = read_photo(photo(seed, ORDINARY, n=1).jpeg)
+    image = read_photo(photo(seed, ORDINARY, n=1, size=None).jpeg)
     sheet = find_sheet(image, LAYOUT)
     density = ink_density(rectify(image, sheet, 2000.0), LAYOUT, 2000.0)
     rows, columns = np.nonzero(np.linalg.norm(density, axis=2) > 1.5)

@@ -40,6 +40,7 @@ def photograph_sheet(
     difficulty: Difficulty | None = None,
     *,
     has_key: bool = True,
+    size: tuple[int, int] | None = None,
 ) -> SheetPhotograph:
     """Return a photograph of a sheet on which pens drew these paths.
 
@@ -49,12 +50,13 @@ def photograph_sheet(
         seed: Seed of all defects.
         difficulty: Strength of the defects.
         has_key: True if each pen was tried in its box.
+        size: Width and height of the photograph [px]. Default: one of `SIZES`, drawn by the seed.
     """
     rng = np.random.default_rng((seed, 0x5EE7))
     hard = difficulty or Difficulty()
     paper = draw_sheet(layout, paths, rng, hard, has_key=has_key)
     return SheetPhotograph(
-        take_photograph(paper, layout, rng, hard), layout, tuple(np.asarray(path) for path in paths)
+        take_photograph(paper, layout, rng, hard, size), layout, tuple(np.asarray(path) for path in paths)
     )
 
 
@@ -96,11 +98,18 @@ def draw_sheet(
     return density
 
 
-def take_photograph(paper: Floats, layout: SheetLayout, rng: np.random.Generator, hard: Difficulty) -> bytes:
+def take_photograph(
+    paper: Floats,
+    layout: SheetLayout,
+    rng: np.random.Generator,
+    hard: Difficulty,
+    size: tuple[int, int] | None = None,
+) -> bytes:
     """Return the JPEG file of a photograph of this sheet, as from a phone held over it."""
     import cv2
 
-    size = SIZES[int(rng.integers(len(SIZES)))]
+    usual = SIZES[int(rng.integers(len(SIZES)))]
+    size = size or usual
     columns, rows = _seen_from(layout, size, rng, hard)
     texture: Any = paper * _creases(paper.shape[:2], rng, hard)[..., None]
     table = _table(rng)

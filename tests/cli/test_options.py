@@ -60,6 +60,7 @@ PRINTED_BY = {
     "orders/_plan.py": ("plan",),
     "orders/_record.py": ("calibrate", "gap", "transfer"),
     "orders/_transfer.py": ("transfer",),
+    "orders/_try.py": ("try",),
     "platforms/_python.py": (
         "calibrate",
         "drive",

@@ -21,6 +21,7 @@ FUNCTIONS = {
     "gap": "gap_between",
     "plan": "plan_gap",
     "transfer": "run_transfer",
+    "try": "try_genome",
 }
 SMALLEST = {
     "calibrate": {"what": "path", "robot": "sim", "out": "fit.toml"},
@@ -28,6 +29,7 @@ SMALLEST = {
     "gap": {"sim": "sim", "target": "jyro"},
     "plan": {"effect": 0.1},
     "transfer": {"study": "sim-paper", "to": "jyro"},
+    "try": {"genome": "champion.json", "on": "sim"},
 }
 """Values of the smallest order."""
 
@@ -43,6 +45,7 @@ WITH = {
     "gap": {},
     "plan": {"margin": {"effect": None}, "correlation": {"effect": None, "correlation": 0.9}},
     "transfer": {},
+    "try": {},
 }
 """Values that a field needs with it."""
 
@@ -52,6 +55,7 @@ ONLY_IN_THE_COMMAND = {
     "gap": {"camera", "report", "allow_code", "as_json"},
     "plan": {"allow_code", "as_json"},
     "transfer": {"allow_code", "as_json"},
+    "try": {"allow_code", "as_json"},
 }
 """Options of a command that choose how its result is shown, or who is at the robot."""
 

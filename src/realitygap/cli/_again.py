@@ -19,7 +19,7 @@ def again(
         Path,
         typer.Argument(
             metavar="FILE",
-            help="Report of a gap (.html), calibration (.toml), folder of a transfer, or result of --json (.json).",
+            help="Report of a gap (.html), calibration (.toml), folder of results, or result of --json (.json).",
         ),
     ],
     options: Annotated[

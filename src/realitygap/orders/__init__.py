@@ -13,6 +13,7 @@ from ._plan import PlanOrder, Question
 from ._record import ORDER_FILE, ORDERS, read_order
 from ._shared import ONLY_ROBOTS
 from ._transfer import TransferOrder
+from ._try import TryOrder
 
 __all__ = [
     "ONLY_ROBOTS",
@@ -28,6 +29,7 @@ __all__ = [
     "PlanOrder",
     "Question",
     "TransferOrder",
+    "TryOrder",
     "read_order",
     "takes_order",
     "with_fields",

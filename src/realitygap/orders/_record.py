@@ -17,9 +17,11 @@ from ._gap import GapOrder
 from ._order import Order
 from ._plan import PlanOrder
 from ._transfer import TransferOrder
+from ._try import TryOrder
 
 ORDERS: dict[str, type[Order]] = {
-    model.command: model for model in (CalibrateOrder, ClosingOrder, GapOrder, PlanOrder, TransferOrder)
+    model.command: model
+    for model in (CalibrateOrder, ClosingOrder, GapOrder, PlanOrder, TransferOrder, TryOrder)
 }
 """Orders by the name of their command."""
 

@@ -46,7 +46,7 @@ from ._transfer.ordered import run_transfer
 from ._transfer.result import TransferResult
 from ._transfer.strategies import choose_condition, transfer
 from ._trial_export import export_trials, write_trials
-from ._try_on import try_on
+from ._try_on import TriedGenome, try_genome, try_on
 
 __all__ = [
     "DEFAULT_NEAT",
@@ -73,6 +73,7 @@ __all__ = [
     "TransferResult",
     "TrialToTrack",
     "TrialsSection",
+    "TriedGenome",
     "calibrate",
     "calibrate_all",
     "calibrate_from_log",
@@ -120,6 +121,7 @@ __all__ = [
     "transfer",
     "trial_of_file",
     "trial_of_ledger",
+    "try_genome",
     "try_on",
     "usable_processors",
     "with_ruled_end",

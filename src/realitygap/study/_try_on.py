@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import shlex
+from dataclasses import dataclass
 from pathlib import Path
 
-from realitygap.evolution import Genome
+from realitygap.errors import StudyError
+from realitygap.evolution import OUTPUTS, ControllerInterface, Genome
+from realitygap.orders import TryOrder, takes_order
+from realitygap.platforms import open_target
 from realitygap.records import Observe, TrialRecord
-from realitygap.trials import Target, TrialPlan
+from realitygap.trials import PortObserver, Target, TrialPlan
+from realitygap.world import load_arena
 
 from ._kept_target import KeptTarget
 from ._targets import open_trials, refuse_more_than_is_seen
@@ -41,3 +47,65 @@ def try_on(
     file = None if out is None else open_trials(out, target, observe)
     with KeptTarget(target, file, is_exclusive=True) as kept:
         return kept.carry_out(plans, observe)
+
+
+@dataclass(frozen=True)
+class TriedGenome:
+    """Trials of one controller on a platform.
+
+    Attributes:
+        target: Name of the target.
+        label: Label of its trials.
+        n_cells: Number of cells of the arena.
+        trials: The trials.
+    """
+
+    target: str
+    label: str
+    n_cells: int
+    trials: list[TrialRecord]
+
+    @property
+    def coverage(self) -> list[float]:
+        """Covered share of the cells in each trial [0..1]."""
+        return [len(trial.cells) / self.n_cells for trial in self.trials]
+
+
+@takes_order(TryOrder)
+def try_genome(order: TryOrder, *, observer: PortObserver | None = None) -> TriedGenome:
+    """Drive a controller from a file on a platform, as `realitygap try`.
+
+    Args:
+        observer: Observer of a robot without a witness: it places the robot and reports what it drew.
+
+    Raises:
+        StudyError: There is no such file, arena, or platform, or so much cannot be seen of it.
+        ControllerError: The platform lacks what the controller sees.
+        RecordError: The file is of another controller or target, or cannot be written.
+        RobotError: The robot failed; what is in the file is safe.
+    """
+    if order.genome.is_dir():
+        raise StudyError(
+            f"{order.genome} is a folder, expected a genome. Export one: realitygap export "
+            f"{shlex.quote(str(order.genome))} -o champion.json"
+        )
+    genome = Genome.load(order.genome)
+    if order.inputs is not None or order.outputs is not None:
+        inputs = genome.interface.inputs if order.inputs is None else _names(order.inputs)
+        outputs = OUTPUTS if order.outputs is None else _names(order.outputs)
+        genome = genome.with_interface(ControllerInterface(inputs, outputs))
+    arena = load_arena(order.arena)
+    with open_target(order.on, arena, witness=order.witness, observer=observer, key=order.seed) as target:
+        trials = try_on(
+            target,
+            genome,
+            trials=order.trials,
+            steps=order.steps,
+            observe=order.observe,
+            out=order.out,
+        )
+        return TriedGenome(target.name, target.label, target.arena.grid.n_cells, trials)
+
+
+def _names(text: str) -> tuple[str, ...]:
+    return tuple(name.strip() for name in text.split(","))

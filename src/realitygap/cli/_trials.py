@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import getpass
 import math
+import sys
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -174,14 +175,12 @@ def trials(
 
 def _open(source: Path, *, writable: bool) -> Ledger | TrialLog:
     """Open the ledger in a folder, or a file of trials."""
-    from realitygap.records import LEDGER_NAME, Ledger, TrialLog
-
     files = sorted(source.glob("*/*.jsonl")) if source.is_dir() else []
-    if files and not (source / LEDGER_NAME).exists():
+    if files and not (source / realitygap.records.LEDGER_NAME).exists():
         raise StudyError(f"{source} has several files of trials. Name one, such as {files[0]}.")
     if source.is_dir() or not source.exists():
-        return Ledger.open(source / LEDGER_NAME, writable=writable)
-    return TrialLog.open(source, writable=writable)
+        return realitygap.records.Ledger.open(source / realitygap.records.LEDGER_NAME, writable=writable)
+    return realitygap.records.TrialLog.open(source, writable=writable)
 
 
 def _of_study(opened: Ledger | TrialLog, what: str) -> Ledger:
@@ -190,9 +189,7 @@ def _of_study(opened: Ledger | TrialLog, what: str) -> Ledger:
     Raises:
         StudyError: It is a file.
     """
-    from realitygap.records import TrialLog
-
-    if isinstance(opened, TrialLog):
+    if isinstance(opened, realitygap.records.TrialLog):
         raise StudyError(f"{what} is only for the trials of a study, and {opened.path} is a file of trials.")
     return opened
 
@@ -209,11 +206,13 @@ def _needed(value: str | None, what: str) -> str:
 
 def _number(opened: Ledger | TrialLog, text: str) -> int:
     """Return a trial's number, from itself or its code."""
-    from realitygap.records import TrialLog
-
     if text.isdecimal() and len(text) < _LONGEST_NUMBER:
         return opened.trial(int(text)).trial
-    codes = {} if isinstance(opened, TrialLog) else {each.code: each.trial for each in opened.trials()}
+    codes = (
+        {}
+        if isinstance(opened, realitygap.records.TrialLog)
+        else {each.code: each.trial for each in opened.trials()}
+    )
     if text.upper() not in codes:
         raise LedgerError(
             f"{opened.path} has no trial {text!r}. `realitygap trials list` shows numbers and codes."
@@ -229,8 +228,6 @@ def _score(
     who: str,
     role: ScoreRole,
 ) -> None:
-    from realitygap.records import Score
-
     if file is not None:
         entries: Iterable[dict[int, list[int]]] = [_read_file(opened, file)]
     elif cells is not None:
@@ -239,7 +236,9 @@ def _score(
         entries = _pick(opened, trial, role)
     n_entered = 0
     for given in entries:  # each as a whole or not at all
-        opened.score_all({number: Score(found, who) for number, found in given.items()}, role)
+        opened.score_all(
+            {number: realitygap.records.Score(found, who) for number, found in given.items()}, role
+        )
         n_entered += len(given)
         for number, found in given.items():
             echo(f"Trial {number}: {len(set(found))} cells.")
@@ -278,8 +277,6 @@ def _read_file(opened: Ledger | TrialLog, path: Path) -> dict[int, list[int]]:
 
 def _pick(opened: Ledger | TrialLog, trial: str | None, role: ScoreRole) -> Iterator[dict[int, list[int]]]:
     """Yield cells picked in the terminal, of one trial or, one after the other, of all that wait."""
-    import sys
-
     from ._operator import pick_cells
 
     if not sys.stdin.isatty():
@@ -296,12 +293,10 @@ def _waiting(
     opened: Ledger | TrialLog, trial: str | None, role: ScoreRole
 ) -> Iterator[tuple[int, str, Arena, tuple[int, ...]]]:
     """Yield number, title, arena, and cells of before of the trial that is named, or of all that wait."""
-    from realitygap.records import TrialLog
-
     number = None
     if trial is not None or role == "correction":
         number = _number(opened, _needed(trial, "a trial"))
-    if isinstance(opened, TrialLog):
+    if isinstance(opened, realitygap.records.TrialLog):
         for logged in opened.trials(states=("driven",)) if number is None else [opened.trial(number)]:
             yield logged.trial, logged.name, opened.arena, ()
         return
@@ -321,9 +316,7 @@ class _Titles:
     """Names that the list of a folder's trials shows."""
 
     def __init__(self, folder: Path) -> None:
-        from realitygap.records import ResultsFolder
-
-        self._description = ResultsFolder.open(folder).description
+        self._description = realitygap.records.ResultsFolder.open(folder).description
         settings = self._description.get("trials") or {}
         self.blind = bool(settings.get("blind"))
         self._pens = settings.get("pens") or []
@@ -332,11 +325,8 @@ class _Titles:
         return f"pen: {self._pens[trial.pen % len(self._pens)]}" if self._pens else f"pen {trial.pen}"
 
     def arena(self, trial: Trial) -> Any:
-        from realitygap.records import settings_of_condition
-        from realitygap.runs import Condition
-
-        settings = settings_of_condition(self._description, trial.condition)
-        return Condition.from_settings(trial.condition, settings).arena.arena()
+        settings = realitygap.records.settings_of_condition(self._description, trial.condition)
+        return realitygap.runs.Condition.from_settings(trial.condition, settings).arena.arena()
 
 
 def _list(opened: Ledger | TrialLog, *, as_json: bool) -> None:
@@ -355,18 +345,16 @@ def _list(opened: Ledger | TrialLog, *, as_json: bool) -> None:
         return
     from rich.table import Table
 
-    from realitygap.records import Trial
-
     from ._tables import wide_console
 
     table = Table(box=None, padding=(0, 2, 0, 0))
-    more = ("code", "sheet") if any(isinstance(trial, Trial) for trial in trials) else ()
+    more = ("code", "sheet") if any(isinstance(trial, realitygap.records.Trial) for trial in trials) else ()
     for head in ("trial", *more, "state", "cells", "description"):
         table.add_column(head, no_wrap=head not in ("code", "description"), overflow="fold")
     for trial in trials:
         on_sheet: tuple[str, ...] = ()
         problem = ""
-        if isinstance(trial, Trial):
+        if isinstance(trial, realitygap.records.Trial):
             on_sheet, problem = (trial.code, str(trial.sheet)), trial.problem or ""
         parts = [
             "" if trial.trial in hidden else trial.name,
@@ -420,18 +408,14 @@ _BLINDED = ("condition", "replicate", "generation", "individual")
 
 def _hidden(opened: Ledger | TrialLog) -> set[int]:
     """Return the trials of a blind study whose conditions are not shown yet."""
-    from realitygap.records import TrialLog
-
-    if isinstance(opened, TrialLog) or not (opened.path.parent / "study.json").exists():
+    if isinstance(opened, realitygap.records.TrialLog) or not (opened.path.parent / "study.json").exists():
         return set()
     is_blind = _Titles(opened.path.parent).blind
     return {trial.trial for trial in opened.trials() if is_blind and not trial.is_closed}
 
 
 def _agreement(folder: Path, *, as_json: bool) -> None:
-    from realitygap.report import measure_agreement
-
-    found = measure_agreement(folder)
+    found = realitygap.report.measure_agreement(folder)
     if as_json:
         print_json(found.to_dict())
         return

@@ -26,11 +26,7 @@ from numpy.typing import NDArray
 from realitygap.errors import RealityGapError
 from realitygap.gap import mean_maximum_rank_violation
 from realitygap.report import (
-    FAMILY_HEAD,
-    GOAL_HEAD,
-    STRATEGY_HEAD,
-    TWIN_HEAD,
-    WHY_HEAD,
+    TableOnPage,
     draw_closing,
     family_table,
     goal_table,
@@ -73,6 +69,11 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     listed = list(rows) or [[NOTHING, *[""] * (len(head) - 1)]]
     writer.writerows(listed)
     return file.getvalue()
+
+
+def csv_of(shown: TableOnPage) -> str:
+    """A table of the report as a CSV file."""
+    return table(shown.heads, shown.rows)
 
 
 def sentences(summary: dict[str, Any]) -> str:
@@ -457,12 +458,12 @@ def slim(summary: dict[str, Any]) -> str:
 def texts(summary: dict[str, Any]) -> dict[str, str]:
     """Tables and sentences of the page, by file name."""
     return {
-        "goals.csv": table(GOAL_HEAD, goal_table(summary)),
-        "families.csv": table(FAMILY_HEAD, family_table(summary)),
+        "goals.csv": csv_of(goal_table(summary)),
+        "families.csv": csv_of(family_table(summary)),
         "kinds.csv": table(KIND_HEAD, kind_table(summary)),
-        "strategies.csv": table(STRATEGY_HEAD, strategy_table(summary)),
-        "twins.csv": table(TWIN_HEAD, twin_table(summary)),
-        "why.csv": table(WHY_HEAD, why_table(summary)),
+        "strategies.csv": csv_of(strategy_table(summary)),
+        "twins.csv": csv_of(twin_table(summary)),
+        "why.csv": csv_of(why_table(summary)),
         "words.md": sentences(summary),
         "directions.md": directions(summary),
         "summary.json": slim(summary),

@@ -16,9 +16,9 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from make_closing import done_parts, results_in, table, verdicts
+from make_closing import csv_of, done_parts, results_in, table, verdicts
 
-from realitygap.report import GOAL_HEAD, draw_closing, goal_table, not_counted
+from realitygap.report import draw_closing, goal_table, not_counted
 from realitygap.stats import Estimate, median_interval
 from realitygap.study._closing.summary import KINDS, pooled_fall
 
@@ -162,7 +162,7 @@ def texts(summary: Summary) -> dict[Path, str]:
     """Return the files that follow from a summary."""
     return {
         TABLES / "words.md": words(summary),
-        TABLES / "goals.csv": table(GOAL_HEAD, goal_table(summary)),
+        TABLES / "goals.csv": csv_of(goal_table(summary)),
         TABLES / "falls.csv": table(FALL_HEAD, fall_table(summary)),
         FIGURES / "scatter.svg": draw_closing(summary)["scatter"].svg + "\n",
     }
@@ -190,7 +190,7 @@ def main() -> None:
         again = results_in(options.folder)
         tables = {
             "again.csv": table(AGAIN_HEAD, again_table(stored_summary(), again)),
-            "again-goals.csv": table(GOAL_HEAD, goal_table(again)),
+            "again-goals.csv": csv_of(goal_table(again)),
         }
         for name, text in tables.items():
             (TABLES / name).write_text(text, "utf-8")

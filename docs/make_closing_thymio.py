@@ -19,10 +19,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from make_closing import done_parts, results_in, table, verdicts
+from make_closing import csv_of, done_parts, results_in, table, verdicts
 from numpy.typing import NDArray
 
-from realitygap.report import FAMILY_HEAD, GOAL_HEAD, draw_closing, family_table, goal_table
+from realitygap.report import draw_closing, family_table, goal_table
 
 HERE = Path(__file__).parent
 TABLES = HERE / "data" / "closing-thymio"
@@ -149,13 +149,13 @@ def main() -> None:
         else results_in(options.folder)
     )
     files = {
-        place / "goals.csv": table(GOAL_HEAD, goal_table(summary)),
+        place / "goals.csv": csv_of(goal_table(summary)),
         place / "sittings.csv": table(SITTING_HEAD, sitting_table(summary)),
         place / "summary.json": json.dumps(summary, separators=(",", ":")) + "\n",
     }
     if not options.playground:
         files |= {
-            place / "budgets.csv": table(FAMILY_HEAD, family_table(summary)),
+            place / "budgets.csv": csv_of(family_table(summary)),
             place / "residuals.csv": table(RESIDUAL_HEAD, residual_table(summary)),
             place / "words.md": words(summary),
         }

@@ -236,8 +236,7 @@ def test_tables_of_the_sitting_with_the_playground_follow_from_its_data():
     rows = make_closing_thymio.sitting_table(summary)
     text = make_closing_thymio.table(make_closing_thymio.SITTING_HEAD, rows)
     assert (place / "sittings.csv").read_text("utf-8") == text
-    goals = make_closing_thymio.goal_table(summary)
-    text = make_closing_thymio.table(make_closing_thymio.GOAL_HEAD, goals)
+    text = make_closing_thymio.csv_of(make_closing_thymio.goal_table(summary))
     assert (place / "goals.csv").read_text("utf-8") == text
 
 

@@ -26,12 +26,13 @@ from realitygap.report import (
     save_drawing,
     write_report,
 )
-from realitygap.report._export import tables_of
 from realitygap.report._individuals_figure import _moved_apart, draw_better
 from realitygap.report._latex import latex_table
 from realitygap.report._species_figure import count_species
 from realitygap.report._structures import _canonical, count_structures, structures_frame
+from realitygap.report._table import Cell, Column, Part, TableOnPage
 from realitygap.report._tally import read_tally
+from realitygap.report._template import page_environment
 from realitygap.report.charts.house import inline
 from realitygap.runs import Condition, genome_of, replay
 from realitygap.study import parse_study, run_study
@@ -282,8 +283,8 @@ def test_export_writes_every_figure_and_table(tiny_study, tmp_path):
         root = ET.fromstring((tmp_path / "figures" / f"{figure}.svg").read_bytes())
         assert [each.tag.split("}")[1] for each in root][:2] == ["title", "desc"]
         assert (tmp_path / "figures" / f"{figure}.pdf").read_bytes().startswith(b"%PDF-")
-    tables = {f"{name}.csv" for name, _, _ in tables_of(page)}
-    assert tables <= names
+    captions = set(re.findall(r'<caption id="caption-([^"]+)">', page)) - {"replay"}
+    assert captions <= {each.removeprefix("table-").removesuffix(".csv") for each in names}
     others = {"structures.csv", "data-species.csv", "data-comparisons.csv", "figures.txt"}
     assert {"table-parameters.csv", "table-results.csv", *others} <= names
     for name in names - {"figures.txt"}:
@@ -299,7 +300,8 @@ def test_export_writes_every_figure_and_table(tiny_study, tmp_path):
         conclusions = [row[column] for row in shown if row[column]]
         assert sorted(conclusions) == sorted(compared["conclusion"])
     files = sorted((tmp_path / "figures").glob("*.tex"))
-    assert [file.stem for file in files] == sorted(n for n, _, _ in tables_of(page) if n.startswith("table-"))
+    captions = re.findall(r'<caption id="caption-([^"]+)"><b>Table', page)
+    assert [file.stem for file in files] == sorted(f"table-{name}" for name in captions)
     for file in files:
         text = file.read_text("utf-8")
         kinds = re.search(r"\\begin\{tabular\}\{([lr]+)\}", text)[1]
@@ -311,7 +313,7 @@ def test_export_writes_every_figure_and_table(tiny_study, tmp_path):
 
 
 def test_a_table_for_latex_escapes_its_texts_and_aligns_numbers():
-    assert latex_table("Table 2. a_b", "x", [["p", "q"], ["2·10⁻⁶", "−0.1 & –"], ["part", ""]]).splitlines()[2:9] == [
+    assert latex_table("a_b", "x", [["p", "q"], ["2·10⁻⁶", "−0.1 & –"], ["part", ""]]).splitlines()[2:9] == [
         r"\caption{a\_b}", r"\label{tab:x}", r"\begin{tabular}{rl}", r"\toprule", r"p & q \\", r"\midrule",
         r"2$\cdot10^{-6}$ & −0.1 \& -- \\",
     ]  # fmt: skip
@@ -331,25 +333,40 @@ def test_export_spares_the_rows_and_says_what_is_wrong(tiny_study, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-def test_tables_of_a_page_have_one_heading_a_column():
-    page = (
-        '<table><caption id="caption-x">A table</caption><thead>'
-        '<tr><th rowspan="2">who</th><th colspan="2">how far</th><th>t</th><th>interval</th></tr>'
-        "<tr><th>line</th><th>ends</th><th></th><th></th></tr></thead>"
-        "<tbody><tr><th colspan='5'>group</th></tr><tr><th>a</th><td>−0.1</td><td>–</td><td>1</td><td>2</td></tr>"
-        "</tbody></table>"
+def test_a_table_for_programs_has_one_heading_a_column_plain_minus_and_no_dash():
+    columns = (
+        Column("who"),
+        Column("line", "how far"),
+        Column("ends", "how far"),
+        Column("t"),
+        Column("interval"),
     )
-    assert tables_of(page) == [
-        (
-            "x",
-            "A table",
-            [
-                ["who", "how far: line", "how far: ends", "t", "interval"],
-                ["group", "", "", "", ""],
-                ["a", "-0.1", "", "1", "2"],
-            ],
-        )
-    ]
+    table = TableOnPage("x", "A table", columns, (Part([("a", "−0.1", Cell("–"), "1", "2")], "group"),))
+    assert table.heads == ["who", "how far: line", "how far: ends", "t", "interval"]
+    assert table.texts == [["group", "", "", "", ""], ["a", "-0.1", "", "1", "2"]]
+
+
+def test_columns_of_one_name_belong_to_the_column_before():
+    columns = tuple(map(Column, ("who", "mean", "interval", "luck", "interval")))
+    table = TableOnPage("x", "A table", columns, ())
+    assert table.heads == ["who", "mean", "mean: interval", "luck", "luck: interval"]
+
+
+def test_a_table_is_rendered_with_its_groups_parts_and_marks():
+    columns = (Column("who"), Column("A12", "all", kind="median"), Column("b", "all"))
+    row = ("a & b", Cell("1", element="mark"), Cell("2", kind="none", more="; 3"))
+    shown = TableOnPage("x", "What A12 is", columns, (Part([row], "part"),), number=2)
+    template = page_environment().from_string('{% from "_table.html.jinja" import table %}{{ table(shown) }}')
+    page = template.render(shown=shown)
+    assert '<caption id="caption-x"><b>Table 2.</b> What A<sub>12</sub> is</caption>' in page
+    assert (
+        '<th scope="col" rowspan="2">who</th><th scope="colgroup" colspan="2" class="group">all</th>' in page
+    )
+    assert '<tr class="group"><th scope="rowgroup" colspan="3">part</th></tr>' in page
+    assert (
+        '<th scope="row">a &amp; b</th><td class="median"><mark>1</mark></td>'
+        '<td class="none">2<span class="others">; 3</span></td>'
+    ) in page
 
 
 def ancestors_of(rows: pl.DataFrame, generation: int, individual: int) -> set[tuple[int, int]]:

@@ -135,7 +135,7 @@ def test_goal_is_decided_only_by_its_whole_interval(low, high, goal, sense, expe
 
 
 def test_goal_of_two_twins_is_open(right):
-    verdicts = {row[0]: row[-1] for row in goal_table(right[0])}
+    verdicts = {row[0]: row[-1] for row in goal_table(right[0]).rows}
     assert verdicts["fall of the RMS gap, track"] == "open"
 
 
@@ -217,7 +217,7 @@ def test_a_twin_whose_floor_is_0_is_named_and_not_dropped_in_silence(right, tmp_
     assert goal["n"] == 1
     said = "its floor is 0, the same order in both halves of its trials; MMRV is 0.012"
     assert goal["unknown"] == [{"twin": "slow-1", "why": said}]
-    row = next(row for row in goal_table(summary) if row[0] == goal["name"])
+    row = next(row for row in goal_table(summary).rows if row[0] == goal["name"])
     assert row[4] == "1 of 2"
     page = write_closing_page(summary, tmp_path / "page.html").read_text("utf-8")
     assert f"1 of 2 twins are judged. slow-1 is not: {said}." in page
@@ -229,7 +229,7 @@ def test_page_says_what_is_simulated_and_holds_all_figures(right, tmp_path):
     assert page.count("<figure") == 4
     assert "TWIN" in page
     assert "No robot was driven" in page
-    for row in goal_table(summary):
+    for row in goal_table(summary).rows:
         assert row[0] in page
 
 

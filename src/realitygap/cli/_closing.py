@@ -64,7 +64,7 @@ def _print(summary: dict[str, Any]) -> None:
             "standard errors"
         )
     echo(f"{'goal':52}{'wanted':>16}{'figure':>9}{'95 % interval':>18}{'n':>9}  verdict")
-    for name, wanted, figure, span, n, verdict in realitygap.report.goal_table(summary):
+    for name, wanted, figure, span, n, verdict in realitygap.report.goal_table(summary).rows:
         echo(f"{name:52}{wanted:>16}{figure:>9}{span:>18}{n:>9}  {verdict}")
     for sentence in realitygap.report.not_counted(summary):
         echo(sentence)

@@ -10,12 +10,7 @@ from realitygap.report._archive_figure import draw_archive
 from realitygap.report._audit import Audit, AuditProgress, audit_notes, audit_results
 from realitygap.report._choices_figure import compare_choices, draw_choices
 from realitygap.report._closing import (
-    FAMILY_HEAD,
-    GOAL_HEAD,
     SELECTION_NOTE,
-    STRATEGY_HEAD,
-    TWIN_HEAD,
-    WHY_HEAD,
     family_table,
     goal_table,
     not_counted,
@@ -46,19 +41,15 @@ from realitygap.report._sensor_figure import save_sensor_figure
 from realitygap.report._show import Subject, save_arena, save_robot, save_twin, save_view
 from realitygap.report._species_figure import draw_species
 from realitygap.report._summary import summarize
+from realitygap.report._table import TableOnPage
 from realitygap.report._tally import Tally, read_tally
 from realitygap.report._task_summary import summarize_tasks
 from realitygap.report._trial_figure import choose_trial, draw_trial
 from realitygap.report.charts.house import NARROW, Drawing
 
 __all__ = [
-    "FAMILY_HEAD",
-    "GOAL_HEAD",
     "NARROW",
     "SELECTION_NOTE",
-    "STRATEGY_HEAD",
-    "TWIN_HEAD",
-    "WHY_HEAD",
     "Audit",
     "AuditProgress",
     "Comparison",
@@ -66,6 +57,7 @@ __all__ = [
     "Drawing",
     "Each",
     "Subject",
+    "TableOnPage",
     "Tally",
     "audit_distance",
     "audit_notes",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,22 +12,9 @@ from realitygap._wording import GOAL_VERDICTS
 from realitygap.records import write_whole
 from realitygap.report._closing_figures import draw_closing, words_of
 from realitygap.report._placed import FigureOnPage, hover_content, number_figures
+from realitygap.report._table import Column, Part, Row, TableOnPage
 from realitygap.report._template import render_page
 
-GOAL_HEAD = ("goal", "wanted", "figure", "95 % interval", "twins", "verdict")
-FAMILY_HEAD = (
-    "family",
-    "observed",
-    "trials",
-    "twins",
-    "RMS gap",
-    "95 % interval",
-    "twins that count",
-    "fall",
-)
-WHY_HEAD = ("goal", "twin", "figure", "p", "at an end")
-TWIN_HEAD = ("twin", "RMS gap as it is", "standard error", "counts")
-STRATEGY_HEAD = ("strategy", "twins", "coverage on the twin", "95 % interval")
 _RATIOS = ("SRCC", "MMRV")
 
 SELECTION_NOTE = (
@@ -36,8 +23,6 @@ SELECTION_NOTE = (
     "it too."
 )
 """Limit of goals whose twins a measured gap selected."""
-
-Table = list[tuple[str, ...]]
 
 
 def write_closing_page(summary: Mapping[str, Any], out: str | Path) -> Path:
@@ -61,12 +46,9 @@ def write_closing_page(summary: Mapping[str, Any], out: str | Path) -> Path:
         "words": words_of(summary),
         "selection_note": SELECTION_NOTE,
         "is_of_twins": not summary["plan"].get("platforms"),
-        "goal_head": GOAL_HEAD,
         "goals": goal_table(summary),
         "not_counted": not_counted(summary),
-        "why_head": WHY_HEAD,
         "why": why_table(summary),
-        "family_head": FAMILY_HEAD,
         "families": family_table(summary),
         "figures": figures,
     }
@@ -76,9 +58,10 @@ def write_closing_page(summary: Mapping[str, Any], out: str | Path) -> Path:
     return path
 
 
-def goal_table(summary: Mapping[str, Any]) -> Table:
-    """Return one row per goal, in the columns of `GOAL_HEAD`; a goal that the interval does not decide is open."""
-    return [
+def goal_table(summary: Mapping[str, Any]) -> TableOnPage:
+    """Return a table with one row per goal; a goal that the interval does not decide is open."""
+    heads = ("goal", "wanted", "figure", "95 % interval", "twins", "verdict")
+    rows = [
         (
             goal["name"],
             f"{goal['sense']} {_plain(goal, goal['goal'])}",
@@ -89,6 +72,7 @@ def goal_table(summary: Mapping[str, Any]) -> Table:
         )
         for goal in summary["goals"]
     ]
+    return _table("goals", "Goals and verdicts.", heads, rows)
 
 
 def not_counted(summary: Mapping[str, Any]) -> list[str]:
@@ -101,9 +85,9 @@ def not_counted(summary: Mapping[str, Any]) -> list[str]:
     return sentences
 
 
-def why_table(summary: Mapping[str, Any]) -> Table:
-    """Twins that miss a goal, in the columns of `WHY_HEAD`."""
-    rows: Table = []
+def why_table(summary: Mapping[str, Any]) -> TableOnPage:
+    """Return a table of the twins that miss a goal."""
+    rows: list[tuple[str, ...]] = []
     for goal in summary["goals"]:
         if goal["met"] is False:
             for each in goal["why"]:
@@ -117,12 +101,17 @@ def why_table(summary: Mapping[str, Any]) -> Table:
                         ", ".join(each.get("at_prior_end", [])) or "–",
                     )
                 )
-    return rows
+    heads = ("goal", "twin", "figure", "p", "at an end")
+    return _table("why", "Twins that miss a goal.", heads, rows, kind="text")
 
 
-def family_table(summary: Mapping[str, Any]) -> Table:
-    """RMS gap by family, observation and budget, in the columns of `FAMILY_HEAD`."""
-    return [
+def family_table(summary: Mapping[str, Any]) -> TableOnPage:
+    """Return a table of the RMS gap by family, observation, and budget."""
+    heads = (
+        *("family", "observed", "trials", "twins", "RMS gap", "95 % interval"),
+        *("twins that count", "fall"),
+    )
+    rows = [
         (
             row["family"],
             "–" if row["observe"] == "none" else row["observe"],
@@ -135,11 +124,12 @@ def family_table(summary: Mapping[str, Any]) -> Table:
         )
         for row in summary["families"]
     ]
+    return _table("families", "RMS gap by family, observation, and budget.", heads, rows)
 
 
-def twin_table(summary: Mapping[str, Any]) -> Table:
-    """Twins and whether they count, in the columns of `TWIN_HEAD`."""
-    return [
+def twin_table(summary: Mapping[str, Any]) -> TableOnPage:
+    """Return a table of the twins, and whether they count."""
+    rows = [
         (
             row["twin"],
             _number(row["rms"]["estimate"]),
@@ -148,14 +138,23 @@ def twin_table(summary: Mapping[str, Any]) -> Table:
         )
         for row in summary["twins"]
     ]
+    heads = ("twin", "RMS gap as it is", "standard error", "counts")
+    return _table("twins", "Twins, and whether they count.", heads, rows)
 
 
-def strategy_table(summary: Mapping[str, Any]) -> Table:
-    """Quality on the twins by strategy, in the columns of `STRATEGY_HEAD`."""
-    return [
+def strategy_table(summary: Mapping[str, Any]) -> TableOnPage:
+    """Return a table of coverage on the twins by strategy."""
+    rows = [
         (row["strategy"], str(row["n"]), _number(row["estimate"]), _span(row, _number))
         for row in summary["strategies"]
     ]
+    heads = ("strategy", "twins", "coverage on the twin", "95 % interval")
+    return _table("strategies", "Coverage on the twins by strategy.", heads, rows)
+
+
+def _table(name: str, caption: str, heads: Sequence[str], rows: Sequence[Row], kind: str = "") -> TableOnPage:
+    columns = (Column(heads[0]), *(Column(head, kind=kind) for head in heads[1:]))
+    return TableOnPage(name, caption, columns, (Part(rows),), kind="numbers")
 
 
 def _counted(goal: Mapping[str, Any]) -> str:

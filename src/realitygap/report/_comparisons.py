@@ -22,6 +22,7 @@ from realitygap._wording import (
     span,
 )
 from realitygap.report._champions import FRESH_TRIALS, Champions
+from realitygap.report._table import Cell, Column, Part, Row, TableOnPage
 from realitygap.report._tally import Results, Tally, label_of, read_tally, settings_of
 from realitygap.stats import (
     ALPHA,
@@ -430,6 +431,8 @@ def comparisons_frame(comparisons: Sequence[Comparison]) -> pl.DataFrame:
 
 # on the page
 
+INTERVAL_NAME = f"{100 * CONFIDENCE:.0f} % BCa interval from {RESAMPLES:,} resamples"
+
 _REASONS: dict[Reason, str] = {
     "noise": "Noise levels, with one selection",
     "selection": "Selections, at one noise level",
@@ -437,42 +440,89 @@ _REASONS: dict[Reason, str] = {
 }
 
 
-def comparisons_content(comparisons: Sequence[Comparison]) -> dict[str, Any] | None:
-    """Return the content of the comparisons on the page; None without comparisons."""
+@dataclass(frozen=True)
+class ComparisonsOnPage:
+    """Comparisons as a page shows them.
+
+    Attributes:
+        table: Their table.
+        n_comparisons: Number of them.
+        n_shown: Number of those with a supported difference.
+        n_refused: Number of those with too few runs.
+        test: How they are tested.
+        notes: Sentences on what the table shows.
+    """
+
+    table: TableOnPage
+    n_comparisons: int
+    n_shown: int
+    n_refused: int
+    test: str
+    notes: list[str]
+
+
+def comparisons_content(
+    comparisons: Sequence[Comparison], name: str, caption: str, verdict: str
+) -> ComparisonsOnPage | None:
+    """Return the comparisons for the page; None without comparisons.
+
+    Args:
+        comparisons: The comparisons.
+        name: Name of the table.
+        caption: What is compared.
+        verdict: Heading of the conclusions.
+    """
     if not comparisons:
         return None
-    return {
-        "groups": [
-            (_REASONS[reason], [_row(each) for each in comparisons if each.reason == reason])
-            for reason in _REASONS
-            if any(each.reason == reason for each in comparisons)
-        ],
-        "n_comparisons": len(comparisons),
-        "n_shown": sum(each.is_shown for each in comparisons),
-        "n_refused": sum(not each.can_claim for each in comparisons),
-        "labels": ", ".join(dict.fromkeys(each.label for each in comparisons)),
-        "test": _test_in_words(comparisons),
-        "notes": _notes(comparisons),
-    }
+    labels = ", ".join(dict.fromkeys(each.label for each in comparisons))
+    columns = (
+        Column("First less second"),
+        Column(verdict, kind="text prose ", head_kind="text"),
+        Column("n"),
+        Column("difference", kind="median"),
+        Column("interval"),
+        Column("A12"),
+        Column("interval"),
+        Column("p"),
+        Column("p (Holm)"),
+    )
+    table = TableOnPage(
+        name,
+        f"{caption} ({labels}; n is the number of runs of each). The difference is the mean of the first condition "
+        "minus that of the second. A12 is the probability that a run of the first is above a run of the second. "
+        f"Intervals: {INTERVAL_NAME}.",
+        columns,
+        tuple(
+            Part(rows, title)
+            for reason, title in _REASONS.items()
+            if (rows := [_row(each) for each in comparisons if each.reason == reason])
+        ),
+        kind="numbers statistics cards",
+        is_cards=True,
+    )
+    return ComparisonsOnPage(
+        table,
+        len(comparisons),
+        sum(each.is_shown for each in comparisons),
+        sum(not each.can_claim for each in comparisons),
+        _test_in_words(comparisons),
+        _notes(comparisons),
+    )
 
 
-def _row(comparison: Comparison) -> dict[str, str]:
-    return {
-        "one": comparison.one,
-        "other": comparison.other,
-        "n": f"{comparison.n:,}"
-        if comparison.n == comparison.n_other
-        else f"{comparison.n:,}; {comparison.n_other:,}",
-        "difference": signed(comparison.size),
-        "difference_interval": span(comparison.difference, signs=True),
-        "a12": f"{comparison.a12.value:.2f}",
-        "a12_interval": span(comparison.a12, digits=2)
-        + (" *" if comparison.a12.method == "Newcombe" else ""),
-        "p": p_in_words(comparison.p),
-        "p_holm": p_in_words(comparison.p_holm),
-        "verdict": comparison.verdict,
-        "strong": "strong" if comparison.is_shown else "",
-    }
+def _row(comparison: Comparison) -> Row:
+    n, m = comparison.n, comparison.n_other
+    return (
+        f"{comparison.one} less {comparison.other}",
+        Cell(comparison.verdict, "text prose strong" if comparison.is_shown else None),
+        f"{n:,}" if n == m else f"{n:,}; {m:,}",
+        signed(comparison.size),
+        span(comparison.difference, signs=True),
+        f"{comparison.a12.value:.2f}",
+        span(comparison.a12, digits=2) + (" *" if comparison.a12.method == "Newcombe" else ""),
+        p_in_words(comparison.p),
+        p_in_words(comparison.p_holm),
+    )
 
 
 def _test_in_words(comparisons: Sequence[Comparison]) -> str:
@@ -513,6 +563,3 @@ def _notes(comparisons: Sequence[Comparison]) -> list[str]:
     if any(each.a12.method == "Newcombe" for each in comparisons):
         notes.append("Marked *: Newcombe’s interval, which needs no resampling.")
     return notes
-
-
-INTERVAL_NAME = f"{100 * CONFIDENCE:.0f} % BCa interval from {RESAMPLES:,} resamples"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from realitygap._version import __version__
@@ -14,6 +14,7 @@ from realitygap.report._lineage_figure import draw_lineage
 from realitygap.report._placed import FigureOnPage
 from realitygap.report._species_figure import count_species, draw_species
 from realitygap.report._structures import Structures
+from realitygap.report._table import Cell, Column, Part, Row, TableOnPage
 from realitygap.report._tally import Tally, settings_of
 from realitygap.report.charts.house import Drawing
 
@@ -41,7 +42,7 @@ def content(tally: Tally) -> dict[str, Any]:
         "networks": networks
         if isinstance(networks, str)
         else FigureOnPage("figure-networks", networks, "Figure 7"),
-        "structures": [_listed(group, tally) for group in structures],
+        "structures": _structures_table(structures, tally),
         "structure_groups": structures,
     }
     objective, novelty = _first(tally, "coverage"), _first(tally, "novelty", noise=0.5)
@@ -81,28 +82,45 @@ def _first(tally: Tally, selection: str, *, noise: float | None = None, driven: 
     return str((wanted or there)[0]["name"]) if there else None
 
 
-def _listed(group: Structures, tally: Tally) -> dict[str, Any]:
-    """Return one kind of selection, for the table of structures."""
-    rows = [
-        {
-            "letter": chr(ord("A") + rank),
-            "words": structure.words,
-            "n_hidden": structure.n_hidden,
-            "n_links": len(structure.links),
-            "n": structure.n,
-            "percent": f"{100 * structure.n / group.n_networks:.1f} %",
-        }
+def _structures_table(structures: Sequence[Structures], tally: Tally) -> TableOnPage:
+    columns = (
+        Column("Structure"),
+        Column("Links", kind="prose"),
+        *(
+            Column(head, kind="right", head_kind="right")
+            for head in ("Hidden nodes", "Enabled links", "Networks", "Share")
+        ),
+    )
+    caption = (
+        "Structures of the networks in the last generation of each run. Two networks have the same structure if the "
+        "same links are enabled; weights and the numbers of hidden nodes do not count."
+    )
+    parts = tuple(_part_of(group, tally) for group in structures)
+    return TableOnPage("structures", caption, columns, parts, kind="settings", separates_parts=True)
+
+
+def _part_of(group: Structures, tally: Tally) -> Part:
+    """Return the structures of one kind of selection."""
+    rows: list[Row] = [
+        (
+            chr(ord("A") + rank),
+            structure.words,
+            str(structure.n_hidden),
+            str(len(structure.links)),
+            f"{structure.n:,}",
+            f"{100 * structure.n / group.n_networks:.1f} %",
+        )
         for rank, structure in enumerate(group.listed)
     ]
     others = group.found[len(group.listed) :]
-    n_other = sum(structure.n for structure in others)
-    return {
-        "selection": group.selection,
-        "inputs": len(group.inputs),
-        "n": group.n_networks,
-        "n_runs": sum(len(tally.replicates(name)) for name in group.conditions),
-        "rows": rows,
-        "n_others": len(others),
-        "n_other": n_other,
-        "other_percent": f"{100 * n_other / group.n_networks:.1f} %",
-    }
+    if others:
+        n = sum(structure.n for structure in others)
+        share = f"{100 * n / group.n_networks:.1f} %"
+        empty = Cell("", kind="")
+        rows.append(("others", f"{len(others)} rarer structures", empty, empty, f"{n:,}", share))
+    n_runs = sum(len(tally.replicates(name)) for name in group.conditions)
+    return Part(
+        rows,
+        f"Selection by {group.selection}, {len(group.inputs)} inputs: n = {group.n_networks:,} networks of "
+        f"{n_runs:,} runs",
+    )

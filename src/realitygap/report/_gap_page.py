@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from realitygap.report._gap_figures import (
 )
 from realitygap.report._page import LABELS
 from realitygap.report._placed import FigureOnPage, hover_content, number_figures
+from realitygap.report._table import Cell, Column, Part, Row, TableOnPage
 from realitygap.report._template import render_page
 from realitygap.stats import Estimate
 from realitygap.study import GapBetween
@@ -97,17 +99,19 @@ def _content(gap: GapBetween) -> dict[str, Any]:
         "verdict": result.verdict,
         "score": result.score,
         "facts": _facts(gap),
-        "measures": [_row(result, each.name, each.title, each.meaning) for each in SHOWN],
-        "apart": [_row(result, *each) for each in _APART],
+        "measures": _measures_table(
+            "transfer",
+            "Measures of the transfer gap.",
+            [_row(result, each.name, each.title, each.meaning) for each in SHOWN],
+        ),
+        "apart": _measures_table(
+            "apart", "Re-evolved gap, and luck of selection.", [_row(result, *each) for each in _APART]
+        ),
         "advice": None if why is None else why.advice,
         "figures": figures,
         "why": figure_of_why,
-        "controllers": [
-            (each.name, *(f"{side.means[k]:.3f}" for side in (study.source, study.target)))
-            for k, each in enumerate(study.controllers)
-        ],
+        "controllers": _controllers_table(gap),
         "order": "" if gap.order is None else gap.order.to_toml(),
-        "names": [f"{side.label} {side.name}" for side in (study.source, study.target)],
     }
     return content | hover_content(content)
 
@@ -135,15 +139,35 @@ def _facts(gap: GapBetween) -> list[tuple[str, str]]:
     return facts + [("Note", note) for note in result.notes]
 
 
-def _row(result: GapResult, name: str, title: str, meaning: str) -> dict[str, Any]:
-    found: Estimate = getattr(result, name)
-    p = found.more.get("p")
-    return {
-        "title": title,
-        "meaning": meaning.format(score=result.score),
-        "estimate": "–" if found.value is None else f"{found.value:.3f}",
-        "interval": between(found),
-        "n": found.n,
-        "p": "" if p is None else p_equation(p).removeprefix("p ").removeprefix("= "),
-        "refused": found.refused,
-    }
+def _row(result: GapResult, name: str, title: str, meaning: str) -> Row:
+    estimate: Estimate = getattr(result, name)
+    p = estimate.more.get("p")
+    explained = meaning.format(score=result.score)
+    return (
+        title,
+        "–" if estimate.value is None else f"{estimate.value:.3f}",
+        between(estimate),
+        str(estimate.n),
+        "" if p is None else p_equation(p).removeprefix("p ").removeprefix("= "),
+        Cell(f"{explained}. ", more=estimate.refused) if estimate.refused else explained,
+    )
+
+
+def _measures_table(name: str, caption: str, rows: Sequence[Row]) -> TableOnPage:
+    columns = (
+        *(Column("Measure"), Column("estimate", kind="median"), Column("interval"), Column("n"), Column("p")),
+        Column("meaning", kind="text prose", head_kind="text"),
+    )
+    return TableOnPage(name, caption, columns, (Part(rows),))
+
+
+def _controllers_table(gap: GapBetween) -> TableOnPage:
+    study = gap.study
+    sides = (study.source, study.target)
+    rows = [
+        (controller.name, *(f"{side.means[k]:.3f}" for side in sides))
+        for k, controller in enumerate(study.controllers)
+    ]
+    columns = (Column("Controller"), *(Column(f"{side.label} {side.name}") for side in sides))
+    caption = f"Mean {study.result.score} of each controller."
+    return TableOnPage("controllers", caption, columns, (Part(rows),), kind="numbers")

@@ -14,7 +14,6 @@ _ESCAPES = {
 }  # fmt: skip
 _SUPERSCRIPTS = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
 _POWER = re.compile("·10([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)")
-_TITLE = re.compile(r"^Table \d+\. ")
 _NUMBER = re.compile(r"[<>=]? ?[+-]?[\d.,]+(?:·10[^\d\s]+)?(?: ?%)?(?:[\N{EN DASH}\s].*)?|")
 
 
@@ -22,7 +21,7 @@ def latex_table(caption: str, label: str, rows: Sequence[Sequence[str]]) -> str:
     r"""Return a table as LaTeX for the package booktabs.
 
     Args:
-        caption: Its caption; a number such as “Table 2.” at its start is left out, because LaTeX numbers tables.
+        caption: Its caption without a number, because LaTeX numbers tables.
         label: For `\ref`, without `tab:`.
         rows: Cells; the first row has the heads. A row with a first cell alone is a heading across the table.
     """
@@ -34,7 +33,7 @@ def latex_table(caption: str, label: str, rows: Sequence[Sequence[str]]) -> str:
     lines = [
         r"\begin{table}",
         r"\centering",
-        rf"\caption{{{_escaped(_TITLE.sub('', caption))}}}",
+        rf"\caption{{{_escaped(caption)}}}",
         rf"\label{{tab:{label}}}",
         rf"\begin{{tabular}}{{{kinds}}}",
         r"\toprule",

@@ -43,6 +43,7 @@ from realitygap.report._replay import content as replay_content
 from realitygap.report._statistics_section import statistics_content
 from realitygap.report._structures import selection_of
 from realitygap.report._summary import summarize
+from realitygap.report._table import Cell, Column, Part, Row, TableOnPage, numbered
 from realitygap.report._tally import Tally, label_of, read_tally, score_text, settings_of
 from realitygap.report._task_summary import summarize_tasks
 from realitygap.report._template import render_page
@@ -59,6 +60,10 @@ LABELS = {
     "REAL": "driven on the physical robot",
 }
 """Explanations of the labels of figures."""
+
+_CONFIDENCE = f"{100 * CONFIDENCE:.0f} %"
+_RANGES = (("low", "high"), ("q25", "q75"))
+"""Columns of a summary with the ends of an interval, and of its quartiles."""
 
 _MOST_GAPS = 12
 """Maximum number of conditions whose missing runs are listed. Otherwise their number is reported."""
@@ -97,7 +102,7 @@ def write_report(
             content = _content(tally)
         page = _render(content)
         if figures is not None:
-            content["exported"] = export_page(Path(figures), tally, content, page)
+            content["exported"] = export_page(Path(figures), tally, content)
             page = _render(content)
     within = tally.folder.path if out is None else None
     path = tally.folder.path / REPORT_NAME if out is None else Path(out)
@@ -125,7 +130,7 @@ def _check_out(path: Path) -> None:
 
 
 def _render(content: Mapping[str, Any]) -> str:
-    return render_page("report.html.jinja", content, share=_share, count=_count, score=score_text)
+    return render_page("report.html.jinja", content, count=_count)
 
 
 def _content(tally: Tally) -> dict[str, Any]:
@@ -146,7 +151,7 @@ def _content(tally: Tally) -> dict[str, Any]:
     number_figures(figure for _, _, figures in sections for figure in figures)
     content["sections"] = [(anchor, title) for anchor, title, _ in sections if title]
     content |= hover_content(content)
-    content["tables"] = {name: number for number, name in enumerate(_tables(content), 1)}
+    content["tables"] = {table.name: table for table in _tables(content)}
     return content
 
 
@@ -176,27 +181,96 @@ def _sections(content: Mapping[str, Any]) -> list[tuple[str, str, list[Any]]]:
     return [each for each in sections if each[0] != "comparisons" or has_comparisons]
 
 
-def _tables(content: Mapping[str, Any]) -> list[str]:
-    """The numbered tables in the order of the page."""
-    statistics = content["statistics"]
-    there = {
-        "results": True,
-        "scores": content["tasks"],
-        "fresh": statistics["fresh"],
-        "comparisons": statistics["comparisons"],
-        "plateaus": statistics["deception"],
-        "champions": not statistics["champions"]["problem"],
-        "spread": True,
-        "variety": statistics["variety"],
-        "chance": statistics["chance"],
-        "audit": content["audit"],
-        "parameters": True,
-    }
-    return [name for name, is_there in there.items() if is_there]
+def _tables(content: Mapping[str, Any]) -> list[TableOnPage]:
+    """Return the tables in the order of the page, with their numbers."""
+    statistics, audit = content["statistics"], content["audit"]
+    compared = [statistics[name].table for name in ("fresh", "comparisons") if statistics[name]]
+    answers = [
+        statistics["deception"] and statistics["deception"]["table"],
+        None if statistics["champions"]["problem"] else statistics["champions"]["table"],
+        statistics["spread"],
+        statistics["variety"],
+        statistics["chance"] and statistics["chance"]["table"],
+        audit and audit["table"],
+        content["parameters"],
+    ]
+    tables = [
+        content["results"],
+        content["task_scores"],
+        *compared,
+        content["gallery"]["structures"],
+        *answers,
+    ]
+    tables += [*content["settings"], _columns_table()]
+    return numbered([table for table in tables if table])
+
+
+def _columns_table() -> TableOnPage:
+    rows = [
+        (Cell(name, element="code"), Cell(kind, element="code"), meaning)
+        for name, kind, meaning in column_table()
+    ]
+    columns = (Column("Column"), Column("Type"), Column("Meaning", kind="prose"))
+    return TableOnPage("columns", "Columns of the data.", columns, (Part(rows),), kind="settings")
+
+
+def _results_table(summary: pl.DataFrame) -> TableOnPage:
+    n_published = max((len(values) for values in summary["published"].drop_nulls()), default=0)
+    columns = [Column("Condition"), Column("Label", kind="text"), Column("n")]
+    for group in ("Cells along the line driven", "Cells at the ends of steps"):
+        columns += [
+            Column("median", group, kind="median"),
+            Column(f"{_CONFIDENCE} interval", group),
+            Column("quartiles", group),
+        ]
+    columns += [Column(f"run {k}", "The paper", kind="published") for k in range(n_published)]
+    rows: list[Row] = []
+    for row in summary.iter_rows(named=True):
+        cells: list[str | Cell] = [row["condition"], row["label"], f"{row['n']:,}"]
+        for which in ("line", "ends"):
+            cells.append(_share(row[f"{which}_median"]))
+            cells += [_range(row[f"{which}_{low}"], row[f"{which}_{high}"]) for low, high in _RANGES]
+        published = [*(row["published"] or []), *[None] * n_published][:n_published]
+        cells += [Cell(_share(value), kind="none" if value is None else None) for value in published]
+        rows.append(cells)
+    caption = (
+        "The greatest coverage achieved in each run: the visited share of the reachable cells, best of all individuals "
+        "of a run."
+    )
+    more = " Counterpart of the paper’s Table 2." if n_published else ""
+    return TableOnPage("results", caption + more, tuple(columns), (Part(rows),), kind="numbers")
+
+
+def _scores_table(tasks: pl.DataFrame) -> TableOnPage | None:
+    if tasks.is_empty():
+        return None
+    columns = (
+        *(Column("Condition"), Column("Label", kind="text"), Column("Task", kind="text"), Column("n")),
+        *(Column("first", "Generation"), Column("last", "Generation")),
+        Column("median", "Whole run", kind="median"),
+        Column(f"{_CONFIDENCE} interval", "Whole run"),
+        Column("quartiles", "Whole run"),
+    )
+    rows = [
+        (
+            *(row["condition"], row["label"], row["task"], f"{row['n']:,}"),
+            *(score_text(row[key]) for key in ("first", "last", "median")),
+            *(
+                "–" if row[low] is None else f"{score_text(row[low])} to {score_text(row[high])}"
+                for low, high in _RANGES
+            ),
+        )
+        for row in tasks.iter_rows(named=True)
+    ]
+    caption = (
+        "The best score of each run by its task. First and last: the median of the best in the first and in the last "
+        "generation."
+    )
+    return TableOnPage("scores", caption, columns, (Part(rows),), kind="numbers tasks")
 
 
 def _words_and_figures(tally: Tally) -> dict[str, Any]:
-    summary = summarize(tally)
+    summary, tasks = summarize(tally), summarize_tasks(tally.folder)
     description = tally.description
     gallery = _gallery.content(tally)
     replay = replay_content(tally, leading_conditions(tally)[0])
@@ -212,17 +286,17 @@ def _words_and_figures(tally: Tally) -> dict[str, Any]:
         "software": description.get("software") or "unknown",
         "parameters": neat_parameters(tally.conditions),
         "settings": settings_tables(tally.conditions),
-        "summary": summary.to_dicts(),
+        "results": _results_table(summary),
         "measure": tally.measure,
         "audit": paper_audit_content(tally),
         "note": description.get("note") or "",
         "published_sources": _published_sources(tally),
-        "n_published": max((len(values) for values in summary["published"].drop_nulls()), default=0),
         "interval_notes": _interval_notes(summary),
-        "confidence": f"{100 * CONFIDENCE:.0f} %",
+        "confidence": _CONFIDENCE,
         "bests": FigureOnPage("figure-bests", draw_bests(tally, links=_links(replay))),
         "coverage": FigureOnPage("figure-coverage", draw_coverage(tally), "Figure 4"),
-        "tasks": summarize_tasks(tally.folder).to_dicts(),
+        "tasks": tasks.to_dicts(),
+        "task_scores": _scores_table(tasks),
         "scores": _score_figures(tally),
         "paths": [*gallery["individuals"][:1], *_path_figures(tally), *gallery["individuals"][1:]],
         "choices": _choices_figure(tally),
@@ -230,7 +304,6 @@ def _words_and_figures(tally: Tally) -> dict[str, Any]:
         "replay": replay,
         "command": _command(tally),
         "has_novelty": any(selection_of(each) == "novelty" for each in tally.conditions),
-        "columns": column_table(),
         "exported": None,
     }
 
@@ -453,6 +526,10 @@ def _is_built_in(description: Mapping[str, Any]) -> bool:
 
 def _share(value: float | None) -> str:
     return "–" if value is None else f"{value:.3f}"
+
+
+def _range(low: float | None, high: float | None) -> Cell:
+    return Cell("–", element="none") if low is None else Cell(f"{_share(low)}–{_share(high)}")
 
 
 def _count(value: int) -> str:

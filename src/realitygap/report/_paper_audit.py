@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from realitygap.report._audit import compare_samples, doubt
+from realitygap.report._table import Column, Part, TableOnPage
 from realitygap.report._tally import Tally, label_of, settings_of
 from realitygap.stats import SEED, smallest_p
 
@@ -234,7 +235,10 @@ def paper_audit_content(tally: Tally) -> dict[str, Any] | None:
     """Return the content of the page; None unless the study is the paper's."""
     if tally.description.get("name") != "paper":
         return None
-    return {"findings": audit_paper(), "spread": _spread_sentences(tally)}
+    rows = [(each.section, each.printed, each.found, each.bearing) for each in audit_paper()]
+    columns = tuple(map(Column, ("Section", "Printed", "Found", "Bearing")))
+    table = TableOnPage("audit", "What does not add up in the paper.", columns, (Part(rows),), kind="audit")
+    return {"table": table, "spread": _spread_sentences(tally)}
 
 
 def _spread_sentences(tally: Tally) -> list[str]:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 from realitygap.report._declared import declared
+from realitygap.report._table import Cell, Column, Part, Row, TableOnPage
 from realitygap.report._tally import settings_of
 
 _N_OUTPUTS = 2
@@ -17,45 +17,12 @@ _MOST_NAMES = 6
 """Conditions listed by name; more are counted."""
 
 
-@dataclass(frozen=True)
-class Parameter:
-    """A row of Table 1.
-
-    Attributes:
-        name: Name in the paper's words.
-        paper: Paper's value.
-        ours: Value of most conditions.
-        others: Conditions with another value, such as "4 in novelty-10"; empty if there are none.
-    """
-
-    name: str
-    paper: str
-    ours: str
-    others: str
-
-
-@dataclass(frozen=True)
-class SettingsTables:
-    """All resolved settings of a study.
-
-    Attributes:
-        differing: Names of the settings that are not the same in all conditions, such as `neat.activation`.
-        rows: For each condition its name, the first digits of its hash, and for each of `differing` the value and
-            whether it is another than the condition's baseline has (the first condition's without one).
-        common: Name and value of the settings that are the same everywhere.
-    """
-
-    differing: tuple[str, ...]
-    rows: tuple[tuple[str, str, tuple[tuple[str, bool], ...]], ...]
-    common: tuple[tuple[str, str], ...]
-
-
-def neat_parameters(conditions: Sequence[Mapping[str, Any]]) -> list[Parameter]:
-    """The paper's Table 1 with its values and those of the study."""
+def neat_parameters(conditions: Sequence[Mapping[str, Any]]) -> TableOnPage:
+    """Return the paper's Table 1 with its values and those of the study."""
     names = [condition["name"] for condition in conditions]
     settings = [settings_of(condition) for condition in conditions]
 
-    def row(name: str, paper: str, values: list[Any]) -> Parameter:
+    def row(name: str, paper: str, values: list[Any]) -> Row:
         shown = [_show(value) for value in values]
         counts = {value: shown.count(value) for value in dict.fromkeys(shown)}
         usual = max(counts, key=lambda value: counts[value])
@@ -64,12 +31,12 @@ def neat_parameters(conditions: Sequence[Mapping[str, Any]]) -> list[Parameter]:
             for value in counts
             if value != usual
         ]
-        return Parameter(name, paper, usual, "; ".join(others))
+        return name, paper, Cell(usual, more="".join(f"; {other}" for other in others))
 
     def neat(key: str) -> list[Any]:
         return [each.get("neat", {}).get(key) for each in settings]
 
-    return [
+    rows = [
         row("Generations", "5", neat("generations")),
         row("Population size", "8", neat("population")),
         row("Input nodes", "3; 4 with novelty", [len(declared(each)[0]) for each in settings]),
@@ -78,10 +45,16 @@ def neat_parameters(conditions: Sequence[Mapping[str, Any]]) -> list[Parameter]:
         row("Prob. to add link", "0.1", neat("add_link")),
         row("Prob. to add node", "0.05", neat("add_node")),
     ]
+    columns = (Column("Parameter"), Column("The paper"), Column("This study"))
+    caption = "NEAT parameters. Counterpart of the paper’s Table 1."
+    return TableOnPage("parameters", caption, columns, (Part(rows),), kind="")
 
 
-def settings_tables(conditions: Sequence[Mapping[str, Any]]) -> SettingsTables:
-    """All resolved settings, those that differ between conditions apart from those that do not."""
+def settings_tables(conditions: Sequence[Mapping[str, Any]]) -> list[TableOnPage]:
+    """Return all resolved settings: those that differ between conditions, if any do, and the others.
+
+    A marked value is another than in the condition's baseline. Without one, it is compared with the first condition.
+    """
     flat = {condition["name"]: dict(_flatten(settings_of(condition))) for condition in conditions}
     keys = list(dict.fromkeys(key for values in flat.values() for key in values))
     differing = [key for key in keys if len({values.get(key, "") for values in flat.values()}) > 1]
@@ -90,10 +63,26 @@ def settings_tables(conditions: Sequence[Mapping[str, Any]]) -> SettingsTables:
     for condition in conditions:
         values = flat[condition["name"]]
         baseline = flat.get(condition.get("baseline") or first, flat[first])
-        cells = tuple((values.get(key, "–"), values.get(key) != baseline.get(key)) for key in differing)
-        rows.append((condition["name"], str(condition.get("hash") or "")[:12], cells))
-    common = [(key, flat[first].get(key, "–")) for key in keys if key not in differing]
-    return SettingsTables(tuple(differing), tuple(rows), tuple(common))
+        cells = (
+            Cell(values.get(key, "–"), element="mark" if values.get(key) != baseline.get(key) else "")
+            for key in differing
+        )
+        name, shortened = condition["name"], str(condition.get("hash") or "")[:12]
+        rows.append((name, *cells, Cell(shortened, element="code")))
+    tables = []
+    if differing:
+        columns = (Column("Condition"), *(Column(key, is_code=True) for key in differing), Column("Hash"))
+        caption = (
+            "Settings that differ between conditions. Marked: another value than in the condition’s baseline (without "
+            "one, in the first condition)."
+        )
+        tables.append(
+            TableOnPage("settings-by-condition", caption, columns, (Part(rows),), kind="settings differing")
+        )
+    common = [(Cell(key, element="code"), flat[first].get(key, "–")) for key in keys if key not in differing]
+    caption = "Settings that are the same in all conditions." if differing else "Settings."
+    columns = (Column("Setting"), Column("Value"))
+    return [*tables, TableOnPage("settings", caption, columns, (Part(common),), kind="settings")]
 
 
 def _flatten(values: Mapping[str, Any], place: str = "") -> Iterator[tuple[str, str]]:

@@ -31,6 +31,7 @@ from realitygap.report._questions import (
     plateaus,
     spreads,
 )
+from realitygap.report._table import Column, Part, Row, TableOnPage
 from realitygap.report._tally import Tally, label_of, settings_of
 from realitygap.stats import Estimate, bca_interval, bca_mean, difference_of_means
 
@@ -53,17 +54,28 @@ def statistics_content(
     """
     basis = basis_of(champions)
     with_runs = [each for each in tally.conditions if len(tally.replicates(each["name"]))]
+    labels = ", ".join(sorted({label_of(each) for each in with_runs}))
     return {
-        "interval": INTERVAL_NAME,
-        "labels": ", ".join(sorted({label_of(each) for each in with_runs})),
-        "comparisons": comparisons_content(comparisons),
-        "fresh": comparisons_content(fresh),
-        "deception": _deception(tally, fresh if basis.is_fresh else comparisons, with_runs, basis),
+        "comparisons": comparisons_content(
+            comparisons,
+            "comparisons",
+            "Differences between conditions, best coverage of a run as recorded",
+            "As recorded",
+        ),
+        "fresh": comparisons_content(
+            fresh, "fresh", "Differences between conditions, best networks on fresh noise", "Conclusion"
+        ),
+        "deception": _deception(tally, fresh if basis.is_fresh else comparisons, with_runs, basis, labels),
         "champions": _champions(tally, comparisons, champions, fresh, with_runs),
-        "spread": _spread(tally),
-        "variety": _variety(tally, with_runs),
-        "chance": _chance(tally),
+        "spread": _spread(tally, labels),
+        "variety": _variety(tally, with_runs, labels),
+        "chance": _chance(tally, labels),
     }
+
+
+def _table(name: str, caption: str, columns: Sequence[Column], rows: Sequence[Row]) -> TableOnPage:
+    """Return a table with one row for each condition."""
+    return TableOnPage(name, caption, (Column("Condition"), *columns), (Part(rows),))
 
 
 # deceptiveness
@@ -74,8 +86,9 @@ def _deception(
     comparisons: Sequence[Comparison],
     conditions: Sequence[Mapping[str, Any]],
     basis: Basis,
+    labels: str,
 ) -> dict[str, Any] | None:
-    rows = []
+    rows: list[Row] = []
     generations = 0
     for condition in conditions:
         name = condition["name"]
@@ -85,21 +98,34 @@ def _deception(
         generations = max(generations, tally.generation_bests(name, tally.measure).shape[1])
         values = tally.run_bests(name, tally.measure)
         rows.append(
-            {
-                "condition": name,
-                "n": share.n,
-                "mean": f"{values.mean():.3f}",
-                "interval": span(bca_mean(values)),
-                "plateaus": _percent(share),
-                "plateaus_interval": _percent_span(share),
-            }
+            (
+                name,
+                f"{share.n:,}",
+                f"{values.mean():.3f}",
+                span(bca_mean(values)),
+                _percent(share),
+                _percent_span(share),
+            )
         )
     if not rows:
         return None
+    table = _table(
+        "plateaus",
+        f"Mean best coverage of a run, and runs that end on a plateau ({labels}, n runs). Intervals: {INTERVAL_NAME}; "
+        "of shares, exact (Clopper & Pearson).",
+        (
+            Column("n"),
+            Column("mean", kind="median"),
+            Column("interval"),
+            Column("plateaus", kind="median"),
+            Column("interval"),
+        ),
+        rows,
+    )
     k = plateau_length(generations)
     has_random = any(settings_of(each).get("selection") == "random" for each in conditions)
     return {
-        "rows": rows,
+        "table": table,
         "k": k,
         "generations": generations,
         "without_learning": f"{100 * (generations - k) / generations:.0f} %" if has_random else None,
@@ -178,24 +204,43 @@ def _champions(
     fresh: Sequence[Comparison],
     conditions: Sequence[Mapping[str, Any]],
 ) -> dict[str, Any]:
-    references = _references("noise", conditions)
     problems = {each.problem for each in found if each.problem}
     return {
-        "rows": [
-            _champion_row(
-                each, _difference_between(fresh, each.condition, references.get(each.condition, ""))
-            )
-            for each in found
-            if not each.problem
-        ],
-        "has_reference": bool(references),
+        "table": _champions_table(found, fresh, conditions),
         "sentences": _noise_sentences(comparisons, fresh, conditions),
         "problem": None if any(not each.problem for each in found) else "; ".join(sorted(problems)),
         "missing": [each.condition for each in found if each.problem],
         "fresh_trials": FRESH_TRIALS,
-        "most": MOST_RUNS,
         "trials_a_run": _trials_a_run(tally),
     }
+
+
+def _champions_table(
+    found: Sequence[Champions], fresh: Sequence[Comparison], conditions: Sequence[Mapping[str, Any]]
+) -> TableOnPage:
+    references = _references("noise", conditions)
+    columns = [
+        Column("n"),
+        Column("reported"),
+        Column("on fresh noise", kind="median"),
+        Column("interval"),
+        Column("luck"),
+        Column("interval"),
+    ]
+    rows: list[Row] = [_champion_row(each) for each in found if not each.problem]
+    if references:
+        columns.append(Column("on fresh noise, less that of its selection’s first noise level"))
+        rows = [
+            (*row, _difference_between(fresh, str(row[0]), references.get(str(row[0]), ""))) for row in rows
+        ]
+    labels = ", ".join(sorted({label_of(each) for each in conditions}))
+    return _table(
+        "champions",
+        f"Best networks as reported and on fresh noise ({labels}; n champions, those of the first {MOST_RUNS} runs at "
+        f"most, {FRESH_TRIALS} fresh trials each). Intervals: {INTERVAL_NAME}, over champions.",
+        columns,
+        rows,
+    )
 
 
 def _noise_sentences(
@@ -240,41 +285,49 @@ def _references(key: str, conditions: Sequence[Mapping[str, Any]]) -> dict[str, 
     }
 
 
-def _champion_row(champions: Champions, difference: str) -> dict[str, str]:
+def _champion_row(champions: Champions) -> tuple[str, ...]:
     luck = champions.luck
-    return {
-        "condition": champions.condition,
-        "n": f"{champions.n:,}",
-        "reported": f"{champions.reported.mean():.3f}",
-        "expected": f"{champions.expected.mean():.3f}",
-        "expected_interval": span(champions.expected_mean),
-        "luck": signed(luck.value or 0.0),
-        "luck_interval": span(luck, signs=True),
-        "reference": difference,
-    }
+    return (
+        champions.condition,
+        f"{champions.n:,}",
+        f"{champions.reported.mean():.3f}",
+        f"{champions.expected.mean():.3f}",
+        span(champions.expected_mean),
+        signed(luck.value or 0.0),
+        span(luck, signs=True),
+    )
 
 
 # spread
 
 
-def _spread(tally: Tally) -> dict[str, Any]:
-    rows = []
-    for each in spreads(tally):
-        compared = each.reference != each.condition
-        rows.append(
-            {
-                "condition": each.condition,
-                "n": f"{each.n:,}",
-                "deviation": _number(each.deviation),
-                "robust": _number(each.robust),
-                "reference": each.reference if compared else "",
-                "ratio": _number(each.ratio.value, 2) if compared else "",
-                "ratio_interval": span(each.ratio, 2) if compared else "",
-                "robust_ratio": _number(each.robust_ratio.value, 2) if compared else "",
-                "robust_interval": span(each.robust_ratio, 2) if compared else "",
-            }
+def _spread(tally: Tally, labels: str) -> TableOnPage:
+    measured = spreads(tally)
+    has_ratio = any(each.reference != each.condition for each in measured)
+    columns = [Column("n"), Column("standard deviation", kind="median"), Column("robust")]
+    if has_ratio:
+        columns += [
+            Column("against", kind="text", head_kind="text"),
+            Column("ratio", kind="median"),
+            Column("interval"),
+            Column("robust ratio"),
+            Column("interval"),
+        ]
+    rows: list[Row] = []
+    for each in measured:
+        ratios = (
+            each.reference,
+            _number(each.ratio.value, 2),
+            span(each.ratio, 2),
+            _number(each.robust_ratio.value, 2),
+            span(each.robust_ratio, 2),
         )
-    return {"rows": rows, "has_ratio": any(row["reference"] for row in rows)}
+        if each.reference == each.condition:
+            ratios = ("",) * 5
+        own = (each.condition, f"{each.n:,}", _number(each.deviation), _number(each.robust))
+        rows.append((*own, *ratios) if has_ratio else own)
+    about = f" Ratios to the condition named. Intervals: {INTERVAL_NAME}." if has_ratio else ""
+    return _table("spread", f"Spread between runs ({labels}, n runs).{about}", columns, rows)
 
 
 def _number(value: float | None, digits: int = 3) -> str:
@@ -284,7 +337,7 @@ def _number(value: float | None, digits: int = 3) -> str:
 # variety
 
 
-def _variety(tally: Tally, conditions: Sequence[Mapping[str, Any]]) -> dict[str, Any] | None:
+def _variety(tally: Tally, conditions: Sequence[Mapping[str, Any]], labels: str) -> TableOnPage | None:
     found = [each for each in measure_variety(tally) if each.n]
     if not found:
         return None
@@ -294,25 +347,35 @@ def _variety(tally: Tally, conditions: Sequence[Mapping[str, Any]]) -> dict[str,
         names = {settings_of(each)["selection"]: str(each["name"]) for each in group}
         if "coverage" in names:
             objective |= {name: names["coverage"] for name in names.values() if name != names["coverage"]}
-    return {
-        "rows": [_variety_row(each, by_name.get(objective.get(each.condition, ""))) for each in found],
-        "has_objective": bool(objective),
-        "most_runs": MOST_RUNS,
-        "most_behaviors": MOST_BEHAVIORS,
-        "n_behaviors": max(each.n_behaviors for each in found),
-    }
+    less = [Column("less the objective’s")] if objective else []
+    columns = [
+        Column("n"),
+        *(Column("sorted cells [cells]", kind="median"), Column("interval"), *less),
+        *(Column("Jaccard", kind="median"), Column("interval"), *less),
+    ]
+    rows = []
+    for each in found:
+        row = _variety_row(each, by_name.get(objective.get(each.condition, "")))
+        rows.append(row if objective else (*row[:4], *row[5:7]))
+    n_behaviors = max(each.n_behaviors for each in found)
+    return _table(
+        "variety",
+        f"Variety of behaviors within a run ({labels}; n runs, the first {MOST_RUNS} at most; {n_behaviors} behaviors "
+        f"of each{' at most' if n_behaviors == MOST_BEHAVIORS else ''}). Intervals: {INTERVAL_NAME}, over runs.",
+        columns,
+        rows,
+    )
 
 
-def _variety_row(variety: Variety, objective: Variety | None) -> dict[str, str]:
-    row = {"condition": variety.condition, "n": f"{variety.n:,}"}
-    for name, digits, own, other in (
-        ("sorted", 1, variety.sorted_cells, None if objective is None else objective.sorted_cells),
-        ("jaccard", 3, variety.jaccard, None if objective is None else objective.jaccard),
+def _variety_row(variety: Variety, objective: Variety | None) -> tuple[str, ...]:
+    row = [variety.condition, f"{variety.n:,}"]
+    for digits, own, other in (
+        (1, variety.sorted_cells, None if objective is None else objective.sorted_cells),
+        (3, variety.jaccard, None if objective is None else objective.jaccard),
     ):
-        row[name] = f"{own.mean():.{digits}f}"
-        row[f"{name}_interval"] = span(bca_mean(own), digits)
-        row[f"{name}_less"] = "" if other is None else _difference(own, other, digits)
-    return row
+        row += [f"{own.mean():.{digits}f}", span(bca_mean(own), digits)]
+        row.append("" if other is None else _difference(own, other, digits))
+    return tuple(row)
 
 
 def _difference(one: npt.NDArray[np.float64], other: npt.NDArray[np.float64], digits: int = 3) -> str:
@@ -323,7 +386,7 @@ def _difference(one: npt.NDArray[np.float64], other: npt.NDArray[np.float64], di
 # chance
 
 
-def _chance(tally: Tally) -> dict[str, Any] | None:
+def _chance(tally: Tally, labels: str) -> dict[str, Any] | None:
     few, more = chances(tally, 3), chances(tally, 100)
     if not few:
         return None
@@ -331,16 +394,30 @@ def _chance(tally: Tally) -> dict[str, Any] | None:
     for three, hundred in zip(few, more, strict=True):
         for k, condition in enumerate(three.conditions):
             rows.append(
-                {
-                    "condition": condition,
-                    "n": f"{len(tally.replicates(condition)):,}",
-                    "mean": f"{tally.run_bests(condition, tally.measure).mean():.3f}",
-                    "best": f"{100 * three.best[k]:.0f} %",
-                    "equal": f"{100 * three.best_if_equal:.0f} %",
-                    "hundred": f"{100 * hundred.best[k]:.0f} %",
-                }
+                (
+                    condition,
+                    f"{len(tally.replicates(condition)):,}",
+                    f"{tally.run_bests(condition, tally.measure).mean():.3f}",
+                    f"{100 * three.best[k]:.0f} %",
+                    f"{100 * three.best_if_equal:.0f} %",
+                    f"{100 * hundred.best[k]:.0f} %",
+                )
             )
-    return {"rows": rows, "sentence": _chance_sentence(tally), "n_groups": len(few)}
+    table = _table(
+        "chance",
+        f"How often a noise level has the highest mean of those with the same selection ({labels}): when runs are "
+        "drawn from the n observed ones, and when all levels have one distribution. Exact for these runs; levels with "
+        "equal means share.",
+        (
+            Column("n"),
+            Column("mean"),
+            Column("best of 3 runs a level", kind="median"),
+            Column("if noise made no difference"),
+            Column("best of 100 runs a level"),
+        ),
+        rows,
+    )
+    return {"table": table, "sentence": _chance_sentence(tally)}
 
 
 def _chance_sentence(tally: Tally) -> str | None:

@@ -5,9 +5,13 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping
 from importlib import resources
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from realitygap._foreign_text import page_text
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
+    from markupsafe import Markup
 
 
 def render_page(name: str, content: Mapping[str, Any], **filters: Callable[..., str]) -> str:
@@ -18,6 +22,13 @@ def render_page(name: str, content: Mapping[str, Any], **filters: Callable[..., 
         content: Content of the page, to which the style sheet is added as `css`.
         filters: Functions that the template uses.
     """
+    tokens = resources.files("realitygap.drawing").joinpath("tokens.css").read_text(encoding="utf-8")
+    template = page_environment(**filters).get_template(name)
+    return _keep_units(page_text(template.render({**content, "css": tokens + template_text("report.css")})))
+
+
+def page_environment(**filters: Callable[..., str]) -> Environment:
+    """Return the environment of the templates, with the functions that one of them uses."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(
@@ -27,10 +38,15 @@ def render_page(name: str, content: Mapping[str, Any], **filters: Callable[..., 
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters.update(filters)
-    tokens = resources.files("realitygap.drawing").joinpath("tokens.css").read_text(encoding="utf-8")
-    page = environment.get_template(name).render({**content, "css": tokens + template_text("report.css")})
-    return _keep_units(page_text(page))
+    environment.filters.update(filters, formula=_formula)
+    return environment
+
+
+def _formula(text: str) -> Markup:
+    """Return a text of ours with the index of the effect size A12 set low."""
+    from markupsafe import Markup, escape
+
+    return escape(text).replace("A12", Markup("A<sub>12</sub>"))
 
 
 _UNIT = re.compile(

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
-from realitygap.report._tally import Tally, label_of, settings_of
+from realitygap.report._tally import DescribedCondition, Tally, label_of, settings_of
 from realitygap.report.charts.house import Drawing, draw_wide
 from realitygap.report.charts.shapes import draw_picture
 from realitygap.report.charts.sheet import IS_WIDE, Sheet
@@ -45,7 +42,7 @@ def draw_arena_and_robot(tally: Tally, condition: str, *, name: str) -> Drawing:
     return draw_wide(draw, name, caption, alt)
 
 
-def _caption(tally: Tally, condition: Condition, described: Mapping[str, Any]) -> str:
+def _caption(tally: Tally, condition: Condition, described: DescribedCondition) -> str:
     start = condition.arena.pose()
     same = len({str(settings_of(each).get("arena")) for each in tally.conditions}) == 1
     whose = "All conditions have this arena." if same else f"Shown is condition {condition.name}."

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from realitygap.platforms import SimPlatform
-from realitygap.report._tally import settings_of
+from realitygap.report._tally import DescribedCondition, settings_of
 
 _CONTACT = {
     "freeze": "a blocked robot does not move at all",
@@ -16,7 +16,7 @@ _CONTACT = {
 _KINDS = ("uniform", "normal", "log_uniform", "choice")
 
 
-def sim_assumptions(conditions: Sequence[Mapping[str, Any]]) -> list[tuple[str, str]]:
+def sim_assumptions(conditions: Sequence[DescribedCondition]) -> list[tuple[str, str]]:
     """Return the conditions and the assumptions of each set-up of the platform `sim`.
 
     Args:

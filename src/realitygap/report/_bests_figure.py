@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from realitygap.drawing import Ink
-from realitygap.report._tally import Results, Tally, label_of, read_tally
+from realitygap.report._tally import DescribedCondition, Results, Tally, label_of, read_tally
 from realitygap.report.charts.house import Drawing, draw_wide, shorten
 from realitygap.report.charts.lines import draw_line, draw_rings, hollow, line_key, mark_key, write
 from realitygap.report.charts.marks import MOST_MARKS, Panel, Series
@@ -68,7 +67,7 @@ def draw_bests(folder: Results, *, links: Mapping[tuple[str, int], str] | None =
     )
 
 
-def _row(tally: Tally, condition: Mapping[str, Any], n_drawn: int) -> _Row:
+def _row(tally: Tally, condition: DescribedCondition, n_drawn: int) -> _Row:
     name = condition["name"]
     values = tally.run_bests(name, tally.measure)
     return _Row(

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -12,7 +10,7 @@ import polars as pl
 
 from realitygap.errors import RecordError, RecordVersionError
 from realitygap.platforms import retry_genomes
-from realitygap.report._tally import Results, Tally, label_of, read_tally, settings_of
+from realitygap.report._tally import DescribedCondition, Results, Tally, label_of, read_tally, settings_of
 from realitygap.runs import Condition, genome_of, partners_of
 from realitygap.stats import Estimate, bca_interval, bca_mean, difference_of_means
 from realitygap.trials import NoiseKey
@@ -86,7 +84,7 @@ def retry_champions(folder: Results) -> list[Champions]:
     return [_retry(tally, each) for each in tally.conditions if each["name"] in with_runs]
 
 
-def _retry(tally: Tally, described: Mapping[str, Any]) -> Champions:
+def _retry(tally: Tally, described: DescribedCondition) -> Champions:
     name, label = described["name"], label_of(described)
     try:
         condition = Condition.from_settings(name, dict(settings_of(described)))

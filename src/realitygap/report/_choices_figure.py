@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from realitygap._wording import counted
 from realitygap.drawing import Ink
-from realitygap.report._tally import Results, Tally, label_of, read_tally, settings_of
+from realitygap.report._tally import DescribedCondition, Results, Tally, label_of, read_tally, settings_of
 from realitygap.report.charts.house import Drawing, draw_wide, shorten, wrap
 from realitygap.report.charts.lines import (
     Dash,
@@ -96,7 +96,7 @@ def compare_choices(folder: Results) -> list[list[Choice]]:
     return groups
 
 
-def _choice(tally: Tally, condition: Mapping[str, Any], baseline: str, reference: float) -> Choice:
+def _choice(tally: Tally, condition: DescribedCondition, baseline: str, reference: float) -> Choice:
     name = condition["name"]
     values = tally.run_bests(name, tally.measure)
     median = quartiles(values).median if len(values) else math.nan

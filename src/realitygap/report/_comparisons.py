@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
@@ -23,7 +23,7 @@ from realitygap._wording import (
 )
 from realitygap.report._champions import FRESH_TRIALS, Champions
 from realitygap.report._table import Cell, Column, Part, Row, TableOnPage
-from realitygap.report._tally import Results, Tally, label_of, read_tally, settings_of
+from realitygap.report._tally import DescribedCondition, Results, Tally, label_of, read_tally, settings_of
 from realitygap.stats import (
     ALPHA,
     BCA_SMALLEST_N,
@@ -213,7 +213,7 @@ def compare_champions(folder: Results, champions: Sequence[Champions]) -> list[C
 
 
 def _compare(
-    pairs: Iterable[tuple[Mapping[str, Any], Mapping[str, Any], Reason, Samples]],
+    pairs: Iterable[tuple[DescribedCondition, DescribedCondition, Reason, Samples]],
 ) -> list[Comparison]:
     parts = [pair for pair in pairs if min(len(pair[-1].one), len(pair[-1].other))]
     raw = np.array([values.p() for *_, values in parts])
@@ -311,9 +311,9 @@ def _is_paired(tally: Tally, one: str, other: str) -> bool:
     )
 
 
-def same_but_for(key: str, conditions: Sequence[Mapping[str, Any]]) -> list[list[Mapping[str, Any]]]:
+def same_but_for(key: str, conditions: Sequence[DescribedCondition]) -> list[list[DescribedCondition]]:
     """Conditions in groups that differ in one setting alone; groups of one are left out."""
-    groups: list[tuple[dict[str, Any], list[Mapping[str, Any]]]] = []
+    groups: list[tuple[dict[str, Any], list[DescribedCondition]]] = []
     for condition in conditions:
         settings = settings_of(condition)
         if key not in settings:
@@ -329,7 +329,7 @@ def same_but_for(key: str, conditions: Sequence[Mapping[str, Any]]) -> list[list
     return [members for _, members in groups if len(members) > 1]
 
 
-def _pairs(tally: Tally) -> Iterator[tuple[Mapping[str, Any], Mapping[str, Any], Reason]]:
+def _pairs(tally: Tally) -> Iterator[tuple[DescribedCondition, DescribedCondition, Reason]]:
     """Return the pairs of conditions to compare, each pair once."""
     seen: set[frozenset[str]] = set()
     for one, other, reason in _all_pairs(tally.conditions):
@@ -340,8 +340,8 @@ def _pairs(tally: Tally) -> Iterator[tuple[Mapping[str, Any], Mapping[str, Any],
 
 
 def _all_pairs(
-    conditions: Sequence[Mapping[str, Any]],
-) -> Iterator[tuple[Mapping[str, Any], Mapping[str, Any], Reason]]:
+    conditions: Sequence[DescribedCondition],
+) -> Iterator[tuple[DescribedCondition, DescribedCondition, Reason]]:
     reasons: tuple[Reason, ...] = ("noise", "selection")
     for reason in reasons:
         for group in same_but_for(reason, conditions):
@@ -350,13 +350,14 @@ def _all_pairs(
                     yield group[later], group[earlier], reason
     names = {condition["name"]: condition for condition in conditions}
     for condition in conditions:
-        if condition.get("baseline") in names:
-            yield condition, names[condition["baseline"]], "baseline"
+        baseline = names.get(condition.get("baseline") or "")
+        if baseline is not None:
+            yield condition, baseline, "baseline"
 
 
 def _comparison(
-    one: Mapping[str, Any],
-    other: Mapping[str, Any],
+    one: DescribedCondition,
+    other: DescribedCondition,
     reason: Reason,
     samples: Samples,
     n_comparisons: int,

@@ -25,7 +25,7 @@ from realitygap._wording import (
 )
 from realitygap.report._champions import Champions
 from realitygap.report._comparisons import Comparison, same_but_for
-from realitygap.report._tally import Tally, label_of, score_text, settings_of, task_of
+from realitygap.report._tally import DescribedCondition, Tally, label_of, score_text, settings_of, task_of
 from realitygap.stats import median_interval, quartiles, runs_for_a_claim
 
 MOST_FINDINGS = 3
@@ -373,7 +373,7 @@ def _of_changes(study: _Study) -> Finding | None:
 # limits
 
 
-def _limits(study: _Study, conditions: Sequence[Mapping[str, Any]], caveats: Sequence[str]) -> str:
+def _limits(study: _Study, conditions: Sequence[DescribedCondition], caveats: Sequence[str]) -> str:
     origins = sorted({_ORIGINS.get(label_of(each), label_of(each)) for each in conditions})
     runs = _runs(len(study.tally.replicates(each["name"])) for each in conditions)
     parts = [" and ".join(origins), f"{runs} per condition"]

@@ -15,6 +15,7 @@ from realitygap.drawing import Ink
 from realitygap.errors import RealityGapError
 from realitygap.records import ResultsFolder
 from realitygap.report._tally import (
+    DescribedCondition,
     Results,
     Tally,
     bests_of,
@@ -152,7 +153,7 @@ def draw_scores(folder: ResultsFolder | str | Path) -> list[Drawing]:
     ]
 
 
-def _score_of(condition: Mapping[str, Any]) -> tuple[str, float, float] | None:
+def _score_of(condition: DescribedCondition) -> tuple[str, float, float] | None:
     """Name, least and greatest value of a condition's score; None for coverage."""
     settings, kind = settings_of(condition), task_of(condition)
     if kind == "coverage":
@@ -187,7 +188,7 @@ def _points_of(description: Mapping[str, Any]) -> Points:
     return "best-so-far" if points == "best-so-far" else "best-of-generation"
 
 
-def _panel(tally: Tally, condition: Mapping[str, Any], points: Points) -> Panel:
+def _panel(tally: Tally, condition: DescribedCondition, points: Points) -> Panel:
     name = condition["name"]
     values = tally.generation_bests(name, tally.measure)
     if points == "best-so-far":

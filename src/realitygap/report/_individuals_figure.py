@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -20,7 +19,7 @@ from realitygap.report._path_figure import (
     trace_paths,
     typical_replicate,
 )
-from realitygap.report._tally import Results, Tally, label_of, read_tally, settings_of
+from realitygap.report._tally import DescribedCondition, Results, Tally, label_of, read_tally, settings_of
 from realitygap.report.charts.arena import arena_extent, arena_panels, draw_cells, draw_start
 from realitygap.report.charts.house import Drawing, draw_wide, shorten
 from realitygap.report.charts.lines import (
@@ -285,7 +284,7 @@ def _draw_pen_key(axes: Axes, n_pens: int, *, small: bool) -> None:
 
 def _individuals_caption(
     tally: Tally,
-    described: Mapping[str, Any],
+    described: DescribedCondition,
     replicate: int,
     panels: list[list[TracedPath]],
     sizes: tuple[int, int],

@@ -8,7 +8,7 @@ from typing import Any
 
 from realitygap.report._declared import declared
 from realitygap.report._table import Cell, Column, Part, Row, TableOnPage
-from realitygap.report._tally import settings_of
+from realitygap.report._tally import DescribedCondition, settings_of
 
 _N_OUTPUTS = 2
 """Move and turn."""
@@ -17,7 +17,7 @@ _MOST_NAMES = 6
 """Conditions listed by name; more are counted."""
 
 
-def neat_parameters(conditions: Sequence[Mapping[str, Any]]) -> TableOnPage:
+def neat_parameters(conditions: Sequence[DescribedCondition]) -> TableOnPage:
     """Return the paper's Table 1 with its values and those of the study."""
     names = [condition["name"] for condition in conditions]
     settings = [settings_of(condition) for condition in conditions]
@@ -50,7 +50,7 @@ def neat_parameters(conditions: Sequence[Mapping[str, Any]]) -> TableOnPage:
     return TableOnPage("parameters", caption, columns, (Part(rows),), kind="")
 
 
-def settings_tables(conditions: Sequence[Mapping[str, Any]]) -> list[TableOnPage]:
+def settings_tables(conditions: Sequence[DescribedCondition]) -> list[TableOnPage]:
     """Return all resolved settings: those that differ between conditions, if any do, and the others.
 
     A marked value is another than in the condition's baseline. Without one, it is compared with the first condition.
@@ -59,7 +59,7 @@ def settings_tables(conditions: Sequence[Mapping[str, Any]]) -> list[TableOnPage
     keys = list(dict.fromkeys(key for values in flat.values() for key in values))
     differing = [key for key in keys if len({values.get(key, "") for values in flat.values()}) > 1]
     first = conditions[0]["name"]
-    rows = []
+    rows: list[Row] = []
     for condition in conditions:
         values = flat[condition["name"]]
         baseline = flat.get(condition.get("baseline") or first, flat[first])

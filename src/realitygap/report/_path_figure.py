@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -13,7 +13,15 @@ import polars as pl
 from realitygap.errors import RealityGapError
 from realitygap.platforms import is_physical
 from realitygap.report._driven import driven_paths
-from realitygap.report._tally import Results, Tally, label_of, read_tally, settings_of, task_of
+from realitygap.report._tally import (
+    DescribedCondition,
+    Results,
+    Tally,
+    label_of,
+    read_tally,
+    settings_of,
+    task_of,
+)
 from realitygap.report.charts.arena import (
     Track,
     arena_keys,
@@ -173,7 +181,7 @@ def _driven_paths(tally: Tally, condition: Condition, rows: pl.DataFrame, column
     return paths
 
 
-def say_origin(condition: Mapping[str, Any], paths: Sequence[TracedPath], problem: str) -> str:
+def say_origin(condition: DescribedCondition, paths: Sequence[TracedPath], problem: str) -> str:
     """Describe the source of the drawn lines, or the reason why there are none."""
     if is_physical(settings_of(condition)):
         if all(path.poses is not None for path in paths):
@@ -222,7 +230,7 @@ def path_key(axes: Axes, paths: Sequence[TracedPath], *, is_wide: bool) -> None:
 
 def _caption(
     tally: Tally,
-    condition: Mapping[str, Any],
+    condition: DescribedCondition,
     replicate: int,
     paths: list[TracedPath],
     *,

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -15,7 +14,7 @@ import polars as pl
 from realitygap.evolution import largest_cell_distance
 from realitygap.report._champions import MOST_RUNS
 from realitygap.report._comparisons import paired_values, same_but_for
-from realitygap.report._tally import Results, Tally, read_tally, settings_of
+from realitygap.report._tally import DescribedCondition, Results, Tally, read_tally, settings_of
 from realitygap.stats import (
     SEED,
     Estimate,
@@ -91,7 +90,7 @@ def spreads(tally: Tally) -> list[Spread]:
     return [_spread(tally, each["name"], _reference(each, with_runs)) for each in with_runs]
 
 
-def _reference(condition: Mapping[str, Any], others: Sequence[Mapping[str, Any]]) -> str:
+def _reference(condition: DescribedCondition, others: Sequence[DescribedCondition]) -> str:
     names = [each["name"] for each in others]
     if condition.get("baseline") in names:
         return str(condition["baseline"])
@@ -178,7 +177,7 @@ def measure_variety(folder: Results) -> list[Variety]:
     return [_variety(tally, each) for each in with_runs]
 
 
-def _variety(tally: Tally, condition: Mapping[str, Any]) -> Variety:
+def _variety(tally: Tally, condition: DescribedCondition) -> Variety:
     name = condition["name"]
     replicates = [int(run) for run in tally.replicates(name)[:MOST_RUNS]]
     rows = tally.folder.read(name, replicates, ["replicate", "cells"])
@@ -213,7 +212,7 @@ def _visited(cells: pl.Series, columns: int, lines: int) -> npt.NDArray[np.bool_
     return visited
 
 
-def grid_of(condition: Mapping[str, Any]) -> tuple[int, int]:
+def grid_of(condition: DescribedCondition) -> tuple[int, int]:
     """Return columns and rows of the arena's reachable cells; the paper's if the settings have none."""
     try:
         grid = ArenaSettings.model_validate(settings_of(condition).get("arena", {})).arena().grid

@@ -22,7 +22,7 @@ from realitygap.errors import RealityGapError
 from realitygap.playback import RobotShape, first_visits, pack_pen, pack_scene, pack_shape
 from realitygap.report._path_figure import typical_replicate
 from realitygap.report._placed import as_json, hash_of
-from realitygap.report._tally import Tally, label_of, score_text, settings_of, task_of
+from realitygap.report._tally import DescribedCondition, Tally, label_of, score_text, settings_of, task_of
 from realitygap.report._template import template_text
 from realitygap.report.charts.arena import arena_extent
 from realitygap.runs import Condition, replay
@@ -176,7 +176,7 @@ def _picture(condition: Condition, trajectory: Trajectory, text: str) -> Markup:
 # one run
 
 
-def _pack_run(tally: Tally, described: Mapping[str, Any], room: int) -> _Run:
+def _pack_run(tally: Tally, described: DescribedCondition, room: int) -> _Run:
     name = described["name"]
     replicate = typical_replicate(tally, name)
     rows = tally.rows_of(name, replicate)

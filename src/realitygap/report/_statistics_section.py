@@ -32,7 +32,7 @@ from realitygap.report._questions import (
     spreads,
 )
 from realitygap.report._table import Column, Part, Row, TableOnPage
-from realitygap.report._tally import Tally, label_of, settings_of
+from realitygap.report._tally import DescribedCondition, Tally, label_of, settings_of
 from realitygap.stats import Estimate, bca_interval, bca_mean, difference_of_means
 
 _SELECTIONS = {"coverage": "objective search", "novelty": "novelty search", "random": "unrelated networks"}
@@ -84,7 +84,7 @@ def _table(name: str, caption: str, columns: Sequence[Column], rows: Sequence[Ro
 def _deception(
     tally: Tally,
     comparisons: Sequence[Comparison],
-    conditions: Sequence[Mapping[str, Any]],
+    conditions: Sequence[DescribedCondition],
     basis: Basis,
     labels: str,
 ) -> dict[str, Any] | None:
@@ -134,7 +134,7 @@ def _deception(
     }
 
 
-def _inputs_differ(conditions: Sequence[Mapping[str, Any]]) -> bool:
+def _inputs_differ(conditions: Sequence[DescribedCondition]) -> bool:
     """Return whether networks have an additional input with novelty, so that two settings change together."""
     return any(
         settings_of(each).get("task", {}).get("bias_input") == "with-novelty"
@@ -145,7 +145,7 @@ def _inputs_differ(conditions: Sequence[Mapping[str, Any]]) -> bool:
 
 
 def _selection_sentences(
-    comparisons: Sequence[Comparison], conditions: Sequence[Mapping[str, Any]]
+    comparisons: Sequence[Comparison], conditions: Sequence[DescribedCondition]
 ) -> list[str]:
     """Return the order and the differences, in sentences, of each group of conditions that differ only in selection."""
     found = []
@@ -163,7 +163,7 @@ def _selection_sentences(
     return found
 
 
-def _is_driven(condition: Mapping[str, Any]) -> bool:
+def _is_driven(condition: DescribedCondition) -> bool:
     return is_physical(settings_of(condition))
 
 
@@ -202,7 +202,7 @@ def _champions(
     comparisons: Sequence[Comparison],
     found: Sequence[Champions],
     fresh: Sequence[Comparison],
-    conditions: Sequence[Mapping[str, Any]],
+    conditions: Sequence[DescribedCondition],
 ) -> dict[str, Any]:
     problems = {each.problem for each in found if each.problem}
     return {
@@ -216,7 +216,7 @@ def _champions(
 
 
 def _champions_table(
-    found: Sequence[Champions], fresh: Sequence[Comparison], conditions: Sequence[Mapping[str, Any]]
+    found: Sequence[Champions], fresh: Sequence[Comparison], conditions: Sequence[DescribedCondition]
 ) -> TableOnPage:
     references = _references("noise", conditions)
     columns = [
@@ -246,7 +246,7 @@ def _champions_table(
 def _noise_sentences(
     recorded: Sequence[Comparison],
     fresh: Sequence[Comparison],
-    conditions: Sequence[Mapping[str, Any]],
+    conditions: Sequence[DescribedCondition],
 ) -> list[str]:
     """Describe the recorded effect of the highest noise against the lowest, and the effect on fresh noise."""
     found = []
@@ -276,7 +276,7 @@ def _trials_a_run(tally: Tally) -> str:
     return f"{counts[0]:,}" if len(counts) == 1 else f"{counts[0]:,} to {counts[-1]:,}"
 
 
-def _references(key: str, conditions: Sequence[Mapping[str, Any]]) -> dict[str, str]:
+def _references(key: str, conditions: Sequence[DescribedCondition]) -> dict[str, str]:
     """Return, for each condition, the first one of those that differ only in `key`; the first itself is left out."""
     return {
         str(each["name"]): str(group[0]["name"])
@@ -337,7 +337,7 @@ def _number(value: float | None, digits: int = 3) -> str:
 # variety
 
 
-def _variety(tally: Tally, conditions: Sequence[Mapping[str, Any]], labels: str) -> TableOnPage | None:
+def _variety(tally: Tally, conditions: Sequence[DescribedCondition], labels: str) -> TableOnPage | None:
     found = [each for each in measure_variety(tally) if each.n]
     if not found:
         return None

@@ -11,7 +11,7 @@ from typing import Any
 import polars as pl
 
 from realitygap.report._declared import Names, declared
-from realitygap.report._tally import Tally, settings_of
+from realitygap.report._tally import DescribedCondition, Tally, settings_of
 
 _MOST_ORDERED = 6
 """Hidden nodes up to which all orders are compared; larger networks are ordered by their links alone."""
@@ -87,7 +87,7 @@ class Structures:
         return self.found[:_MOST_LISTED]
 
 
-def selection_of(condition: Mapping[str, Any]) -> str:
+def selection_of(condition: DescribedCondition) -> str:
     """Return the selection method of a condition, as named in its settings."""
     return str(settings_of(condition).get("selection", "unknown")).encode("utf-8", "replace").decode()
 

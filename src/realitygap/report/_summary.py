@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bisect
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from itertools import accumulate
 from typing import Any
 
@@ -14,6 +14,7 @@ import polars as pl
 from realitygap.records import ResultsFolder
 from realitygap.report._driven import read_driven
 from realitygap.report._tally import (
+    DescribedCondition,
     Measure,
     Results,
     Tally,
@@ -73,7 +74,7 @@ def summarize(folder: Results) -> pl.DataFrame:
     return pl.DataFrame(rows, schema=SUMMARY_SCHEMA)
 
 
-def _bests_by_condition(folder: Results) -> Iterator[tuple[Mapping[str, Any], _Bests]]:
+def _bests_by_condition(folder: Results) -> Iterator[tuple[DescribedCondition, _Bests]]:
     """Yield each condition with the best coverage of its runs."""
     if isinstance(folder, Tally):
         for condition in folder.conditions:

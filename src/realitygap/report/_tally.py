@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, Required, TypedDict
 
 import numpy as np
 import numpy.typing as npt
@@ -31,6 +31,28 @@ _BEST = {
 }
 
 
+class DescribedCondition(TypedDict, total=False):
+    """A condition in the description of a study, as its folder has it.
+
+    Attributes:
+        name: Its name.
+        settings: Settings as resolved, as JSON.
+        hash: Hash of the settings.
+        label: Origin of its numbers: SIM, TWIN, EMULATED, or REAL.
+        baseline: Name of the condition with which it is compared.
+        published: Published values, one for each run.
+        published_source: Source of these values.
+    """
+
+    name: Required[str]
+    settings: Mapping[str, Any]
+    hash: str
+    label: str
+    baseline: str | None
+    published: list[float] | None
+    published_source: str | None
+
+
 @dataclass(frozen=True)
 class Tally:
     """A study's description and the best of each of its generations.
@@ -52,11 +74,11 @@ class Tally:
     _whole_runs: dict[tuple[str, int], pl.DataFrame] = field(default_factory=dict, repr=False, compare=False)
 
     @property
-    def conditions(self) -> list[Mapping[str, Any]]:
+    def conditions(self) -> list[DescribedCondition]:
         """The conditions as the description has them."""
         return list(self.description["conditions"])
 
-    def condition(self, name: str) -> Mapping[str, Any]:
+    def condition(self, name: str) -> DescribedCondition:
         """Return one condition by name.
 
         Raises:
@@ -203,23 +225,24 @@ def _uncounted(best: pl.DataFrame) -> tuple[str, ...]:
     return tuple(counted.filter(~pl.col("line"))["condition"])
 
 
-def labeled_conditions(folder: ResultsFolder) -> list[dict[str, Any]]:
+def labeled_conditions(folder: ResultsFolder) -> list[DescribedCondition]:
     """The conditions of a study, with the label of the robot that drove them, which only the ledger knows."""
     driven = read_driven(folder)
     return [_labeled(each, driven) for each in conditions_of(folder.description)]
 
 
-def _labeled(condition: dict[str, Any], driven: Mapping[str, Driven]) -> dict[str, Any]:
+def _labeled(condition: DescribedCondition, driven: Mapping[str, Driven]) -> DescribedCondition:
     label = driven[condition["name"]].label if condition["name"] in driven else None
-    return condition if label is None else condition | {"label": label}
+    return condition if label is None else {**condition, "label": label}
 
 
-def conditions_of(description: Mapping[str, Any]) -> list[dict[str, Any]]:
+def conditions_of(description: Mapping[str, Any]) -> list[DescribedCondition]:
     """The conditions in a study's description, which may name them alone."""
-    return [each if isinstance(each, dict) else {"name": each} for each in description["conditions"]]
+    described: list[DescribedCondition | str] = description["conditions"]
+    return [{"name": each} if isinstance(each, str) else each for each in described]
 
 
-def settings_of(condition: Mapping[str, Any]) -> Mapping[str, Any]:
+def settings_of(condition: DescribedCondition) -> Mapping[str, Any]:
     """Return the resolved settings of a condition; empty if the description has none."""
     settings = condition.get("settings")
     return settings if isinstance(settings, dict) else {}
@@ -246,7 +269,7 @@ def replicates_of(folder: ResultsFolder, condition: str) -> tuple[int, ...]:
     )
 
 
-def task_of(condition: Mapping[str, Any]) -> str:
+def task_of(condition: DescribedCondition) -> str:
     """The kind of a condition's task."""
     return str(settings_of(condition).get("task", {}).get("kind", "coverage"))
 
@@ -256,6 +279,6 @@ def score_text(score: float | None) -> str:
     return "–" if score is None else significant(score, 4, keep_zeros=True)
 
 
-def label_of(condition: Mapping[str, Any]) -> str:
+def label_of(condition: DescribedCondition) -> str:
     """Return the label for the origin of the numbers, printed on every figure: SIM, TWIN, EMULATED or REAL."""
     return str(condition.get("label") or "unlabeled").encode("utf-8", "replace").decode()

@@ -26,7 +26,7 @@ from realitygap.study import (
     drive_study,
     load_study,
 )
-from realitygap.study._robot import connect_robot
+from realitygap.study._physical import connect_robot
 from realitygap.trials import TrialPlan
 from realitygap.world import Arena, Obstacle, Pose, paper_arena
 from tests.commands import run_command

@@ -27,10 +27,9 @@ from realitygap.report import (
     write_report,
 )
 from realitygap.report._individuals_figure import _moved_apart, draw_better
-from realitygap.report._latex import latex_table
 from realitygap.report._species_figure import count_species
 from realitygap.report._structures import _canonical, count_structures, structures_frame
-from realitygap.report._table import Cell, Column, Part, TableOnPage
+from realitygap.report._table import Cell, Column, Part, TableOnPage, latex_table
 from realitygap.report._tally import read_tally
 from realitygap.report._template import page_environment
 from realitygap.report.charts.house import inline

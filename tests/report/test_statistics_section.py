@@ -51,10 +51,15 @@ def test_every_table_says_sim_and_n(words, paper):
         caption = re.search(rf"Table {number} *\. .{{0,400}}", words)[0]
         assert "SIM" in caption, caption
     content = content_of(paper)
-    assert content["labels"] == "SIM"
-    for part in ("deception", "champions", "spread", "variety", "chance"):
-        assert all(row["n"] in ("3", 3) for row in content[part]["rows"]), part
-        assert len(content[part]["rows"]) == 9
+    assert [table.name for table in content.answers] == [
+        "plateaus",
+        "champions",
+        "spread",
+        "variety",
+        "chance",
+    ]
+    for table in content.answers:
+        assert [row[1] for row in table.rows] == ["3"] * 9, table.name
 
 
 def test_audit_is_for_the_papers_study_alone(words, tiny_study, tiny_html, paper):
@@ -82,12 +87,13 @@ def test_intervals_come_with_enough_runs(out):
     ]
     folder = write_results(out, conditions, {"a": random_runs(12, seed=1), "b": random_runs(12, seed=2)})
     content = content_of(folder)
-    assert "BCa" in content["interval"]
-    row = content["comparisons"]["groups"][0][1][0]
-    assert " to " in row["difference_interval"]
-    assert "–" in row["a12_interval"]
-    assert "*" not in row["a12_interval"]
-    assert content["champions"]["problem"] == "its rows were not drawn with the key of its settings"
+    table = content.comparisons.table
+    assert "BCa" in table.caption
+    row = dict(zip(table.heads, table.rows[0], strict=True))
+    assert " to " in row["difference: interval"]
+    assert "–" in row["A12: interval"]
+    assert "*" not in row["A12: interval"]
+    assert content.champions.problem == "its rows were not drawn with the key of its settings"
 
 
 @pytest.mark.parametrize(
@@ -106,7 +112,7 @@ def test_selection_sentence_gives_equivalence_beside_a_difference_that_is_not_sh
         "coverage": [[[30 / 72, 0.0]] * 2 for _ in cells],
         "novelty": [[[(30 + difference) / 72, 0.0]] * 2 for difference in cells],
     }
-    (sentence,) = content_of(write_results(out, conditions, runs))["deception"]["sentences"]
+    (sentence,) = content_of(write_results(out, conditions, runs)).deception.sentences
     assert sentence.endswith(verdict)
 
 
@@ -117,8 +123,8 @@ def test_studies_of_every_shape_have_the_section(out):
         ("partly", [describe("c"), describe("d", settings=settings(noise=0.5))], {"c": random_runs(2)}),
     ):
         content = content_of(write_results(out / name, conditions, runs))
-        assert content["comparisons"] is None
-        assert content["spread"]["rows"]
+        assert content.comparisons is None
+        assert content.spread.rows
 
 
 def test_the_same_results_give_the_same_numbers(paper):

@@ -11,7 +11,7 @@ import pytest
 
 from realitygap.cli._study import print_result
 from realitygap.report import summarize_tasks
-from realitygap.report._task_summary import TASK_SCHEMA
+from realitygap.report._summary import TASK_SCHEMA
 from realitygap.runs import Condition, replay, run_replicates
 from realitygap.study import load_study, run_study
 from realitygap.tasks import PythonTask

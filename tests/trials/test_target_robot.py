@@ -26,7 +26,7 @@ from realitygap.study import (
     open_target,
     try_on,
 )
-from realitygap.study._robot import connect_robot
+from realitygap.study._physical import connect_robot
 from realitygap.trials import OnLost, Pulse, RobotTarget, TrialPlan, WitnessObserver
 from realitygap.trials._target_robot import PacedRobot
 from realitygap.world import Pose, load_arena, paper_arena

@@ -13,7 +13,7 @@ from realitygap.study import (
     CameraObserver,
     drive_study,
 )
-from realitygap.study._robot import connect_robot
+from realitygap.study._physical import connect_robot
 from realitygap.testing import Film, FilmedCamera, path_through
 from realitygap.trials import Operator, RobotTarget, TrialPlan, WitnessObserver
 from realitygap.vision import LiveTrack, Marks, Track, Tracked

@@ -24,11 +24,10 @@ from realitygap.report._comparisons import Comparison, compare_conditions
 from realitygap.report._distance_audit import DistanceAudit, audit_distance, distance_notes
 from realitygap.report._distance_figure import draw_distance, save_distance
 from realitygap.report._divergence_figure import compare_trials, save_divergence
+from realitygap.report._files import export_frame, export_individual
 from realitygap.report._formats import check_ending, save_drawing
-from realitygap.report._frame_file import export_frame
 from realitygap.report._gap_page import refuse_gap_page, write_gap_report
 from realitygap.report._generations_figure import draw_coverage, draw_scores
-from realitygap.report._individual_file import export_individual
 from realitygap.report._individuals_figure import draw_individuals
 from realitygap.report._lineage_figure import draw_lineage
 from realitygap.report._motion import Each, choose_moving, watch, write_movie
@@ -40,10 +39,9 @@ from realitygap.report._questions import measure_variety
 from realitygap.report._sensor_figure import save_sensor_figure
 from realitygap.report._show import Subject, save_arena, save_robot, save_twin, save_view
 from realitygap.report._species_figure import draw_species
-from realitygap.report._summary import summarize
+from realitygap.report._summary import summarize, summarize_tasks
 from realitygap.report._table import TableOnPage
 from realitygap.report._tally import Tally, read_tally
-from realitygap.report._task_summary import summarize_tasks
 from realitygap.report._trial_figure import choose_trial, draw_trial
 from realitygap.report.charts.house import NARROW, Drawing
 

@@ -15,10 +15,10 @@ from realitygap.errors import RecordError
 from realitygap.records import write_whole
 from realitygap.report._comparisons import comparisons_frame
 from realitygap.report._formats import drawing_bytes
-from realitygap.report._latex import latex_table
 from realitygap.report._placed import figures_in
 from realitygap.report._species_figure import SpeciesCounts
 from realitygap.report._structures import structures_frame
+from realitygap.report._table import latex_table
 from realitygap.report._tally import Tally
 
 _NOTES = "figures.txt"

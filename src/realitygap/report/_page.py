@@ -35,17 +35,16 @@ from realitygap.report._driven import describe_driven
 from realitygap.report._export import export_page
 from realitygap.report._findings import find, leading_conditions
 from realitygap.report._generations_figure import draw_coverage, draw_scores
-from realitygap.report._paper_audit import paper_audit_content
+from realitygap.report._paper_audit import AuditOnPage, paper_audit_content
 from realitygap.report._parameters import neat_parameters, settings_tables
 from realitygap.report._path_figure import draw_paths
 from realitygap.report._placed import FigureOnPage, hover_content, number_figures
 from realitygap.report._replay import content as replay_content
-from realitygap.report._statistics_section import statistics_content
+from realitygap.report._statistics_section import Statistics, statistics_content
 from realitygap.report._structures import selection_of
-from realitygap.report._summary import summarize
+from realitygap.report._summary import summarize, summarize_tasks
 from realitygap.report._table import Cell, Column, Part, Row, TableOnPage, numbered
 from realitygap.report._tally import Tally, label_of, read_tally, score_text, settings_of
-from realitygap.report._task_summary import summarize_tasks
 from realitygap.report._template import render_page
 from realitygap.report.charts.house import house_style
 from realitygap.stats import CONFIDENCE, MEDIAN_SMALLEST_N, interval_ranks
@@ -157,7 +156,7 @@ def _content(tally: Tally) -> dict[str, Any]:
 
 def _statistics(
     tally: Tally,
-) -> tuple[dict[str, Any], list[Comparison], list[Champions], list[Comparison]]:
+) -> tuple[Statistics, list[Comparison], list[Champions], list[Comparison]]:
     comparisons, champions = compare_conditions(tally), retry_champions(tally)
     fresh = compare_champions(tally, champions)
     return statistics_content(tally, comparisons, champions, fresh), comparisons, champions, fresh
@@ -177,29 +176,22 @@ def _sections(content: Mapping[str, Any]) -> list[tuple[str, str, list[Any]]]:
         ("again", "Reproduce and cite", []),
         ("data", "Data", []),
     ]
-    has_comparisons = content["statistics"]["comparisons"] or content["choices"]
+    has_comparisons = content["statistics"].comparisons or content["choices"]
     return [each for each in sections if each[0] != "comparisons" or has_comparisons]
 
 
 def _tables(content: Mapping[str, Any]) -> list[TableOnPage]:
     """Return the tables in the order of the page, with their numbers."""
-    statistics, audit = content["statistics"], content["audit"]
-    compared = [statistics[name].table for name in ("fresh", "comparisons") if statistics[name]]
-    answers = [
-        statistics["deception"] and statistics["deception"]["table"],
-        None if statistics["champions"]["problem"] else statistics["champions"]["table"],
-        statistics["spread"],
-        statistics["variety"],
-        statistics["chance"] and statistics["chance"]["table"],
-        audit and audit["table"],
-        content["parameters"],
-    ]
+    statistics: Statistics = content["statistics"]
+    audit: AuditOnPage | None = content["audit"]
     tables = [
         content["results"],
         content["task_scores"],
-        *compared,
+        *statistics.compared,
         content["gallery"]["structures"],
-        *answers,
+        *statistics.answers,
+        None if audit is None else audit.table,
+        content["parameters"],
     ]
     tables += [*content["settings"], _columns_table()]
     return numbered([table for table in tables if table])

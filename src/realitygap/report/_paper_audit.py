@@ -231,14 +231,27 @@ def _words() -> list[Finding]:
 # on the page
 
 
-def paper_audit_content(tally: Tally) -> dict[str, Any] | None:
+@dataclass(frozen=True)
+class AuditOnPage:
+    """The inconsistencies of the paper, and whether its robot is less stable.
+
+    Attributes:
+        table: The findings.
+        spread: Sentences on the spread of the robot's runs; empty without runs to compare.
+    """
+
+    table: TableOnPage
+    spread: list[str]
+
+
+def paper_audit_content(tally: Tally) -> AuditOnPage | None:
     """Return the content of the page; None unless the study is the paper's."""
     if tally.description.get("name") != "paper":
         return None
     rows = [(each.section, each.printed, each.found, each.bearing) for each in audit_paper()]
     columns = tuple(map(Column, ("Section", "Printed", "Found", "Bearing")))
     table = TableOnPage("audit", "What does not add up in the paper.", columns, (Part(rows),), kind="audit")
-    return {"table": table, "spread": _spread_sentences(tally)}
+    return AuditOnPage(table, _spread_sentences(tally))
 
 
 def _spread_sentences(tally: Tally) -> list[str]:

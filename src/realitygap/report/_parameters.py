@@ -6,9 +6,8 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from realitygap.report._declared import declared
 from realitygap.report._table import Cell, Column, Part, Row, TableOnPage
-from realitygap.report._tally import DescribedCondition, settings_of
+from realitygap.report._tally import DescribedCondition, declared, settings_of
 
 _N_OUTPUTS = 2
 """Move and turn."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -18,6 +18,7 @@ from realitygap.report._comparisons import (
     INTERVAL_NAME,
     MARGIN,
     Comparison,
+    ComparisonsOnPage,
     comparisons_content,
     same_but_for,
 )
@@ -38,12 +39,106 @@ from realitygap.stats import Estimate, bca_interval, bca_mean, difference_of_mea
 _SELECTIONS = {"coverage": "objective search", "novelty": "novelty search", "random": "unrelated networks"}
 
 
+@dataclass(frozen=True)
+class Deception:
+    """Whether coverage under noise is a deceptive task.
+
+    Attributes:
+        table: Mean best coverage of a run, and runs that end on a plateau.
+        k: Generations of a plateau.
+        generations: Generations of a run.
+        without_learning: Share of runs without learning that end on a plateau; None without such a condition.
+        sentences: Results of the comparisons of selections.
+        inputs_differ: True if networks have an additional input with novelty.
+    """
+
+    table: TableOnPage
+    k: int
+    generations: int
+    without_learning: str | None
+    sentences: list[str]
+    inputs_differ: bool
+
+
+@dataclass(frozen=True)
+class Luck:
+    """The part of the best coverage that is luck.
+
+    Attributes:
+        table: Best networks as reported and on fresh noise.
+        sentences: The effect of noise as recorded and on fresh noise.
+        problem: Why no network could be tried again; None if one could.
+        missing: Conditions whose networks could not be tried again.
+        fresh_trials: Number of trials of each network on fresh noise.
+        trials_a_run: Number of trials of a run.
+    """
+
+    table: TableOnPage
+    sentences: list[str]
+    problem: str | None
+    missing: list[str]
+    fresh_trials: int
+    trials_a_run: str
+
+
+@dataclass(frozen=True)
+class Chance:
+    """Which noise level comes out best by chance.
+
+    Attributes:
+        table: How often each level has the highest mean.
+        sentence: How often it is that with 50 %; None without this level.
+    """
+
+    table: TableOnPage
+    sentence: str | None
+
+
+@dataclass(frozen=True)
+class Statistics:
+    """Answers to the paper’s questions, for the page.
+
+    Attributes:
+        comparisons: Comparisons of recorded scores; None without any.
+        fresh: Comparisons on fresh noise; None without any.
+        deception: Whether the task is deceptive; None without runs that end on a plateau or not.
+        champions: How much of the best coverage is luck.
+        spread: Spread between runs.
+        variety: Variety of behaviors within a run; None if it cannot be measured.
+        chance: Which noise level comes out best; None without several levels.
+    """
+
+    comparisons: ComparisonsOnPage | None
+    fresh: ComparisonsOnPage | None
+    deception: Deception | None
+    champions: Luck
+    spread: TableOnPage
+    variety: TableOnPage | None
+    chance: Chance | None
+
+    @property
+    def compared(self) -> list[TableOnPage]:
+        """Tables of comparisons in the order of the page."""
+        return [each.table for each in (self.fresh, self.comparisons) if each is not None]
+
+    @property
+    def answers(self) -> list[TableOnPage | None]:
+        """Tables of the paper's questions in the order of the page; None for one that is missing."""
+        return [
+            None if self.deception is None else self.deception.table,
+            None if self.champions.problem else self.champions.table,
+            self.spread,
+            self.variety,
+            None if self.chance is None else self.chance.table,
+        ]
+
+
 def statistics_content(
     tally: Tally,
     comparisons: Sequence[Comparison],
     champions: Sequence[Champions],
     fresh: Sequence[Comparison],
-) -> dict[str, Any]:
+) -> Statistics:
     """Return the content of the section's template.
 
     Args:
@@ -55,22 +150,22 @@ def statistics_content(
     basis = basis_of(champions)
     with_runs = [each for each in tally.conditions if len(tally.replicates(each["name"]))]
     labels = ", ".join(sorted({label_of(each) for each in with_runs}))
-    return {
-        "comparisons": comparisons_content(
+    return Statistics(
+        comparisons=comparisons_content(
             comparisons,
             "comparisons",
             "Differences between conditions, best coverage of a run as recorded",
             "As recorded",
         ),
-        "fresh": comparisons_content(
+        fresh=comparisons_content(
             fresh, "fresh", "Differences between conditions, best networks on fresh noise", "Conclusion"
         ),
-        "deception": _deception(tally, fresh if basis.is_fresh else comparisons, with_runs, basis, labels),
-        "champions": _champions(tally, comparisons, champions, fresh, with_runs),
-        "spread": _spread(tally, labels),
-        "variety": _variety(tally, with_runs, labels),
-        "chance": _chance(tally, labels),
-    }
+        deception=_deception(tally, fresh if basis.is_fresh else comparisons, with_runs, basis, labels),
+        champions=_champions(tally, comparisons, champions, fresh, with_runs),
+        spread=_spread(tally, labels),
+        variety=_variety(tally, with_runs, labels),
+        chance=_chance(tally, labels),
+    )
 
 
 def _table(name: str, caption: str, columns: Sequence[Column], rows: Sequence[Row]) -> TableOnPage:
@@ -87,7 +182,7 @@ def _deception(
     conditions: Sequence[DescribedCondition],
     basis: Basis,
     labels: str,
-) -> dict[str, Any] | None:
+) -> Deception | None:
     rows: list[Row] = []
     generations = 0
     for condition in conditions:
@@ -124,14 +219,14 @@ def _deception(
     )
     k = plateau_length(generations)
     has_random = any(settings_of(each).get("selection") == "random" for each in conditions)
-    return {
-        "table": table,
-        "k": k,
-        "generations": generations,
-        "without_learning": f"{100 * (generations - k) / generations:.0f} %" if has_random else None,
-        "sentences": [basis.claim(each) for each in _selection_sentences(comparisons, conditions)],
-        "inputs_differ": _inputs_differ(conditions),
-    }
+    return Deception(
+        table=table,
+        k=k,
+        generations=generations,
+        without_learning=f"{100 * (generations - k) / generations:.0f} %" if has_random else None,
+        sentences=[basis.claim(each) for each in _selection_sentences(comparisons, conditions)],
+        inputs_differ=_inputs_differ(conditions),
+    )
 
 
 def _inputs_differ(conditions: Sequence[DescribedCondition]) -> bool:
@@ -203,16 +298,16 @@ def _champions(
     found: Sequence[Champions],
     fresh: Sequence[Comparison],
     conditions: Sequence[DescribedCondition],
-) -> dict[str, Any]:
+) -> Luck:
     problems = {each.problem for each in found if each.problem}
-    return {
-        "table": _champions_table(found, fresh, conditions),
-        "sentences": _noise_sentences(comparisons, fresh, conditions),
-        "problem": None if any(not each.problem for each in found) else "; ".join(sorted(problems)),
-        "missing": [each.condition for each in found if each.problem],
-        "fresh_trials": FRESH_TRIALS,
-        "trials_a_run": _trials_a_run(tally),
-    }
+    return Luck(
+        table=_champions_table(found, fresh, conditions),
+        sentences=_noise_sentences(comparisons, fresh, conditions),
+        problem=None if any(not each.problem for each in found) else "; ".join(sorted(problems)),
+        missing=[each.condition for each in found if each.problem],
+        fresh_trials=FRESH_TRIALS,
+        trials_a_run=_trials_a_run(tally),
+    )
 
 
 def _champions_table(
@@ -386,7 +481,7 @@ def _difference(one: npt.NDArray[np.float64], other: npt.NDArray[np.float64], di
 # chance
 
 
-def _chance(tally: Tally, labels: str) -> dict[str, Any] | None:
+def _chance(tally: Tally, labels: str) -> Chance | None:
     few, more = chances(tally, 3), chances(tally, 100)
     if not few:
         return None
@@ -417,7 +512,7 @@ def _chance(tally: Tally, labels: str) -> dict[str, Any] | None:
         ),
         rows,
     )
-    return {"table": table, "sentence": _chance_sentence(tally)}
+    return Chance(table, _chance_sentence(tally))
 
 
 def _chance_sentence(tally: Tally) -> str | None:

@@ -10,8 +10,7 @@ from typing import Any
 
 import polars as pl
 
-from realitygap.report._declared import Names, declared
-from realitygap.report._tally import DescribedCondition, Tally, settings_of
+from realitygap.report._tally import DescribedCondition, Names, Tally, declared, settings_of
 
 _MOST_ORDERED = 6
 """Hidden nodes up to which all orders are compared; larger networks are ordered by their links alone."""

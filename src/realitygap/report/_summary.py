@@ -1,4 +1,4 @@
-"""The best coverage of each run, condition by condition: the paper's Table 2 with more runs."""
+"""The best of each run, condition by condition: coverage, as the paper's Table 2, and scores of other tasks."""
 
 from __future__ import annotations
 
@@ -6,9 +6,11 @@ import bisect
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from itertools import accumulate
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import polars as pl
 
 from realitygap.records import ResultsFolder
@@ -18,11 +20,13 @@ from realitygap.report._tally import (
     Measure,
     Results,
     Tally,
+    bests_of,
     label_of,
     labeled_conditions,
     no_trials,
+    task_of,
 )
-from realitygap.stats import IntervalRanks, interval_ranks
+from realitygap.stats import IntervalRanks, interval_ranks, median_interval, quartiles
 
 _STATISTICS = ("median", "q25", "q75", "low", "high")
 _MEASURES: tuple[Measure, ...] = ("line", "ends")
@@ -127,4 +131,56 @@ def _describe(counts: Counter[float | None], ranks: IntervalRanks | None) -> dic
         "q75": quantile(0.75),
         "low": None if ranks is None else at(ranks.lower),
         "high": None if ranks is None else at(ranks.upper),
+    }
+
+
+TASK_SCHEMA = pl.Schema(
+    {
+        "condition": pl.String(),
+        "label": pl.String(),
+        "task": pl.String(),
+        "n": pl.UInt32(),
+        **{name: pl.Float64() for name in ("first", "last", "median", "q25", "q75", "low", "high")},
+    }
+)
+
+
+def summarize_tasks(folder: ResultsFolder | str | Path) -> pl.DataFrame:
+    """Return one row per condition of another task than coverage, on the best fitness of each run.
+
+    Args:
+        folder: Results of a study, or the path to them. They are read chunk by chunk.
+
+    Returns:
+        Columns `condition`; `label`, such as SIM; `task`, its kind; `n`, the number of runs; `first` and `last`, the
+        median of the best in the first and in the last generation. Then for the best of the whole run: `median`, the
+        quartiles `q25` and `q75`, and the bounds `low` and `high` of the median's 95 % interval. Null if there are no
+        runs, or too few for an interval (below 6). No rows if all conditions are of coverage.
+
+    Raises:
+        RecordError: there is no such folder, or a file in it is damaged.
+    """
+    folder = folder if isinstance(folder, ResultsFolder) else ResultsFolder.open(folder)
+    rows: list[dict[str, Any]] = []
+    for condition in labeled_conditions(folder):
+        task = task_of(condition)
+        if task == "coverage":
+            continue
+        best = bests_of(folder, condition["name"])
+        row = {"condition": condition["name"], "label": label_of(condition), "task": task, "n": len(best)}
+        rows.append(row | _described(best) if len(best) else row)
+    return pl.DataFrame(rows, schema=TASK_SCHEMA)
+
+
+def _described(best: npt.NDArray[np.float64]) -> dict[str, float | None]:
+    of_runs = best.max(axis=1)
+    middle, median = quartiles(of_runs), median_interval(of_runs)
+    return {
+        "first": float(np.median(best[:, 0])),
+        "last": float(np.median(best[:, -1])),
+        "median": middle.median,
+        "q25": middle.q25,
+        "q75": middle.q75,
+        "low": median.low,
+        "high": median.high,
     }

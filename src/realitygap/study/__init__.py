@@ -10,8 +10,7 @@ from ._calibrate.from_table import calibrate_from_table
 from ._calibrate.one import calibrate, save_calibration
 from ._calibrate.ordered import make_calibration
 from ._calibrate.whole import calibrate_all
-from ._camera_observer import CameraObserver
-from ._camera_spec import marks_of, read_camera, tag_of
+from ._camera import CameraObserver, marks_of, read_camera, tag_of
 from ._closing.plan import PLANS, ClosingPlan
 from ._closing.study import ClosingProgress, closing_the_gap
 from ._closing.summary import summarize_closing

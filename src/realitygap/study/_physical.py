@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from realitygap.errors import LedgerError, RobotError, StudyError, TaskError
-from realitygap.platforms import Platform
+from realitygap.platforms import Platform, names_a_port, split_spec
 from realitygap.records import (
     ROBOT,
     EndReason,
@@ -19,10 +19,19 @@ from realitygap.records import (
     complete_runs,
     sees,
 )
-from realitygap.robots import Robot
+from realitygap.robots import Robot, is_in_this_program
 from realitygap.runs import Condition, Evolution
 from realitygap.tasks import score_observed
-from realitygap.trials import Card, Operator, TrialInterrupted, Verdict, drive_trial, preflight
+from realitygap.trials import (
+    Card,
+    Operator,
+    TrialInterrupted,
+    Verdict,
+    WitnessObserver,
+    drive_trial,
+    preflight,
+)
+from realitygap.world import Arena
 
 from ._blocks import Block, blocks_of, turns_of
 from ._study import Study
@@ -413,3 +422,35 @@ def _bred_otherwise(ledger: Ledger, condition: Condition, replicate: int, genera
 def n_complete(ledger: Ledger, conditions: Sequence[Condition], replicates: int) -> int:
     """Return the number of complete runs of these conditions, of those that the study requests."""
     return sum(run < replicates for each in conditions for run in complete_runs(ledger, each.name))
+
+
+def connect_robot(port: str, arena: Arena | None = None) -> OpenRobot:
+    """Return what opens the robot at a port, with the settings of a condition's platform.
+
+    Args:
+        port: Name of the port, with or without the platform's name before it.
+        arena: Start of a robot that is emulated in this program, unless its port gives the start.
+    """
+
+    def open_robot(platform: Platform) -> Robot:
+        name, rest = split_spec(port)
+        if names_a_port(port) and name != platform.name:
+            raise StudyError(f"{port} is a port of platform {name!r}, expected one of {platform.name!r}.")
+        robot = platform.at_port(rest if names_a_port(port) else port)
+        return (robot if arena is None else robot.in_arena(arena)).connect()
+
+    return open_robot
+
+
+def default_operator(port: str) -> Operator:
+    """Return the witness of an emulator in this program.
+
+    Raises:
+        StudyError: Another port, whose robot needs a person who places it and scores its trials.
+    """
+    if is_in_this_program(port):
+        return Operator(WitnessObserver())
+    raise StudyError(
+        f"No operator places the robot at {port} and reports its cells. Run `realitygap drive` to be the "
+        "operator; realitygap.trials.Operator(WitnessObserver(witness)) serves an emulator elsewhere."
+    )

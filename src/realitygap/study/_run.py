@@ -21,8 +21,15 @@ from realitygap.trials import Operator, usable_processors
 from ._code import AllowCode, with_code_allowed
 from ._executors import ChunkTask, Executor, Threads
 from ._file import load_study
-from ._physical import OpenRobot, PhysicalResult, PhysicalStudy, n_complete, physical_conditions
-from ._robot import connect_robot, default_operator
+from ._physical import (
+    OpenRobot,
+    PhysicalResult,
+    PhysicalStudy,
+    connect_robot,
+    default_operator,
+    n_complete,
+    physical_conditions,
+)
 from ._study import Study, same_file
 
 # A chunk is as many runs as take about this many robot-steps: some tenths of a second of one core.

@@ -19,8 +19,8 @@ from .._calibrate.one import refuse_other_sensors
 from .._calibrate.whole import calibrate_all
 from .attempt import Attempt, allow_trials
 from .noise import needs_sim
-from .selected import best_on_target
 from .simulated import Champion
+from .uncalibrated import best_on_target
 
 SELECTING = 2
 """One trial in so many is kept for choosing among champions where calibrating is on the budget: a fit that is a little

@@ -8,8 +8,8 @@ from realitygap.runs import Condition
 from realitygap.world import Distribution
 
 from .attempt import Attempt
-from .selected import best_on_target
 from .simulated import Champion
+from .uncalibrated import best_on_target
 
 LEVELS = (0.1, 0.5, 0.8)
 """The paper's levels of noise (section 2.3)."""

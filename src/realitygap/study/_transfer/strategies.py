@@ -36,12 +36,11 @@ from .._study import Study
 from .._targets import check_task, refuse_more_than_is_seen, refuse_too_little
 from .attempt import Attempt, Simulation, allow_trials, plans_of
 from .calibrated import Calibrating, calibrated, posterior, recommended
-from .direct import direct
 from .noise import needs_sim, noise, randomized
 from .result import Transferred, TransferResult, summarize_transfer
-from .selected import halving, plain, select
 from .simulated import Champion, refuse_unevolved
 from .transferability import transferability
+from .uncalibrated import direct, halving, plain, select
 
 STRATEGIES: Mapping[str, Callable[[Attempt], Champion]] = {
     "plain": plain,

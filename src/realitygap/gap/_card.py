@@ -21,11 +21,11 @@ def gap_card(result: GapResult, pictures: Sequence[Picture] = ()) -> Card:
     """
     rows: list[list[str | Bar]] = []
     for kind in (("rms", "level"), ("srcc", "noise_ceiling")):  # each pair on one axis
-        found = [(each.title, getattr(result, each.name)) for each in SHOWN if each.name in kind]
-        axis = _axis([one for _, one in found])
+        estimates = [(each.title, getattr(result, each.name)) for each in SHOWN if each.name in kind]
+        axis = _axis([one for _, one in estimates])
         rows += [
             [title, str(one), Bar(one.value, one.low, one.high, *axis)]
-            for title, one in found
+            for title, one in estimates
             if one.value is not None
         ]
     every = [

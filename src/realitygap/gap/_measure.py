@@ -241,8 +241,8 @@ class _Work:
         with np.errstate(divide="ignore", invalid="ignore"):
             ratios = drawn["srcc"] / np.sqrt(drawn["source"] * drawn["target"])
         value = float(_srcc(*self.pair)[0] / np.sqrt(np.prod(self.reliabilities)))
-        found = self._estimate(_within_one(value), ratios, lambda end: np.clip(end, -1.0, 1.0))
-        return replace(found, more={"unclipped": value})
+        ratio = self._estimate(_within_one(value), ratios, lambda end: np.clip(end, -1.0, 1.0))
+        return replace(ratio, more={"unclipped": value})
 
     def _unreliable(self) -> Estimate | None:
         for side, found in zip((self.source, self.target), self.reliabilities, strict=True):
@@ -275,7 +275,7 @@ class _Work:
                 self.n, "An energy distance needs 2 trials of each controller on both sides."
             )
         distances = energy_distances(one, other)
-        found = self._estimate(
+        estimate = self._estimate(
             float(distances.mean()), resampled_means(distances, self.n_resamples, self.rng)
         )
         smallest = smallest_energy_p(self.n, self.source.trials, self.target.trials)
@@ -286,7 +286,7 @@ class _Work:
             if p is not None
             else f"The number of trials allows no p below {smallest:.2f}; twice as many do. "
         )
-        return replace(found, refused=(why + found.refused).strip(), more=more)
+        return replace(estimate, refused=(why + estimate.refused).strip(), more=more)
 
     # equivalence
 
@@ -297,17 +297,21 @@ class _Work:
                 "With one controller, the spread of differences is unknown. At least 5 are needed.",
                 margin=margin,
             )
-        found = prove_equivalence(self.target.means - self.source.means, margin, self.source.score_range)
-        more: dict[str, float | None] = {"margin": margin, "equivalent": found.equivalent}
+        equivalence = prove_equivalence(
+            self.target.means - self.source.means, margin, self.source.score_range
+        )
+        more: dict[str, float | None] = {"margin": margin, "equivalent": equivalence.equivalent}
         why = ""
         if margin is None:
             why = "No margin was given (--margin), so equivalence is not tested."
         else:
-            more["p"] = found.p
-            if not found.equivalent and (found.power or 0.0) < POWER:
+            more["p"] = equivalence.p
+            if not equivalence.equivalent and (equivalence.power or 0.0) < POWER:
                 more["equivalent"] = None
-                why = _too_few(self.n, margin, found.power or 0.0, found.needed)
-        return replace(found.difference, refused=why, more=more, needed=found.needed if why else None)
+                why = _too_few(self.n, margin, equivalence.power or 0.0, equivalence.needed)
+        return replace(
+            equivalence.difference, refused=why, more=more, needed=equivalence.needed if why else None
+        )
 
 
 def _too_few(n: int, margin: float, power: float, needed: int | None) -> str:

@@ -141,5 +141,5 @@ def rank_violation_floor(target: Values, rng: Rng, splits: int = SPLITS) -> Valu
         rng: Draws the halves.
         splits: Number of random splits, of which the mean is taken.
     """
-    found = [mean_maximum_rank_violation(*halves(target, rng)) for _ in range(splits)]
-    return np.asarray(np.mean(found, axis=0))
+    violations = [mean_maximum_rank_violation(*halves(target, rng)) for _ in range(splits)]
+    return np.asarray(np.mean(violations, axis=0))

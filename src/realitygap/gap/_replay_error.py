@@ -46,9 +46,9 @@ class ReplayError:
         values: dict[str, Any] = {"trials": self.n, "n": len(np.unique(self.controllers))}
         for name in ("distance", "heading", "noise_distance", "noise_heading"):
             most = np.pi if "heading" in name else np.inf
-            found = [self._mean(step, most) for step in getattr(self, name).T]
+            estimates = [self._mean(step, most) for step in getattr(self, name).T]
             values[name] = {
-                name: [getattr(step, end) for step in found]
+                name: [getattr(step, end) for step in estimates]
                 for name, end in (("estimate", "value"), ("low", "low"), ("high", "high"))
             }
         return values

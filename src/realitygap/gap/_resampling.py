@@ -87,8 +87,8 @@ def _map_between(seen: Values, wanted: Values) -> Values:
 def _power(matrix: Values, exponent: float) -> Values:
     """Return a power of the part of a symmetric matrix above 0."""
     values, vectors = np.linalg.eigh((matrix + matrix.T) / 2)
-    there = values > 1e-12 * max(float(values.max()), 1e-300)
-    powers = np.where(there, np.where(there, values, 1.0) ** exponent, 0.0)
+    is_positive = values > 1e-12 * max(float(values.max()), 1e-300)
+    powers = np.where(is_positive, np.where(is_positive, values, 1.0) ** exponent, 0.0)
     return np.asarray((vectors * powers) @ vectors.T)
 
 

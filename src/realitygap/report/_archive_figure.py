@@ -90,11 +90,11 @@ def draw_archive(folder: Results, condition: str | None = None, replicate: int |
 
 def _chosen(tally: Tally, condition: str | None) -> str:
     """A condition that selects by novelty and has runs."""
-    there = set(tally.runs["condition"])
+    with_runs = set(tally.runs["condition"])
     novel = [
         str(each["name"])
         for each in tally.conditions
-        if selection_of(each) == "novelty" and each["name"] in there
+        if selection_of(each) == "novelty" and each["name"] in with_runs
     ]
     if condition is None and novel:
         return novel[0]

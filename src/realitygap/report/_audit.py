@@ -360,18 +360,18 @@ def _read(path: Path) -> list[_Row]:
 
 
 def _places(path: Path, header: Sequence[str]) -> list[int]:
-    found = [name.strip().lower() for name in header]
-    missing = [name for name in COLUMNS if name not in found]
+    columns = [name.strip().lower() for name in header]
+    missing = [name for name in COLUMNS if name not in columns]
     if missing:
         listed = reprlib.repr([name.strip() for name in header])[1:-1]
         raise TableError(
             f"{path}: has no column {' and no column '.join(missing)}. Expected {', '.join(COLUMNS)} in the first "
             f"line, which has {listed}."
         )
-    twice = [name for name in COLUMNS if found.count(name) > 1]
+    twice = [name for name in COLUMNS if columns.count(name) > 1]
     if twice:
         raise TableError(f"{path}: has two columns {twice[0]!r}. Keep one of them.")
-    return [found.index(name) for name in COLUMNS]
+    return [columns.index(name) for name in COLUMNS]
 
 
 def _problem(row: _Row) -> str:

@@ -70,12 +70,12 @@ def draw_closing(summary: Summary) -> dict[str, Drawing]:
         "strategies": draw_strategies,
         "order": draw_order,
     }
-    found = {}
+    drawings = {}
     for key, draw in drawers.items():
         drawing = draw(summary)
         if drawing is not None:
-            found[key] = drawing
-    return found
+            drawings[key] = drawing
+    return drawings
 
 
 def draw_budget(summary: Summary) -> Drawing | None:
@@ -134,7 +134,7 @@ def _marks_of_budgets(summary: Summary, family: str) -> Iterator[Series]:
 
 def _budgets_of_twins(summary: Summary, family: str, observe: str) -> dict[str, list[tuple[int, float]]]:
     """Return budget and RMS gap of each twin of a family, in order."""
-    found = {}
+    series = {}
     for twin in _of(summary, family):
         points = [(0, twin["rms"]["estimate"])]
         points += [
@@ -142,8 +142,8 @@ def _budgets_of_twins(summary: Summary, family: str, observe: str) -> dict[str, 
             for each in twin["calibrated"]
             if each["observe"] == observe
         ]
-        found[str(twin["twin"])] = sorted((x, y) for x, y in points if y is not None)
-    return found
+        series[str(twin["twin"])] = sorted((x, y) for x, y in points if y is not None)
+    return series
 
 
 def _budget_medians(summary: Summary, family: str, observe: str) -> list[tuple[int, float]]:
@@ -295,9 +295,9 @@ def draw_order(summary: Summary) -> Drawing | None:
     words, budget = words_of(summary), summary["budget"]
     groups = {"as it is": ("none", [(str(twin["twin"]), twin["gap"]) for twin in summary["twins"]])}
     for observe in summary["plan"]["observations"]:
-        found = [(str(twin["twin"]), each["gap"]) for twin, each in _after(summary, observe, budget)]
-        if found:
-            groups[f"calibrated, {observe}"] = (observe, found)
+        gaps = [(str(twin["twin"]), each["gap"]) for twin, each in _after(summary, observe, budget)]
+        if gaps:
+            groups[f"calibrated, {observe}"] = (observe, gaps)
     caption = (
         "Left: Spearman’s correlation over the held-out controllers of coverage in simulation (SIM) and on the "
         f"{words.robot} ({words.label}), disattenuated. Right: mean maximum rank violation over its floor, that of one "
@@ -309,8 +309,8 @@ def draw_order(summary: Summary) -> Drawing | None:
     titles = {"srcc_disattenuated": "Disattenuated SRCC", "mmrv_ratio": "MMRV over its floor"}
     by_measure = {
         measure: {
-            label: (kind, [(twin, each[measure]) for twin, each in found if each[measure] is not None])
-            for label, (kind, found) in groups.items()
+            label: (kind, [(twin, each[measure]) for twin, each in gaps if each[measure] is not None])
+            for label, (kind, gaps) in groups.items()
         }
         for measure in goals
     }
@@ -318,7 +318,7 @@ def draw_order(summary: Summary) -> Drawing | None:
     ends = {
         measure: (min([0.0, *values]), 1.05 * max([goals[measure], *values]))
         for measure, known in by_measure.items()
-        for values in [[value for _, found in known.values() for _, value in found]]
+        for values in [[value for _, gaps in known.values() for _, value in gaps]]
     }
 
     def draw(width: float) -> Sheet:
@@ -329,10 +329,10 @@ def draw_order(summary: Summary) -> Drawing | None:
             is_named = axes is panels[0] or not sheet.is_wide
             name_rows(axes, list(groups) if is_named else [""] * len(groups), grid=False)
             draw_line(axes, [goal, goal], [-0.5, len(groups)], color=Ink.PUBLISHED, linewidth=1.0)
-            for place, (kind, found) in enumerate(by_measure[measure].values()):
-                if found:
+            for place, (kind, gaps) in enumerate(by_measure[measure].values()):
+                if gaps:
                     color = COLORS.get(kind, Ink.PEN3)
-                    values = np.array([value for _, value in found])
+                    values = np.array([value for _, value in gaps])
                     row = Row(None, None, values, stacked(values, ends[measure][1]), color, color)
                     draw_row(axes, place, row)
                     middle = float(np.median(values))

@@ -287,8 +287,8 @@ def paired_values(tally: Tally, one: str, other: str) -> Samples:
 
 def _paired_champions(tally: Tally, one: Champions, other: Champions) -> Samples:
     """Return the means on fresh noise of two conditions, in pairs as `paired_values`."""
-    found = _in_pairs(tally, *((each.condition, each.replicates, each.expected) for each in (one, other)))
-    return replace(found, trials=FRESH_TRIALS)
+    samples = _in_pairs(tally, *((each.condition, each.replicates, each.expected) for each in (one, other)))
+    return replace(samples, trials=FRESH_TRIALS)
 
 
 _Runs = tuple[str, npt.NDArray[np.uint32], npt.NDArray[np.float64]]
@@ -330,7 +330,7 @@ def same_but_for(key: str, conditions: Sequence[DescribedCondition]) -> list[lis
 
 
 def _pairs(tally: Tally) -> Iterator[tuple[DescribedCondition, DescribedCondition, Reason]]:
-    """Return the pairs of conditions to compare, each pair once."""
+    """Yield the pairs of conditions to compare, each pair once."""
     seen: set[frozenset[str]] = set()
     for one, other, reason in _all_pairs(tally.conditions):
         both = frozenset((one["name"], other["name"]))

@@ -68,8 +68,8 @@ class Confound:
     @property
     def shared(self) -> float:
         """Share of the variance of the ranks of distances that is explained by the lengths [0..1]."""
-        found = self.correlation.value
-        return math.nan if found is None else found**2
+        value = self.correlation.value
+        return math.nan if value is None else value**2
 
 
 @dataclass(frozen=True)
@@ -112,15 +112,15 @@ class DistanceAudit:
 
     def to_dict(self) -> dict[str, Any]:
         """Return all results but the single pairs as plain values."""
-        found = asdict(self)
+        fields = asdict(self)
         for name in ("leverage", "leverage_low", "leverage_high"):
-            found[name] = getattr(self, name).tolist()
-        found["most_steps"] = MOST_STEPS
-        found["weight_bias"] = weight_bias(self)
-        for plain, confound in zip(found["confounds"], self.confounds, strict=True):
+            fields[name] = getattr(self, name).tolist()
+        fields["most_steps"] = MOST_STEPS
+        fields["weight_bias"] = weight_bias(self)
+        for plain, confound in zip(fields["confounds"], self.confounds, strict=True):
             del plain["length_difference"], plain["distance"]
             plain["shared"] = confound.shared
-        plain_values: dict[str, Any] = _without_nan(found)
+        plain_values: dict[str, Any] = _without_nan(fields)
         return plain_values
 
 
@@ -256,12 +256,12 @@ def _leverages(
     distance: BehaviorDistance, walks: Sequence[list[int]], columns: int, rows: int, sort: CellOrder
 ) -> Values:
     """Return the distance from each walk to itself with each cell changed, (w, c)."""
-    found = np.empty((len(walks), columns * rows))
+    counts = np.empty((len(walks), columns * rows))
     for k, walk in enumerate(walks):
         variants = [changed_walk(walk, cell, columns) for cell in range(columns * rows)]
         behaviors = [_as_behavior(distance, each, columns) for each in (walk, *variants)]
-        found[k] = distance.distances(behaviors[:1], behaviors[1:], columns=columns, rows=rows, sort=sort)
-    return found
+        counts[k] = distance.distances(behaviors[:1], behaviors[1:], columns=columns, rows=rows, sort=sort)
+    return counts
 
 
 def _order(columns: int, rows: int, sort: CellOrder) -> npt.NDArray[np.int64]:
@@ -347,21 +347,21 @@ def _confounds_of(
     folder: ResultsFolder, distance: BehaviorDistance, rng: np.random.Generator, n_pairs: int, sort: CellOrder
 ) -> list[Confound]:
     """Return the confounds for the trials of each condition of a study."""
-    found = []
+    sentences = []
     for condition in folder.description["conditions"]:
         rows = folder.read(condition["name"], columns=["replicate", "cells"])
         behaviors = _pairs_of_runs(rows, rng, n_pairs)
         if len(behaviors) >= 2 * _LEAST_PAIRS:
             columns, lines = grid_of(condition)
-            found.append(
+            sentences.append(
                 _confound(condition["name"], label_of(condition), distance, behaviors, columns, lines, sort)
             )
-    if not found:
+    if not sentences:
         raise RecordError(
             f"{folder.path} holds no condition with {2 * _LEAST_PAIRS} trials of two runs or more, so there is nothing "
             "to compare. Run the study first."
         )
-    return found
+    return sentences
 
 
 def _pairs_of_runs(rows: pl.DataFrame, rng: np.random.Generator, n_pairs: int) -> list[list[int]]:
@@ -418,12 +418,12 @@ def weight_bias(audit: DistanceAudit) -> int:
 
 
 def _length_note(confound: Confound) -> str:
-    found = confound.correlation
+    correlation = confound.correlation
     where = f"{confound.label}, {confound.of}" if confound.label else confound.of
-    if found.value is None:
+    if correlation.value is None:
         return f"Length, {where}: no correlation, all pairs being alike in one of the two."
     return (
-        f"Length, {where}: Spearman's correlation of distance with the difference in cells is {in_words(found)}, "
+        f"Length, {where}: Spearman's correlation of distance with the difference in cells is {in_words(correlation)}, "
         f"{100 * confound.shared:.0f} % of the variance of ranks. Of the cells of the shorter behavior, the longer "
         f"visited {100 * confound.contained:.0f} %."
     )

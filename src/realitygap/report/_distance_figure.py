@@ -130,8 +130,8 @@ def _draw_pairs(axes: Axes, confound: Confound, audit: DistanceAudit, *, wide: b
     axes.set_xlabel("difference in visited cells", labelpad=2)
     unit = {"cells": "distance [cells]", "m": "distance [m]", "1": "distance"}[audit.distance.unit]
     axes.set_ylabel(unit, labelpad=3)
-    found = confound.correlation
-    text = "no correlation" if found.value is None else f"Spearman {in_words(found)}"
+    correlation = confound.correlation
+    text = "no correlation" if correlation.value is None else f"Spearman {in_words(correlation)}"
     note = f"{confound.n_pairs:,} pairs of {'random ' if wide else ''}walks: {text}"
     head(axes, "Distance and length", note, stacked=True)
 
@@ -151,11 +151,15 @@ def _draw_correlations(axes: Axes, confounds: list[Confound], *, wide: bool) -> 
     axes.grid(axis="x", color=Ink.RULE, linewidth=0.5)
     draw_line(axes, [0, 0], [-0.5, len(confounds)], color=Ink.MUTED, linewidth=0.8)
     for place, confound in enumerate(confounds):
-        found = confound.correlation
-        ends = None if found.low is None or found.high is None else (found.low, found.high)
-        draw_row(axes, place, Row(found.value, ends, color=Ink.OURS if place else Ink.RUN))
+        correlation = confound.correlation
+        ends = (
+            None
+            if correlation.low is None or correlation.high is None
+            else (correlation.low, correlation.high)
+        )
+        draw_row(axes, place, Row(correlation.value, ends, color=Ink.OURS if place else Ink.RUN))
         name = f"{confound.label}, {confound.of}" if confound.label else confound.of
-        number = "none" if found.value is None else in_words(found)
+        number = "none" if correlation.value is None else in_words(correlation)
         write(axes, shorten(name, 25 if wide else 15), (low, place), (-6, 0), 7.5, units=_DATA, **_RIGHT)
         write(axes, number, (1.0, place), (8, 0), 7.5, units=_DATA, **_LEFT)
     axes.set_xlabel("Spearman’s correlation of distance with the difference in visited cells", labelpad=2)

@@ -105,9 +105,9 @@ def find(
     if tasks:
         is_mixed = any(task_of(each) == "coverage" for each in with_runs)
         possible = [*_best_scores(tasks), *(possible if is_mixed else possible[:-1])]
-    found = tuple(each for each in possible if each is not None)[:MOST_FINDINGS]
-    caveats = [each.basis.caveat for each in found if each.basis.caveat]
-    return Findings(found, _limits(study, with_runs, caveats))
+    findings = tuple(each for each in possible if each is not None)[:MOST_FINDINGS]
+    caveats = [each.basis.caveat for each in findings if each.basis.caveat]
+    return Findings(findings, _limits(study, with_runs, caveats))
 
 
 @dataclass(frozen=True)
@@ -261,20 +261,20 @@ def _of_search(study: _Study) -> Finding | None:
     between, tally = [each for each in study.compared if each.reason == "selection"], study.tally
     pairs = {}
     for first, second in _PAIRS:
-        found = [
+        matching = [
             turned
             for each in between
             for turned in (each, each.seen_from(each.other))
             if (_selection(tally, turned.one), _selection(tally, turned.other)) == (first, second)
         ]
-        if found:
-            pairs[first, second] = found
-    sentences = [_search_sentences(*pair, found) for pair, found in pairs.items()]
+        if matching:
+            pairs[first, second] = matching
+    sentences = [_search_sentences(*pair, matching) for pair, matching in pairs.items()]
     if not sentences:
         return None
     evolved = [pairs.get((each, "random"), []) for each in ("coverage", "novelty")]
-    if all(evolved) and all(_is_above(each) for found in evolved for each in found):
-        both = [each for found in evolved for each in found]
+    if all(evolved) and all(_is_above(each) for matching in evolved for each in matching):
+        both = [each for matching in evolved for each in matching]
         levels = _at_levels(len(evolved[0]), len(evolved[0]))
         random = f"objective and novelty search cover more than random networks{levels}", _difference(both)
         sentences = [*sentences[: ("novelty", "coverage") in pairs], random]

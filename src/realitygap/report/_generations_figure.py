@@ -216,13 +216,13 @@ def _count_drawable(values: npt.NDArray[np.float64]) -> int:
 
 def _segments(values: npt.NDArray[np.float64]) -> list[tuple[npt.NDArray[np.float64], npt.NDArray[np.int64]]]:
     """Return distinct values in a generation and the next, (m, 2), with their numbers of runs, (m,), by generation."""
-    found = []
+    panels = []
     for left in range(values.shape[1] - 1):
         pairs = values[:, left : left + 2]
         pairs = pairs[np.isfinite(pairs).all(axis=1)]
         distinct, counts = np.unique(np.round(pairs, 9), axis=0, return_counts=True)
-        found.append((distinct, counts))
-    return found
+        panels.append((distinct, counts))
+    return panels
 
 
 def _marks_of(panels: Sequence[Panel], decimals: int) -> tuple[MarkedPanel, ...]:
@@ -241,16 +241,16 @@ def _series(panel: Panel, n_runs: int, decimals: int) -> tuple[Series, ...]:
     medians = []
     notes = []
     for values in panel.values.T:
-        there = values[np.isfinite(values)]
-        interval = median_interval(there).ends
+        known = values[np.isfinite(values)]
+        interval = median_interval(known).ends
         within = "" if interval is None else f" [{interval[0]:.{decimals}f}, {interval[1]:.{decimals}f}]"
-        medians.append(float(np.median(there)))
-        notes.append(f"{within}, n = {len(there):,}")
+        medians.append(float(np.median(known)))
+        notes.append(f"{within}, n = {len(known):,}")
     text = f"{panel.title}, generation {{x}}: median {{y}}{{label}}"
     series = [Series(text, np.column_stack([np.arange(len(medians)), medians]), labels=tuple(notes))]
     for run, values in zip(panel.replicates[:n_runs], panel.values[:n_runs], strict=True):
-        there = np.isfinite(values)
-        points = np.column_stack([np.flatnonzero(there), values[there]])
+        known = np.isfinite(values)
+        points = np.column_stack([np.flatnonzero(known), values[known]])
         series.append(Series(f"{panel.title}, run {{name}}, generation {{x}}: {{y}}", points, str(run)))
     return tuple(series)
 
@@ -373,10 +373,10 @@ def _opacity(single: float, count: int) -> float:
 def _draw_median(axes: Axes, values: npt.NDArray[np.float64]) -> None:
     generations, medians, bands = [], [], []
     for generation in range(values.shape[1]):
-        there = values[:, generation][np.isfinite(values[:, generation])]
+        known = values[:, generation][np.isfinite(values[:, generation])]
         generations.append(generation)
-        medians.append(float(np.median(there)))
-        interval = median_interval(there).ends
+        medians.append(float(np.median(known)))
+        interval = median_interval(known).ends
         bands.append(interval or (np.nan, np.nan))
     low, high = np.array(bands).T
     if len(generations) == 1:

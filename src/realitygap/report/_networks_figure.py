@@ -86,9 +86,9 @@ def draw_network(condition: Condition, row: Mapping[str, Any], measure: str) -> 
 def _first_objective(tally: Tally) -> str:
     """Return the condition with runs that selects by coverage at the least noise; otherwise the first with runs."""
     with_runs = set(tally.runs["condition"])
-    there = [each for each in tally.conditions if each["name"] in with_runs]
-    objective = [each for each in there if settings_of(each).get("selection") == "coverage"]
-    return str((objective or there)[0]["name"])
+    candidates = [each for each in tally.conditions if each["name"] in with_runs]
+    objective = [each for each in candidates if settings_of(each).get("selection") == "coverage"]
+    return str((objective or candidates)[0]["name"])
 
 
 def _best_of_last(tally: Tally, condition: str, replicate: int) -> Mapping[str, Any]:

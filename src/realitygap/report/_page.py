@@ -334,13 +334,13 @@ def _path_figures(tally: Tally) -> list[FigureOnPage | str]:
 
 def _conditions_with_paths(tally: Tally) -> list[str]:
     with_runs = set(tally.runs["condition"])
-    there = [condition for condition in tally.conditions if condition["name"] in with_runs]
+    described = [condition for condition in tally.conditions if condition["name"] in with_runs]
     by_selection = {
-        selection: [each["name"] for each in there if settings_of(each).get("selection") == selection]
+        selection: [each["name"] for each in described if settings_of(each).get("selection") == selection]
         for selection in ("coverage", "novelty")
     }
     names = [found[0] for found in by_selection.values() if found]
-    return names or [there[0]["name"]]
+    return names or [described[0]["name"]]
 
 
 def _choices_figure(tally: Tally) -> FigureOnPage | None:
@@ -358,8 +358,8 @@ def _banners(tally: Tally) -> list[tuple[str, str]]:
     if tally.folder.version_note is not None:
         banners.append(("Results of another version", tally.folder.version_note))
     if tally.driven:
-        said = " ".join(describe_driven(name, driven) for name, driven in tally.driven.items())
-        banners.append(("Trials on a robot", said))
+        message = " ".join(describe_driven(name, driven) for name, driven in tally.driven.items())
+        banners.append(("Trials on a robot", message))
     if tally.uncounted:
         banners.append(
             (

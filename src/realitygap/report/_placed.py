@@ -82,8 +82,8 @@ def as_json(values: Mapping[str, Any]) -> Markup:
 
 def number_figures(figures: Iterable[Any]) -> None:
     """Number figures in the order given; reasons why one is missing (text) and None have no number."""
-    found = [each for each in figures if isinstance(each, FigureOnPage)]
-    for number, figure in enumerate(found, 1):
+    placed = [each for each in figures if isinstance(each, FigureOnPage)]
+    for number, figure in enumerate(placed, 1):
         figure.number = number
 
 

@@ -323,7 +323,7 @@ def chances(tally: Tally, n_runs: int = 3) -> list[Chance]:
     Each group of three or more conditions that differ in noise alone gives one result.
     """
     with_runs = [each for each in tally.conditions if len(tally.replicates(each["name"]))]
-    found = []
+    chances_of = []
     for group in same_but_for("noise", with_runs):
         if len(group) < 3:
             continue
@@ -332,5 +332,5 @@ def chances(tally: Tally, n_runs: int = 3) -> list[Chance]:
         together = np.concatenate(samples)
         if lattice(together) is not None:
             equal = chance_of_best([together] * len(samples), n_runs)
-            found.append(Chance(names, n_runs, chance_of_best(samples, n_runs), float(equal[0])))
-    return found
+            chances_of.append(Chance(names, n_runs, chance_of_best(samples, n_runs), float(equal[0])))
+    return chances_of

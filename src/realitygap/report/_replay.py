@@ -87,9 +87,9 @@ def content(tally: Tally, lead: str) -> dict[str, Any]:
     from markupsafe import Markup
 
     with_runs = set(tally.runs["condition"])
-    there = [condition for condition in tally.conditions if condition["name"] in with_runs]
-    room = MOST_STEPS // max(len(there), 1)
-    runs = [_pack_run(tally, condition, room) for condition in there]
+    candidates = [condition for condition in tally.conditions if condition["name"] in with_runs]
+    room = MOST_STEPS // max(len(candidates), 1)
+    runs = [_pack_run(tally, condition, room) for condition in candidates]
     with_trials = [run for run in runs if run.data is not None]
     packed = [run.data for run in with_trials]
     first = _lead_of(tally, with_trials, lead) if packed else None
@@ -118,7 +118,7 @@ def content(tally: Tally, lead: str) -> dict[str, Any]:
         "n_trials": sum(run.n_embedded for run in runs),
         "n_runs": len(packed),
         "same_number": len({run.n_embedded for run in runs if run.data is not None}) == 1,
-        "labels": sorted({label_of(condition) for condition in there}),
+        "labels": sorted({label_of(condition) for condition in candidates}),
     }
 
 
@@ -308,6 +308,6 @@ def _sevens(numbers: npt.NDArray[np.int64]) -> bytes:
     n_groups = max(1, -(-int(numbers.max(initial=0)).bit_length() // 7))
     left = numbers[:, None] >> 7 * np.arange(n_groups + 1)
     groups = left[:, :-1] & 127 | np.where(left[:, 1:] > 0, 128, 0)
-    there = left[:, :-1] > 0
-    there[:, 0] = True
-    return groups[there].astype(np.uint8).tobytes()
+    is_used = left[:, :-1] > 0
+    is_used[:, 0] = True
+    return groups[is_used].astype(np.uint8).tobytes()

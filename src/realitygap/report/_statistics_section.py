@@ -243,7 +243,7 @@ def _selection_sentences(
     comparisons: Sequence[Comparison], conditions: Sequence[DescribedCondition]
 ) -> list[str]:
     """Return the order and the differences, in sentences, of each group of conditions that differ only in selection."""
-    found = []
+    sentences = []
     for group in same_but_for("selection", conditions):
         names = {settings_of(each)["selection"]: str(each["name"]) for each in group}
         parts = []
@@ -254,8 +254,8 @@ def _selection_sentences(
             noise = settings_of(group[0]).get("noise")
             level = f"{100 * noise:g} % noise" if isinstance(noise, int | float) else "this noise"
             where = f"on the robot ({label_of(group[0])})" if _is_driven(group[0]) else f"at {level}"
-            found.append(f"{where}: {'; '.join(parts)}")
-    return found
+            sentences.append(f"{where}: {'; '.join(parts)}")
+    return sentences
 
 
 def _is_driven(condition: DescribedCondition) -> bool:
@@ -265,16 +265,16 @@ def _is_driven(condition: DescribedCondition) -> bool:
 def _apart(comparisons: Sequence[Comparison], names: Mapping[str, str], one: str, other: str) -> str:
     words = _SELECTIONS[one], _SELECTIONS[other]
     pair = names[one], names[other]
-    found = next(
+    comparison = next(
         (each.seen_from(pair[0]) for each in comparisons if {each.one, each.other} == set(pair)), None
     )
-    if found is None:
+    if comparison is None:
         return f"{words[0]} and {words[1]} not compared"
-    within = _within(found.difference)
-    if found.is_shown:
-        return f"{apart_clause(*words, found.size)}{within}"
-    why = undecided_clause(found.can_claim, bool(found.is_equivalent), MARGIN)
-    return f"{words[0]} less {words[1]} {signed(found.size)}{within}, {why}"
+    within = _within(comparison.difference)
+    if comparison.is_shown:
+        return f"{apart_clause(*words, comparison.size)}{within}"
+    why = undecided_clause(comparison.can_claim, bool(comparison.is_equivalent), MARGIN)
+    return f"{words[0]} less {words[1]} {signed(comparison.size)}{within}, {why}"
 
 
 def _within(difference: Estimate, digits: int = 3) -> str:
@@ -344,7 +344,7 @@ def _noise_sentences(
     conditions: Sequence[DescribedCondition],
 ) -> list[str]:
     """Describe the recorded effect of the highest noise against the lowest, and the effect on fresh noise."""
-    found = []
+    sentences = []
     for group in same_but_for("noise", conditions):
         usable = [each for each in group if isinstance(settings_of(each).get("noise"), int | float)]
         ends = sorted(usable, key=lambda each: float(settings_of(each)["noise"]))
@@ -353,8 +353,8 @@ def _noise_sentences(
         high, low = str(ends[-1]["name"]), str(ends[0]["name"])
         changes = [_difference_between(each, high, low) for each in (recorded, fresh)]
         if "–" not in changes:
-            found.append(f"{high} less {low}: {changes[0]} as recorded, {changes[1]} on fresh noise.")
-    return found
+            sentences.append(f"{high} less {low}: {changes[0]} as recorded, {changes[1]} on fresh noise.")
+    return sentences
 
 
 def _difference_between(comparisons: Sequence[Comparison], one: str, other: str) -> str:
@@ -433,10 +433,10 @@ def _number(value: float | None, digits: int = 3) -> str:
 
 
 def _variety(tally: Tally, conditions: Sequence[DescribedCondition], labels: str) -> TableOnPage | None:
-    found = [each for each in measure_variety(tally) if each.n]
-    if not found:
+    measured = [each for each in measure_variety(tally) if each.n]
+    if not measured:
         return None
-    by_name = {each.condition: each for each in found}
+    by_name = {each.condition: each for each in measured}
     objective: dict[str, str] = {}
     for group in same_but_for("selection", conditions):
         names = {settings_of(each)["selection"]: str(each["name"]) for each in group}
@@ -449,10 +449,10 @@ def _variety(tally: Tally, conditions: Sequence[DescribedCondition], labels: str
         *(Column("Jaccard", kind="median"), Column("interval"), *less),
     ]
     rows = []
-    for each in found:
+    for each in measured:
         row = _variety_row(each, by_name.get(objective.get(each.condition, "")))
         rows.append(row if objective else (*row[:4], *row[5:7]))
-    n_behaviors = max(each.n_behaviors for each in found)
+    n_behaviors = max(each.n_behaviors for each in measured)
     return _table(
         "variety",
         f"Variety of behaviors within a run ({labels}; n runs, the first {MOST_RUNS} at most; {n_behaviors} behaviors "

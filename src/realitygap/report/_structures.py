@@ -98,12 +98,12 @@ def count_structures(tally: Tally) -> list[Structures]:
     for condition in tally.conditions:
         key = selection_of(condition), declared(settings_of(condition))
         groups.setdefault(key, []).append(condition["name"])
-    found = []
+    counted = []
     for (selection, names), conditions in groups.items():
-        there = [name for name in conditions if name in genes]
-        if there:
-            found.append(_count(tally, selection, names, {name: genes[name] for name in there}))
-    return found
+        present = [name for name in conditions if name in genes]
+        if present:
+            counted.append(_count(tally, selection, names, {name: genes[name] for name in present}))
+    return counted
 
 
 _ROW = ("replicate", "generation", "individual")
@@ -152,14 +152,14 @@ def _count(
             counts.setdefault(links, Counter())[condition] += kind["n"]
             if links not in examples or kind["coverage"] > examples[links]["coverage"]:
                 examples[links] = {"condition": condition, **kind}
-    found = []
+    structures = []
     for links, by_condition in counts.items():
         n_hidden = len({name for link in links for name in link if name not in names.values()})
         example = {key: examples[links][key] for key in ("condition", *_ROW)}
-        found.append(Structure(inputs, outputs, links, n_hidden, dict(by_condition), example))
-    found.sort(key=lambda structure: (-structure.n, structure.n_hidden, structure.links))
-    n_networks = sum(structure.n for structure in found)
-    return Structures(selection, inputs, tuple(genes), n_networks, tuple(found))
+        structures.append(Structure(inputs, outputs, links, n_hidden, dict(by_condition), example))
+    structures.sort(key=lambda structure: (-structure.n, structure.n_hidden, structure.links))
+    n_networks = sum(structure.n for structure in structures)
+    return Structures(selection, inputs, tuple(genes), n_networks, tuple(structures))
 
 
 def _canonical(links: tuple[tuple[int, int], ...], names: Mapping[int, str]) -> Links:

@@ -119,8 +119,8 @@ class Tally:
         """Return the best score of each run of a condition by its task, in the order of replicates, (n,)."""
         if task_of(self.condition(condition)) == "coverage":
             return self.run_bests(condition, self.measure)
-        found = bests_of(self.folder, condition)
-        return found.max(axis=1) if len(found) else np.empty(0)
+        bests = bests_of(self.folder, condition)
+        return bests.max(axis=1) if len(bests) else np.empty(0)
 
     def replicates(self, condition: str) -> npt.NDArray[np.uint32]:
         """Return the replicates of a condition, in order, (n,)."""
@@ -153,10 +153,10 @@ class Tally:
             rows = rows.select(columns)
         if not rows.is_empty():
             return rows
-        there = [int(run) for run in self.replicates(condition)]
-        has = f"its runs are {there[0]} to {there[-1]}" if there else "it has none yet"
-        if there and there != list(range(there[0], there[-1] + 1)):
-            has += f", {len(there)} of them"
+        replicates = [int(run) for run in self.replicates(condition)]
+        has = f"its runs are {replicates[0]} to {replicates[-1]}" if replicates else "it has none yet"
+        if replicates and replicates != list(range(replicates[0], replicates[-1] + 1)):
+            has += f", {len(replicates)} of them"
         raise ValueError(f"Condition {condition!r} has no run {replicate} in {self.folder.path}: {has}.")
 
     def n_trials(self, condition: str | None = None) -> int:

@@ -132,8 +132,8 @@ def range_of_differences(within: Range) -> Range:
 def distance_on_scale(value: float, end: float, within: Range) -> float:
     """Return how far `end` is above `value` on the scale of `bounded_interval`, in units of the value at `value`."""
     with np.errstate(divide="ignore"):
-        there = float(_to_scale(np.array(end), within) - _to_scale(np.array(value), within))
-    return there / float(_slope(np.array(value), within))
+        distance = float(_to_scale(np.array(end), within) - _to_scale(np.array(value), within))
+    return distance / float(_slope(np.array(value), within))
 
 
 def _to_scale(x: Values, within: Range) -> Values:

@@ -89,8 +89,8 @@ def plan_effect(
     if n is None:
         return Needed(trials, None)
     means, errors = _simulated(effect, sd, n, seed)
-    found = np.abs(means) > float(scipy.special.stdtrit(n - 1, 1 - ALPHA / 2)) * errors
-    return _needed(trials, n, found)
+    is_detected = np.abs(means) > float(scipy.special.stdtrit(n - 1, 1 - ALPHA / 2)) * errors
+    return _needed(trials, n, is_detected)
 
 
 def detectable_difference(n: int, *, spread: float, noise: float, trials: int, power: float = 0.8) -> float:
@@ -154,10 +154,10 @@ def plan_correlation(
     seen, floor = (attenuated(each, reliability, reliability) for each in (correlation, least))
     n = fewest(lambda n: _z_power(seen, floor, n), power, smallest=SMALLEST_N)
     while n is not None and n <= MOST_CONTROLLERS:
-        found = _simulated_correlations(correlation, reliability, floor, n, seed)
-        needed, share = _needed(trials, n, found), float(found.mean())
+        correlations = _simulated_correlations(correlation, reliability, floor, n, seed)
+        needed, share = _needed(trials, n, correlations), float(correlations.mean())
         # fewer studies give a wider interval, which is no reason for more controllers
-        if (needed.low or 0.0) >= power - SHORT_OF * math.sqrt(SIMULATED / len(found)):
+        if (needed.low or 0.0) >= power - SHORT_OF * math.sqrt(SIMULATED / len(correlations)):
             return needed
         n = max(n + 1, math.ceil(n * min((_reach(power) / _reach(share)) ** 2, 2.0)))
     return Needed(trials, None)

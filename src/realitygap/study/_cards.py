@@ -39,8 +39,8 @@ def study_card(study: Study) -> Card:
 @card_of.register(GapBetween)
 def between_card(gap: GapBetween) -> Card:
     """Return the measures of a gap, its controllers on both platforms, and the part of each part of the model."""
-    found = gap.study
-    card = gap_card(found.result, [pairs_picture(found.source, found.target, found.result.score)])
+    study = gap.study
+    card = gap_card(study.result, [pairs_picture(study.source, study.target, study.result.score)])
     why = gap.why
     if why is None:
         return card

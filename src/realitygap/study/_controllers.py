@@ -74,14 +74,14 @@ def sample_controllers(
     if str(kind) == "random":
         return _random(n, seed)
     if Path(kind).is_dir():
-        found = _of_folder(ResultsFolder.open(kind), kind, allow_code)
-        if len(found) < n:
+        controllers = _of_folder(ResultsFolder.open(kind), kind, allow_code)
+        if len(controllers) < n:
             raise StudyError(
-                f"{kind} has champions of {len(found)} runs, but {n} controllers were requested. Run more "
+                f"{kind} has champions of {len(controllers)} runs, but {n} controllers were requested. Run more "
                 "replicates, or request fewer."
             )
-        chosen = sorted(np.random.default_rng(seed).permutation(len(found))[:n])
-        return _with_fresh_scores([found[k] for k in chosen])
+        chosen = sorted(np.random.default_rng(seed).permutation(len(controllers))[:n])
+        return _with_fresh_scores([controllers[k] for k in chosen])
     return _with_fresh_scores(_of_study(kind, n, seed, allow_code))
 
 
@@ -115,9 +115,9 @@ def recorded_controllers(target: str) -> list[tuple[Controller, int]]:
     name, path = split_spec(target)
     if name != RecordedPlatform.name or not path:
         return []
-    found = RecordedTarget(path).controllers
-    least = min(n for _, n in found)
-    return [(Controller(genome, f"recorded-{k}", "random"), least) for k, (genome, _) in enumerate(found)]
+    recorded = RecordedTarget(path).controllers
+    least = min(n for _, n in recorded)
+    return [(Controller(genome, f"recorded-{k}", "random"), least) for k, (genome, _) in enumerate(recorded)]
 
 
 def _random(n: int, seed: int) -> list[Controller]:

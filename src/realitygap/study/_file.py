@@ -324,8 +324,8 @@ def _check_arena_numbers(platform: str, merged: dict[str, Any], place: str, prob
         arena.with_numbers({name: value for name, value in numbers.items() if name.startswith(ARENA)})
     except ValueError as error:
         for line in str(error).split("\n"):
-            said = line.removeprefix("ArenaFile").lstrip(".: ").replace("mean '", f"mean '{ARENA}")
-            problems.add(f"{place}.{platform}.set", ARENA + said)
+            message = line.removeprefix("ArenaFile").lstrip(".: ").replace("mean '", f"mean '{ARENA}")
+            problems.add(f"{place}.{platform}.set", ARENA + message)
 
 
 def _condition(

@@ -193,8 +193,8 @@ class PhysicalStudy:
                 self._check_planned(condition, replicate, generation)
                 rows = self._ledger.individuals(condition.name, replicate, generation)
                 cells = [row["cells"] for row in rows]
-                told = evolution.tell(self._scores(condition, [row["trial"] for row in rows], cells), cells)
-                if list(told.fitness) != [row["fitness"] for row in rows]:
+                scored = evolution.tell(self._scores(condition, [row["trial"] for row in rows], cells), cells)
+                if list(scored.fitness) != [row["fitness"] for row in rows]:
                     raise LedgerError(_bred_otherwise(self._ledger, condition, replicate, generation))
         return evolution
 
@@ -234,9 +234,9 @@ class PhysicalStudy:
                 f"{self._ledger.path}: a score was withdrawn while its generation was being closed. Run the "
                 "same command again."
             )
-        told = evolution.tell(self._scores(condition, [each.trial for each in trials], cells), cells)
+        scored = evolution.tell(self._scores(condition, [each.trial for each in trials], cells), cells)
         self._ledger.close_generation(
-            condition.name, replicate, generation, told.fitness, told.novelty, cells=cells
+            condition.name, replicate, generation, scored.fitness, scored.novelty, cells=cells
         )
 
     def _scores(
@@ -392,16 +392,16 @@ class PhysicalStudy:
         self._operator.meet(robot)
         for condition in self._conditions:
             self._refuse_unseen(condition)
-        found = preflight(robot, self._ledger.robots())
-        if (found.problems or not self._is_looked_at) and not self._operator.accept(found):
-            said = "; ".join(found.problems) or "the operator stopped there"
+        check = preflight(robot, self._ledger.robots())
+        if (check.problems or not self._is_looked_at) and not self._operator.accept(check):
+            message = "; ".join(check.problems) or "the operator stopped there"
             raise StudyError(
-                f"The pre-flight was not accepted, and nothing was driven: {said}. Put that right, or accept it "
+                f"The pre-flight was not accepted, and nothing was driven: {message}. Put that right, or accept it "
                 "(--despite-preflight)."
             )
         self._is_looked_at = True
         self._sitting = self._ledger.begin_sitting(
-            robot.label, self._port, found.robot, found.to_dict(), [each.name for each in self._conditions]
+            robot.label, self._port, check.robot, check.to_dict(), [each.name for each in self._conditions]
         )
 
     def _let_go(self) -> None:

@@ -43,10 +43,10 @@ def placing_words(plan: TrialPlan, arena: Arena, robot: RobotModel) -> str:
 
 def parse_length(text: str) -> float | None:
     """Return a number as read from a ruler, such as 13 3/4 or -.5; None if the text is no number."""
-    found = _NUMBER.match(text.strip())
-    if found is None:
+    match = _NUMBER.match(text.strip())
+    if match is None:
         return None
-    sign, whole, over, under, alone_over, alone_under = found.groups()
+    sign, whole, over, under, alone_over, alone_under = match.groups()
     if 0 in (int(under or 1), int(alone_under or 1)):
         return None
     value = float(whole) if whole else int(alone_over) / int(alone_under)

@@ -228,7 +228,7 @@ def _physical_result(study: Study, folder: ResultsFolder, n_driven: int, waiting
 
 @contextlib.contextmanager
 def _executor(threads: int | None, cluster: str | None) -> Iterator[Executor]:
-    """Return the executor; a cluster is connected before anything in the folder changes."""
+    """Yield the executor; a cluster is connected before anything in the folder changes."""
     if cluster is None:
         yield Threads(threads or usable_processors())
         return
@@ -329,20 +329,20 @@ def _refuse_other_settings(folder: ResultsFolder, study: Study) -> None:
     """
     old = folder.description
     new = study.description()
-    there = {condition["name"]: condition for condition in old["conditions"]}
+    existing = {condition["name"]: condition for condition in old["conditions"]}
     differences: list[str] = []
     for condition in new["conditions"]:
-        before = there.pop(condition["name"], None)
+        before = existing.pop(condition["name"], None)
         if before is not None and before["hash"] != condition["hash"]:
             lines = _differences(before["settings"], condition["settings"])
             differences += [f"{condition['name']}: {line}" for line in lines]
     for condition in new["conditions"]:
-        if (alike := same_file(condition["name"], there)) is not None:
+        if (alike := same_file(condition["name"], existing)) is not None:
             differences.append(
                 f"condition {condition['name']!r} would share files with the existing condition {alike!r}; "
                 "give it another name"
             )
-    if there:
+    if existing:
         # conditions that this study lacks may stay in its own folder, but not in that of another study
         differences = [
             f"the study's {key} is {old.get(key)!r} there, {new[key]!r} here"

@@ -117,15 +117,15 @@ def trial_of_file(path: str | Path, number: int) -> TrialToTrack:
         StudyError: There is none with this number.
         RecordError: The file cannot be read.
     """
-    found = read_observations(path)
-    trials = {trial.number: trial for trial in found.trials if len(trial.commands)}
+    observations = read_observations(path)
+    trials = {trial.number: trial for trial in observations.trials if len(trial.commands)}
     if number not in trials:
         has = ", ".join(map(str, sorted(trials))) or "none"
         raise StudyError(f"{path} has no trial {number}; it has {has}.")
     trial = trials[number]
     times = np.arange(len(trial.commands) + 1, dtype=np.float64) * trial.step_s
-    head = replace(found.head, observe="track")
-    return TrialToTrack(head, trial, times, Arena.from_dict(dict(found.head.arena)))
+    head = replace(observations.head, observe="track")
+    return TrialToTrack(head, trial, times, Arena.from_dict(dict(observations.head.arena)))
 
 
 def place_trial(

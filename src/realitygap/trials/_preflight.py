@@ -79,10 +79,10 @@ def preflight(robot: Robot, known: Sequence[Mapping[str, str]] = ()) -> Prefligh
 def identity_of(robot: Robot) -> dict[str, str]:
     """Return the identity of a robot, as far as it reports one."""
     info = getattr(robot, "info", None)
-    found = {name: getattr(info, name, None) for name in ("model", "fluke")}
+    identity = {name: getattr(info, name, None) for name in ("model", "fluke")}
     with contextlib.suppress(RobotError):
-        found["name"] = getattr(robot, "name", None)
-    return {name: str(value).strip() for name, value in found.items() if value is not None}
+        identity["name"] = getattr(robot, "name", None)
+    return {name: str(value).strip() for name, value in identity.items() if value is not None}
 
 
 def _other_robot(identity: Mapping[str, str], before: Mapping[str, str]) -> list[str]:

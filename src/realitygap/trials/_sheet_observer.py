@@ -91,12 +91,12 @@ class SheetObserver(OwnSenses):
         """Return the trial with its cells, if its robot had driven and the person counts it; None: it is void."""
         has_driven = trial.end == EndReason.DRIVEN
         what = f"The program ended in trial {trial.number} ({trial.purpose})"
-        told = (
+        message = (
             f"{what}, which was driven, before you said what you saw."
             if has_driven
             else f"{what}: it is driven again."
         )
-        if self._settle is None or self._settle(told, has_driven) == "void" or not has_driven:
+        if self._settle is None or self._settle(message, has_driven) == "void" or not has_driven:
             return None
         self._plan, self._arena = plan, arena
         cells = tuple(sorted(set(trial.cells or self.cells())))

@@ -175,8 +175,8 @@ class RobotTarget(ClosedOnExit):
         trials = []
         try:
             for k, plan in enumerate(plans):
-                told = None if tell is None else functools.partial(tell, k)
-                trials.append(self._carry_out(plan, observe, told))
+                tell_trial = None if tell is None else functools.partial(tell, k)
+                trials.append(self._carry_out(plan, observe, tell_trial))
         except BaseException:
             self.close()
             raise

@@ -146,9 +146,9 @@ def _refuse_mistakes(path: str, diagnosis: Diagnosis) -> None:
     Raises:
         StudyError: They contradict each other; the message has every mistake.
     """
-    found = [mistake.message for mistake in diagnosis.mistakes if mistake.kind not in HARMLESS]
-    if found:
-        raise StudyError(f"{path} cannot be fitted as its mapping has it. {' '.join(found)}")
+    messages = [mistake.message for mistake in diagnosis.mistakes if mistake.kind not in HARMLESS]
+    if messages:
+        raise StudyError(f"{path} cannot be fitted as its mapping has it. {' '.join(messages)}")
 
 
 def _notes(diagnosis: Diagnosis) -> list[str]:

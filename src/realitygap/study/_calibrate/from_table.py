@@ -210,9 +210,9 @@ def _compare(
     between = (table.readings > BETWEEN[0]) & (table.readings < BETWEEN[1])
 
     def errors(rows: NDArray[np.bool_]) -> dict[str, float]:
-        found = {name: _rms(values[rows & ~seen]) for name, values in off.items()}
-        noise = math.sqrt(found[NOMINAL] ** 2 + JyroPlatform.default_noise**2 / 3)
-        return {FITTED: found[FITTED], NOMINAL: found[NOMINAL], NOISE: noise, TABLE: found[TABLE]}
+        errors = {name: _rms(values[rows & ~seen]) for name, values in off.items()}
+        noise = math.sqrt(errors[NOMINAL] ** 2 + JyroPlatform.default_noise**2 / 3)
+        return {FITTED: errors[FITTED], NOMINAL: errors[NOMINAL], NOISE: noise, TABLE: errors[TABLE]}
 
     where = "at every second place" if hold_out == "blocks" else f"at {hold_out:.0%} of the places"
     everywhere = np.ones(len(seen), np.bool_)

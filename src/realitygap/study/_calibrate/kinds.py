@@ -72,12 +72,12 @@ def _told_of_ends(parts: Parts, *, is_cut: bool) -> Parts:
     at_end = [each for each in parts.fitted if each.is_at_end and each.name in MOTION]
     if not at_end:
         return parts
-    said = ", ".join(
+    message = ", ".join(
         f"{each.name} is {significant(each.estimate, 3)} "
         f"({significant(each.prior_low, 3)} to {significant(each.prior_high, 3)})"
         for each in at_end
     )
-    note = f"At or beyond the end of what was thought possible: {said}."
+    note = f"At or beyond the end of what was thought possible: {message}."
     return replace(parts, misspecified=is_cut, notes=(*parts.notes, note))
 
 
@@ -209,11 +209,11 @@ def _fit_sensors(
             "The robot is never still: expected trials with readings in front of a wall, as `realitygap "
             "calibrate sensors` records them."
         )
-    found = {trial.readings.shape[1] for trial in standing}
-    if found != {len(robot.range)}:
+    n_readings = {trial.readings.shape[1] for trial in standing}
+    if n_readings != {len(robot.range)}:
         raise ValueError(
-            f"The trials have {min(found)} range sensors and robot {robot.name!r} {len(robot.range)}. Build on the "
-            "robot that it was (--base ROBOT)."
+            f"The trials have {min(n_readings)} range sensors and robot {robot.name!r} {len(robot.range)}. Build on "
+            "the robot that it was (--base ROBOT)."
         )
     rng = np.random.default_rng(seed)
     placements = placements_of(standing, robot, arena)

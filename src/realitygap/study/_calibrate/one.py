@@ -227,24 +227,26 @@ def calibrate_from(
         RecordError: The file cannot be read.
     """
     _check_kind(kind)
-    found = read_observations(data)
-    robot = found.head.robot if robot is None else robot
-    arena = _arena_of(data, found)
-    seen = observe or found.head.observe
+    observations = read_observations(data)
+    robot = observations.head.robot if robot is None else robot
+    arena = _arena_of(data, observations)
+    seen = observe or observations.head.observe
     if seen not in KINDS[kind].observes:
         raise _too_little_seen(kind, seen)
-    if not sees(found.head.observe, seen):
-        raise StudyError(f"--observe is {seen!r}, and {data} has no more than {found.head.observe!r}.")
-    trials = [_seen_as(trial, seen) for trial in those_that_count(found.trials)]
+    if not sees(observations.head.observe, seen):
+        raise StudyError(f"--observe is {seen!r}, and {data} has no more than {observations.head.observe!r}.")
+    trials = [_seen_as(trial, seen) for trial in those_that_count(observations.trials)]
     if kind not in NO_READINGS or any(trial.readings.shape[1] for trial in trials):
         _refuse_other_readings(trials, load_robot(robot))
-    has_marker = is_under_camera(found.head.target, found.head.label, seen)
+    has_marker = is_under_camera(observations.head.target, observations.head.label, seen)
     parts = _fit(kind, trials, robot, arena, seen, seed, has_marker)
     made = calibration_of(
-        kind, parts, robot, found.head.target, found.head.label, seen, trials, arena.name, seed
+        kind, parts, robot, observations.head.target, observations.head.label, seen, trials, arena.name, seed
     )
     more = {"measured": measured_at(data)}
-    return made.model_copy(update=more | ({"notes": (*made.notes, found.problem)} if found.problem else {}))
+    return made.model_copy(
+        update=more | ({"notes": (*made.notes, observations.problem)} if observations.problem else {})
+    )
 
 
 def measured_at(path: Path) -> str:
@@ -400,7 +402,7 @@ def _still_said(below: Sequence[Fitted], parts: Parts) -> list[Fitted]:
 
 
 def _refuse_no_robot(parts: Parts, robot: str | Path, target: str) -> None:
-    """Return where a robot can have the numbers that were fitted.
+    """Raise an error if no robot can have the fitted numbers.
 
     Raises:
         StudyError: There can be no such robot, for example with a gain below 0.
@@ -408,9 +410,9 @@ def _refuse_no_robot(parts: Parts, robot: str | Path, target: str) -> None:
     try:
         load_robot(robot).with_numbers(parts.numbers)
     except ValueError as error:
-        said = "; ".join(line.removeprefix("RobotModel.") for line in str(error).split("\n"))
+        message = "; ".join(line.removeprefix("RobotModel.") for line in str(error).split("\n"))
         raise StudyError(
-            f"The numbers fitted to {target} are not a valid robot: {said} Did it drive backward on a forward "
+            f"The numbers fitted to {target} are not a valid robot: {message} Did it drive backward on a forward "
             "command, or turn in the wrong direction? Check which end is the front, and that left and right "
             "are not swapped. Saved trials are safe."
         ) from None

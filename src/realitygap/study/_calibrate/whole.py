@@ -101,12 +101,12 @@ def calibrate_all(
     whole_number("budget", budget, 0)
     platform = SimPlatform(step_s=target.step_s, **({} if robot is None else {"robot": robot}))
     say = tell or (lambda _: None)
-    told = None if keep is None else lambda _, trial: keep(trial)
+    keep_trial = None if keep is None else lambda _, trial: keep(trial)
     plans = all_plans(target.arena, platform.robot, budget, seed)
     is_chosen = choose and budget >= LEAST_TO_CHOOSE
     first = round(BEFORE_CHOICE * budget) if is_chosen else budget
     say(f"{first} trials on {target.name}, {observe} observed")
-    carried_out = list(target.carry_out(plans[:first], observe, told))
+    carried_out = list(target.carry_out(plans[:first], observe, keep_trial))
     trials, left_out = of_one_length(carried_out)
     if trials:
         platform = platform.model_copy(update={"step_s": step_of(trials)})
@@ -114,7 +114,7 @@ def calibrate_all(
     if is_chosen:
         chosen = fit.chosen(fit.posterior(trials, "small"), budget - first, first)
         say(f"{len(chosen)} more trials, chosen")
-        carried_out += target.carry_out(chosen, observe, told)
+        carried_out += target.carry_out(chosen, observe, keep_trial)
         trials, left_out = of_one_length(carried_out)
     marker = None
     if is_under_camera(target.name, target.label, observe):
@@ -199,19 +199,19 @@ class _Fit:
         `sim` cannot make both, the first knows how the robot moves and the second what comes of it. With poses, the
         first is that of single commands. Without poses, it is that of whole trials with the same commands.
         """
-        told = [trial for trial in trials if len(trial.commands) >= LEAST_STEPS]
-        if not told:
+        usable = [trial for trial in trials if len(trial.commands) >= LEAST_STEPS]
+        if not usable:
             return self._posterior_of_trials(trials, effort)
-        if all(trial.observe == "track" for trial in told):
+        if all(trial.observe == "track" for trial in usable):
             sharp = fit_from_poses(
-                told, self.ensemble, self.prior, self.robot, self.arena, seed=self.seed, tell=self.tell
+                usable, self.ensemble, self.prior, self.robot, self.arena, seed=self.seed, tell=self.tell
             )
-            blind = [trial.seen_as("cells") for trial in told]
+            blind = [trial.seen_as("cells") for trial in usable]
             whole = self._posterior_of_trials(blind, effort)
         else:
             whole = self._posterior_of_trials(trials, effort)
             sharp = fit_from_commands(
-                told,
+                usable,
                 self.ensemble,
                 self.prior,
                 self.robot,
@@ -220,7 +220,7 @@ class _Fit:
                 seed=self.seed,
                 effort=effort,
             )
-            self.tell(f"commands: {sum(len(trial.commands) for trial in told)}, given again")
+            self.tell(f"commands: {sum(len(trial.commands) for trial in usable)}, given again")
         return mixed(sharp, whole, self.prior, share=OF_COMMANDS)
 
     def _posterior_of_trials(self, trials: Sequence[TrialRecord], effort: Effort) -> Posterior:

@@ -259,11 +259,11 @@ def adopt_plan(folder: Path, plan: ClosingPlan) -> None:
     refuse_links(folder, path, *(folder / name for name in ("summary.json", "report.html")))
     refuse_links_in(folder, *_PARTS)
     if path.exists():
-        there = _stored(path)
+        stored = _stored(path)
         now = plan.to_dict()
-        different = [name for name in now if name not in EXTENDED and there.get(name) != now[name]]
+        different = [name for name in now if name not in EXTENDED and stored.get(name) != now[name]]
         if different:
-            shown = "; ".join(f"{name} was {there.get(name)}, is {now[name]}" for name in different)
+            shown = "; ".join(f"{name} was {stored.get(name)}, is {now[name]}" for name in different)
             raise RecordError(
                 f"{folder} holds a {NAME} of another plan ({shown}); nothing was run. Name another folder with --out."
             )

@@ -186,9 +186,9 @@ def _family(
     twins: Sequence[Row],
     read: Callable[[Row], tuple[Row, float | None] | None],
 ) -> Row:
-    found = [(twin, each) for twin in twins if (each := read(twin)) is not None]
-    values = [each[0]["estimate"] for _, each in found if each[0]["estimate"] is not None]
-    falls = [each[1] for twin, each in found if twin["counts"] and each[1] is not None]
+    units = [(twin, each) for twin in twins if (each := read(twin)) is not None]
+    values = [each[0]["estimate"] for _, each in units if each[0]["estimate"] is not None]
+    falls = [each[1] for twin, each in units if twin["counts"] and each[1] is not None]
     return {
         "family": family,
         "observe": observe,
@@ -246,7 +246,7 @@ def _goals(plan: ClosingPlan, twins: Sequence[Row], budget: int) -> Iterable[Row
 
 
 def _goals_of_platform(plan: ClosingPlan, family: str, twins: Sequence[Row], budget: int) -> Iterable[Row]:
-    """Return goals of one robot over its sittings, none of which is left out; of all controllers, and of each kind."""
+    """Yield goals of one robot over all its sittings: of all controllers, and of each kind."""
     pairs = [(twin, after) for twin in twins if twin["family"] == family for after in twin["calibrated"]]
     for observe in plan.observations:
         if (family, observe) in plan.unseen:

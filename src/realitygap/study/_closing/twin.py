@@ -64,10 +64,10 @@ class ClosingTwin:
         with self.open_twin() as target:
             for unit in missing:
                 since = time.perf_counter()
-                found = self._unit(unit, target)
-                found |= {"family": self.name.family, "seed": self.name.seed, "unit": unit}
-                found["seconds"] = round(time.perf_counter() - since, 1)
-                write_whole(self._path(unit), json.dumps(found).encode(), within=self.folder)
+                result = self._unit(unit, target)
+                result |= {"family": self.name.family, "seed": self.name.seed, "unit": unit}
+                result["seconds"] = round(time.perf_counter() - since, 1)
+                write_whole(self._path(unit), json.dumps(result).encode(), within=self.folder)
                 self.tell(f"{self.name} {unit}")
 
     def _path(self, unit: str) -> Path:
@@ -172,7 +172,7 @@ class ClosingTwin:
             with allow_trials(
                 target, place.with_suffix(".jsonl"), budget, CALIBRATING, observe=observe
             ) as kept:
-                found = self.calibrate(
+                calibration = self.calibrate(
                     kept,
                     robot=needs_sim(self.condition, "calibrated").robot,
                     observe=observe,
@@ -180,7 +180,7 @@ class ClosingTwin:
                     seed=self.name.seed,
                     effort=self.plan.effort,
                 )
-            write_whole(path, found.to_toml().encode(), within=self.folder)
+            write_whole(path, calibration.to_toml().encode(), within=self.folder)
         return load_calibration(path)
 
     # transfer

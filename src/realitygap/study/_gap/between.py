@@ -75,7 +75,7 @@ def gap_between(
         )
     tell_of = say or (lambda _: None)
     setting = _setting(order, task, arena, tell_of, allow_code=allow_code)
-    there = (
+    champions = (
         []
         if order.reevolved is None
         else sample_controllers(order.reevolved, setting.n_controllers, order.seed, allow_code=allow_code)
@@ -85,9 +85,9 @@ def gap_between(
             f"--why shares out the gap in coverage, and the score here is {setting.task.score_name}. Leave --why out, "
             "or name the task (--task coverage)."
         )
-    if there and not setting.is_recorded:
-        _refuse_elsewhere(there, f"--reevolved {order.reevolved}", order.target)
-    if there:
+    if champions and not setting.is_recorded:
+        _refuse_elsewhere(champions, f"--reevolved {order.reevolved}", order.target)
+    if champions:
         _refuse_elsewhere(setting.controllers, f"--controllers {order.controllers}", order.sim)
     with (
         open_target(
@@ -122,7 +122,7 @@ def gap_between(
             margin=order.margin,
             observe=order.observe,
             misspecified=_misspecified(calibration),
-            reevolved=there,
+            reevolved=champions,
             seed=order.seed,
             tell=tell,
             results=order.results,

@@ -64,8 +64,8 @@ class GapPlan:
     @property
     def best(self) -> Needed | None:
         """The row with the fewest trials on the target; None if no row can be measured."""
-        there = [row for row in self.needed if row.controllers and row.controllers <= MOST_CONTROLLERS]
-        return min(there, key=lambda row: row.on_target or 0) if there else None
+        measurable = [row for row in self.needed if row.controllers and row.controllers <= MOST_CONTROLLERS]
+        return min(measurable, key=lambda row: row.on_target or 0) if measurable else None
 
 
 def pilot_spreads(seed: int = 1, arena: str | Arena = "paper", task: Task | None = None) -> Spreads:
@@ -93,9 +93,9 @@ def recorded_spreads(path: str, task: Task | None = None) -> Spreads:
         StudyError: It has not two controllers with two trials each.
         TaskError: A trial has less than the task needs.
     """
-    found = read_observations(path)
-    arena = Arena.from_dict(dict(found.head.arena))
-    trials = [trial for trial in those_that_count(found.trials) if trial.genome]
+    observations = read_observations(path)
+    arena = Arena.from_dict(dict(observations.head.arena))
+    trials = [trial for trial in those_that_count(observations.trials) if trial.genome]
     by_genome: dict[str, list[float]] = {}
     for trial in trials:
         score = score_observed(task or CoverageTask(), [trial], arena)[0]
@@ -107,7 +107,7 @@ def recorded_spreads(path: str, task: Task | None = None) -> Spreads:
         )
     r = min(len(values) for values in repeated)
     values = np.array([values[:r] for values in repeated])
-    return _spreads(values, f"{path} ({found.head.label}): {len(values)} controllers, {r} trials each")
+    return _spreads(values, f"{path} ({observations.head.label}): {len(values)} controllers, {r} trials each")
 
 
 def _spreads(values: NDArray[np.float64], origin: str) -> Spreads:

@@ -150,7 +150,7 @@ def study_gap(
     refuse_inputs(reevolved, target)
     file = None if results is None else open_trials(results, target, observe)
     on_target = _carry_out(target, [*plans, *more], observe, tell, file)
-    source, said = _paced(source, target, on_target) if at_its_pace else (source, ())
+    source, pace_notes = _paced(source, target, on_target) if at_its_pace else (source, ())
     own = [replace(plan, number=plan.number - TARGET_FROM) for plan in plans]
     in_source = _carry_out(source, own, seen, tell)
     one = side_of(source, in_source, len(controllers), task)
@@ -162,7 +162,7 @@ def study_gap(
         score=task.score_name,
         luck=_luck(controllers, task),
         reevolved=_reevolved(controllers, source, one, reevolved, reevolved_there, target, task),
-        notes=said,
+        notes=pace_notes,
     )
     return GapStudy(
         result,
@@ -190,8 +190,8 @@ def _paced(
     if step_s == source.step_s:
         return source, ()
     lasted = f"{step_s:g} s in place of {source.step_s:g} s"
-    said = f"Commands of {source.name} last {lasted}, as those of {target.name} did."
-    return source.lasting(step_s), (said,)
+    note = f"Commands of {source.name} last {lasted}, as those of {target.name} did."
+    return source.lasting(step_s), (note,)
 
 
 # trials
@@ -336,5 +336,5 @@ def _reevolved(
             0, f"The controllers were evolved on {', '.join(sorted(elsewhere))}, and not on {source.name}."
         )
     here = in_source.means[[k for k, _ in champions]]
-    there = side_of(target, on_target, len(reevolved), task).means
-    return difference_interval(there, here, task.score_range, noun="champions")
+    on_target_means = side_of(target, on_target, len(reevolved), task).means
+    return difference_interval(on_target_means, here, task.score_range, noun="champions")

@@ -152,7 +152,7 @@ def _carry_out(
     for k, genome in enumerate(genomes):
         kinds.setdefault((genome.rules, genome.interface, genome.bias_value), []).append(k)
     m = len(next(iter(values.values())))
-    found = np.empty((m, len(genomes), trials))
+    scores = np.empty((m, len(genomes), trials))
     ensemble = SimEnsemble(platform, arena)
     for number, places in enumerate(kinds.values()):
         n = len(places) * trials
@@ -164,5 +164,5 @@ def _carry_out(
         coverage = ensemble.summarize(
             play, values, seed + number, lambda done: done.coverage, keep=(), same_noise=True
         )
-        found[:, places] = coverage.reshape(m, len(places), trials)
-    return found
+        scores[:, places] = coverage.reshape(m, len(places), trials)
+    return scores

@@ -112,14 +112,14 @@ class TransferResult:
 
         Scores of champions are named `coverage` if they are that; otherwise `scores`, and `score` says of what.
         """
-        found = asdict(self)
+        fields = asdict(self)
         if self.score == COVERAGE:
-            del found["score"]
-            for champion in found["champions"]:
+            del fields["score"]
+            for champion in fields["champions"]:
                 champion["coverage"] = champion.pop("scores")
-        for row, strategist in zip(found["strategies"], self.strategies, strict=True):
+        for row, strategist in zip(fields["strategies"], self.strategies, strict=True):
             row |= {"quality": strategist.quality.to_dict(), "regret": strategist.regret.to_dict()}
-        return found
+        return fields
 
 
 def summarize_transfer(

@@ -74,13 +74,13 @@ def evolve_champions(condition: Condition, runs: range, *, repeats: int) -> list
         scores = tried.reshape(len(runs), n, repeats).mean(axis=2)
         for row, population in enumerate(populations):
             k = int(scores[row].argmax())
-            found = best[row]
-            if found is None or scores[row, k] > found[0]:
+            champion = best[row]
+            if champion is None or scores[row, k] > champion[0]:
                 best[row] = scores[row, k], named(genomes[row * n + k], condition)
             archive = archives[row]
             first = [batch.behavior((row * n + k) * repeats) for k in range(n)]
             population.tell(scores[row] if archive is None else archive.update(first))
-    champions = [found[1] for found in best if found is not None]
+    champions = [champion[1] for champion in best if champion is not None]
     return rank_genomes(condition, champions, runs.start)
 
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from realitygap.playback import WatchedRobot
+from realitygap.playback import WatchedRobot, pack_scene, pack_trials
 from realitygap.report import choose_trial, read_tally
 from realitygap.runs import genome_of
 from realitygap.trials import drive_trial
@@ -24,8 +24,7 @@ class _FarPage:
 
     def __init__(self, channel: Channel) -> None:
         self._channel = channel
-        self.scene: dict[str, Any] = {}
-        self.trials: list[dict[str, Any]] = []
+        self.scene, self.trials = pack_scene(None, ""), pack_trials([])
         self.live = True
 
     def send(self, content: dict[str, Any]) -> None:

@@ -20,7 +20,7 @@ from realitygap.robots import Command, Label, Observation, Robot, channels_of, s
 from realitygap.world import Arena, Grid, Pose, VisitedCells
 
 from ._moving import MovingTrial, RobotShape
-from ._player import check_speed, pack_rays, pack_scene, pack_trials, player_class
+from ._player import PackedScene, PackedTrial, check_speed, pack_rays, pack_scene, pack_trials, player_class
 
 PERIOD_S = 0.05
 """Minimum time between two messages to a page [s]: at most 20 a second."""
@@ -38,8 +38,8 @@ class Page(Protocol):
         live: True if it continues.
     """
 
-    scene: dict[str, Any]
-    trials: list[dict[str, Any]]
+    scene: PackedScene
+    trials: list[PackedTrial]
     live: bool
 
     def send(self, content: dict[str, Any]) -> None:
@@ -234,7 +234,7 @@ class WatchedRobot:
     def _now(self) -> Pose:
         return Pose(0.0, 0.0, 0.0) if self._where is None else Pose(*self._where())
 
-    def _packed(self) -> list[dict[str, Any]]:
+    def _packed(self) -> list[PackedTrial]:
         """Return a trial in which nothing has happened yet, so that the page knows the robot."""
         (packed,) = pack_trials([self.trial], placed=self._where is not None)
         return [packed]

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Sequence
 from functools import cache
 from importlib import import_module, resources
-from typing import Any, TypedDict
+from typing import Any, Required, TypedDict
 
 import numpy as np
 
@@ -104,7 +104,56 @@ def player_class() -> type:
     return Player
 
 
-def pack_scene(arena: Arena | None, title: str) -> dict[str, Any]:
+class PackedLine(TypedDict):
+    """A line of an arena on a page: points [m], and colors, width [pt], and dashes [pt]."""
+
+    points: list[list[float]]
+    fill: str
+    stroke: str
+    width: float
+    dash: list[float]
+
+
+class PackedDisc(TypedDict):
+    """A disc of an arena on a page: its middle [m], its radius [pt], and its color."""
+
+    x: float
+    y: float
+    radius: float
+    fill: str
+
+
+class PackedText(TypedDict):
+    """A text of an arena on a page: its place [m], the shift upward [pt], and its color."""
+
+    x: float
+    y: float
+    text: str
+    up: float
+    fill: str
+
+
+class PackedGrid(TypedDict):
+    """The cells of an arena on a page: corner and side [m], and numbers of columns and rows."""
+
+    x: float
+    y: float
+    cell: float
+    columns: int
+    rows: int
+
+
+class PackedScene(TypedDict, total=False):
+    """The fixed parts of a scene on a page; without an arena the title and the extent [m] alone."""
+
+    title: Required[str]
+    extent: Required[list[float]]
+    shapes: list[PackedLine | PackedDisc | PackedText]
+    walls: list[list[float]]
+    grid: PackedGrid
+
+
+def pack_scene(arena: Arena | None, title: str) -> PackedScene:
     """Return the fixed parts of a scene, ready for JSON; without an arena a bare rectangle around the origin."""
     if arena is None:
         return {"title": title, "extent": [-0.4, 0.4, -0.25, 0.25]}
@@ -118,7 +167,7 @@ def pack_scene(arena: Arena | None, title: str) -> dict[str, Any]:
     }
 
 
-def _pack_thing(shape: Shape) -> dict[str, Any]:
+def _pack_thing(shape: Shape) -> PackedLine | PackedDisc | PackedText:
     """Return a plain shape of an object in the arena, ready for JSON."""
     if isinstance(shape, Line):
         points = [[round(x, _DIGITS), round(y, _DIGITS)] for x, y in shape.points]
@@ -144,28 +193,6 @@ def _paint(color: str | None) -> str:
     return "none" if color is None else themed_color(color)
 
 
-def pack_trials(trials: Sequence[MovingTrial], *, placed: bool = True) -> list[dict[str, Any]]:
-    """Return trials in a form for JSON; `placed` is false if the robot's poses are unknown."""
-    return [
-        {
-            "title": trial.title,
-            "label": trial.label,
-            "placed": placed,
-            **pack_pen(pen),
-            **({} if len(trials) > 1 else {"color": themed_color(Ink.OURS)}),
-            **pack_shape(trial.shape),
-            "step_s": trial.step_s,
-            "parts": trial.parts,
-            "poses": np.round(trial.poses, _DIGITS).tolist(),
-            "rays": [pack_rays(row) for row in trial.rays.tolist()],
-            "stalled": trial.stalled.astype(int).tolist(),
-            "cells": list(trial.cells),
-            "visited_at": list(trial.visited_at),
-        }
-        for pen, trial in enumerate(trials)
-    ]
-
-
 class PackedPen(TypedDict):
     """Letter, color, and dashes [pt] of a trial on a page."""
 
@@ -180,6 +207,45 @@ class PackedShape(TypedDict):
     outlines: list[list[list[float]]]
     mounts: list[list[float]]
     reach: list[float]
+
+
+class PackedTrial(PackedPen, PackedShape):
+    """A trial on a page: poses [m, rad] and rays [m] by row, and the visited cells with their rows."""
+
+    title: str
+    label: str
+    placed: bool
+    step_s: float
+    parts: int
+    poses: list[list[float]]
+    rays: list[list[float | None]]
+    stalled: list[int]
+    cells: list[int]
+    visited_at: list[int]
+
+
+def pack_trials(trials: Sequence[MovingTrial], *, placed: bool = True) -> list[PackedTrial]:
+    """Return trials in a form for JSON; `placed` is false if the robot's poses are unknown."""
+    pens = [pack_pen(pen) for pen in range(len(trials))]
+    if len(trials) == 1:
+        pens[0]["color"] = themed_color(Ink.OURS)
+    return [
+        {
+            "title": trial.title,
+            "label": trial.label,
+            "placed": placed,
+            **pens[pen],
+            **pack_shape(trial.shape),
+            "step_s": trial.step_s,
+            "parts": trial.parts,
+            "poses": np.round(trial.poses, _DIGITS).tolist(),
+            "rays": [pack_rays(row) for row in trial.rays.tolist()],
+            "stalled": trial.stalled.astype(int).tolist(),
+            "cells": list(trial.cells),
+            "visited_at": list(trial.visited_at),
+        }
+        for pen, trial in enumerate(trials)
+    ]
 
 
 def pack_pen(pen: int) -> PackedPen:

@@ -6,7 +6,7 @@ import itertools
 import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,12 @@ from realitygap.world import Arena, floor_shapes, things_in
 from ._moving import Moment, MovingTrial, extent, nearness, placed, ray_ends
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from matplotlib.text import Text
     from PIL.Image import Image
+
+A = TypeVar("A", bound="Artist")
 
 LABEL_COLORS = {"SIM": Ink.OURS, "TWIN": Ink.PEN3, "EMULATED": Ink.PEN5, "REAL": Ink.REACH}
 LETTERS = "ABCDEFGH"
@@ -117,17 +122,17 @@ class Screen:
         dots = width / self._wide
         pixels = [2 * round(width / 2), 2 * round(height * dots / 2)]  # video wants even numbers
         self._figure = Figure(figsize=(pixels[0] / dots, pixels[1] / dots), dpi=dots, facecolor=Ink.GROUND)
-        canvas: Any = FigureCanvasAgg(self._figure)
+        canvas: Any = FigureCanvasAgg(self._figure)  # without types in Matplotlib
         self._canvas = canvas
         height = pixels[1] / dots
-        self._all: Any = self._figure.add_axes((0, 0, 1, 1))
+        self._all = self._figure.add_axes((0, 0, 1, 1))
         self._all.set(xlim=(0, self._wide), ylim=(height, 0))
         self._all.set_axis_off()
         box = (_EDGE / self._wide, 1 - (_HEAD + up) / height, across / self._wide, up / height)
-        self._field: Any = self._figure.add_axes(box)
+        self._field = self._figure.add_axes(box)
         self._field.set(xlim=(left, right), ylim=(bottom, top))
         self._field.set_axis_off()
-        self._moving: list[tuple[Any, Any]] = []
+        self._moving: list[tuple[Axes, Artist]] = []
         self._draw_arena(trials[0].arena)
         self._draw_head()
         self._robots = [_Robot(trial, pen, several=self._several) for pen, trial in enumerate(trials)]
@@ -217,7 +222,7 @@ class Screen:
 
     def _draw_names(self, top: float) -> None:
         """Draw letter, pen, and name of each trial and its present coverage below the arena."""
-        self._words: list[Any] = []
+        self._words: list[Text] = []
         if not self._several:
             return
         wide = (self._wide - 2 * _EDGE) / self._columns
@@ -256,7 +261,7 @@ class Screen:
 
     # what moves
 
-    def _add(self, axes: Any, artist: Any) -> Any:
+    def _add(self, axes: Axes, artist: A) -> A:
         artist.set_animated(True)
         if artist.axes is None:
             axes.add_artist(artist)
@@ -348,7 +353,14 @@ class _Robot:
         )
         self._letter.set(ha="center", va="center_baseline")
         self._letter.set_bbox({"boxstyle": "circle,pad=0.22", "facecolor": color, "edgecolor": Ink.GROUND})
-        self.artists: list[Any] = [self._trail, self._body, self._blocked, self._rays, self._hits, self._nose]
+        self.artists: list[Artist] = [
+            self._trail,
+            self._body,
+            self._blocked,
+            self._rays,
+            self._hits,
+            self._nose,
+        ]
         if several:
             self.artists.append(self._letter)
 
@@ -384,7 +396,7 @@ class _Robot:
         self._letter.set_position((float(place[0]), float(place[1])))
 
 
-def _draw_shape(axes: Any, shape: Shape) -> None:
+def _draw_shape(axes: Axes, shape: Shape) -> None:
     """Draw a plain shape of an object in the arena."""
     if isinstance(shape, Line):
         points = np.array([*shape.points, shape.points[0]] if shape.closed else shape.points)

@@ -7,7 +7,7 @@ import warnings
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TypedDict
 
 from realitygap._version import __version__
 from realitygap.errors import did_you_mean, from_extra
@@ -17,6 +17,22 @@ from realitygap.report._tally import read_tally
 from realitygap.report._trial_figure import ChosenTrial, choose_trial
 from realitygap.robot_families import NetworkProgram, load, network_programs
 from realitygap.runs import genome_of
+
+
+class Origin(TypedDict):
+    """Where an exported network comes from."""
+
+    study: str
+    condition: str
+    replicate: int
+    generation: int
+    individual: int
+    label: str
+    fitness: float
+    coverage_line: float | None
+    coverage_ends: float | None
+    results_version: int
+    software: str
 
 
 def export_individual(
@@ -69,11 +85,16 @@ def export_individual(
             warnings.simplefilter("default", RecordWarning)
         tally = read_tally(folder)
     chosen = choose_trial(tally, condition, replicate, generation, individual, of_last=True)
-    origin = {
+    origin: Origin = {
         "study": str(tally.description.get("name", "")),
-        **{key: chosen.row[key] for key in ("condition", "replicate", "generation", "individual")},
+        "condition": chosen.row["condition"],
+        "replicate": chosen.row["replicate"],
+        "generation": chosen.row["generation"],
+        "individual": chosen.row["individual"],
         "label": chosen.label,
-        **{key: chosen.row[key] for key in ("fitness", "coverage_line", "coverage_ends")},
+        "fitness": chosen.row["fitness"],
+        "coverage_line": chosen.row["coverage_line"],
+        "coverage_ends": chosen.row["coverage_ends"],
         "results_version": tally.folder.results_version,
         "software": __version__,
     }
@@ -81,8 +102,8 @@ def export_individual(
     return out
 
 
-def _writer(out: Path, format: str | None) -> Callable[[ChosenTrial, Genome, dict[str, Any]], bytes]:
-    writers: dict[str, Callable[[ChosenTrial, Genome, dict[str, Any]], bytes]] = {
+def _writer(out: Path, format: str | None) -> Callable[[ChosenTrial, Genome, Origin], bytes]:
+    writers: dict[str, Callable[[ChosenTrial, Genome, Origin], bytes]] = {
         "json": _json,
         "onnx": _onnx,
         "graphml": _graphml,
@@ -108,12 +129,12 @@ def _names(chosen: ChosenTrial) -> tuple[tuple[str, ...], tuple[str, ...]]:
     return chosen.condition.network_inputs, chosen.condition.output_names
 
 
-def _json(chosen: ChosenTrial, genome: Genome, origin: dict[str, Any]) -> bytes:
+def _json(chosen: ChosenTrial, genome: Genome, origin: Origin) -> bytes:
     values = genome.to_dict() | interface_to_dict(genome.interface) | {"origin": origin}
     return to_text(values).encode("utf-8")
 
 
-def _onnx(chosen: ChosenTrial, genome: Genome, origin: dict[str, Any]) -> bytes:
+def _onnx(chosen: ChosenTrial, genome: Genome, origin: Origin) -> bytes:
     inputs, outputs = _names(chosen)
     network = genome.network()
     model = to_onnx(network, inputs[: network.n_inputs], outputs)
@@ -123,13 +144,13 @@ def _onnx(chosen: ChosenTrial, genome: Genome, origin: dict[str, Any]) -> bytes:
     return data
 
 
-def _c(chosen: ChosenTrial, genome: Genome, origin: dict[str, Any]) -> bytes:
+def _c(chosen: ChosenTrial, genome: Genome, origin: Origin) -> bytes:
     inputs, outputs = _names(chosen)
     network = genome.network()
     return to_c(network, inputs[: network.n_inputs], outputs, origin=origin).encode("ascii")
 
 
-def _program(program: NetworkProgram, chosen: ChosenTrial, genome: Genome, origin: dict[str, Any]) -> bytes:
+def _program(program: NetworkProgram, chosen: ChosenTrial, genome: Genome, origin: Origin) -> bytes:
     platform = chosen.condition.on
     text: str = load(program.write)(
         genome.network(), genome.interface, steps=platform.steps, step_s=platform.command_s, origin=origin
@@ -137,7 +158,7 @@ def _program(program: NetworkProgram, chosen: ChosenTrial, genome: Genome, origi
     return text.encode("ascii")
 
 
-def _graphml(chosen: ChosenTrial, genome: Genome, origin: dict[str, Any]) -> bytes:
+def _graphml(chosen: ChosenTrial, genome: Genome, origin: Origin) -> bytes:
     graph = to_networkx(genome, *_names(chosen))
     graph.graph |= origin
     buffer = io.BytesIO()

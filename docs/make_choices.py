@@ -13,6 +13,8 @@ import io
 import tempfile
 from pathlib import Path
 
+from written import write_files
+
 from realitygap import ResultsFolder, run_study
 from realitygap.report import compare_choices, draw_choices
 
@@ -40,10 +42,7 @@ def main() -> None:
     """Run the study and write both."""
     with tempfile.TemporaryDirectory() as temporary:
         folder = run_study("paper-choices", Path(temporary) / "paper-choices").folder
-        for path, text in ((DATA, table(folder)), (FIGURE, draw_choices(folder).svg + "\n")):
-            path.parent.mkdir(exist_ok=True)
-            path.write_text(text, "utf-8")
-            print(f"Written: {path}")
+        write_files({DATA: table(folder), FIGURE: draw_choices(folder).svg + "\n"})
 
 
 if __name__ == "__main__":

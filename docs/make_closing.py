@@ -22,6 +22,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from written import write_files
 
 from realitygap.errors import RealityGapError
 from realitygap.gap import mean_maximum_rank_violation
@@ -477,8 +478,6 @@ def main() -> None:
     parser.add_argument("folder", type=Path, nargs="?", help="results of `realitygap closing-the-gap`")
     parser.add_argument("--earlier", action="store_true", help="write the table of earlier runs instead")
     options = parser.parse_args()
-    TABLES.mkdir(parents=True, exist_ok=True)
-    FIGURES.mkdir(parents=True, exist_ok=True)
     if options.earlier:
         files = {TABLES / "earlier.csv": table(EARLIER_HEAD, earlier_table())}
     else:
@@ -487,9 +486,7 @@ def main() -> None:
         if options.folder is not None:
             drawn = draw_closing(summary)
             files |= {FIGURES / f"{name}.svg": drawing.svg + "\n" for name, drawing in drawn.items()}
-    for path, text in files.items():
-        path.write_text(text, "utf-8")
-        print(f"Written: {path}")
+    write_files(files)
 
 
 if __name__ == "__main__":

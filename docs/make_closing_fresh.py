@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from make_closing import csv_of, done_parts, results_in, table, verdicts
+from written import write_files
 
 from realitygap.report import draw_closing, goal_table, not_counted
 from realitygap.stats import Estimate, median_interval
@@ -192,18 +193,12 @@ def main() -> None:
             "again.csv": table(AGAIN_HEAD, again_table(stored_summary(), again)),
             "again-goals.csv": csv_of(goal_table(again)),
         }
-        for name, text in tables.items():
-            (TABLES / name).write_text(text, "utf-8")
-            print(f"Written: {TABLES / name}")
+        write_files({TABLES / name: text for name, text in tables.items()})
         return
     folder = options.folder
-    for place in (TABLES, FIGURES):
-        place.mkdir(parents=True, exist_ok=True)
     summary = stored_summary() if folder is None else results_in(folder)
     files = {TABLES / "summary.json": json.dumps(summary, separators=(",", ":")) + "\n", **texts(summary)}
-    for path, text in files.items():
-        path.write_text(text, "utf-8")
-        print(f"Written: {path}")
+    write_files(files)
 
 
 if __name__ == "__main__":

@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 from make_closing import csv_of, done_parts, results_in, table, verdicts
 from numpy.typing import NDArray
+from written import write_files
 
 from realitygap.report import draw_closing, family_table, goal_table
 
@@ -141,8 +142,6 @@ def main() -> None:
     parser.add_argument("--playground", action="store_true", help="results of the plan `playground`")
     options = parser.parse_args()
     place = TABLES / "playground" if options.playground else TABLES
-    for each in (place, FIGURES):
-        each.mkdir(parents=True, exist_ok=True)
     summary = (
         json.loads((place / "summary.json").read_text("utf-8"))
         if options.folder is None
@@ -162,9 +161,7 @@ def main() -> None:
         files |= {
             FIGURES / f"{name}.svg": drawing.svg + "\n" for name, drawing in draw_closing(summary).items()
         }
-    for path, text in files.items():
-        path.write_text(text, "utf-8")
-        print(f"Written: {path}")
+    write_files(files)
 
 
 if __name__ == "__main__":

@@ -20,6 +20,7 @@ from pathlib import Path
 
 import numpy as np
 import polars as pl
+from written import write_files
 
 from realitygap import ResultsFolder, run_study
 from realitygap.evolution import DISTANCES
@@ -255,15 +256,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--times", action="store_true", help="measure times instead")
     if parser.parse_args().times:
-        TIMES.write_text(times(), "utf-8")
-        print(f"Written: {TIMES}")
+        write_files({TIMES: times()})
         return
     with tempfile.TemporaryDirectory() as temporary:
         for target, files in zip((TABLES, FIGURES), make(Path(temporary)), strict=True):
-            target.mkdir(parents=True, exist_ok=True)
-            for name, text in files.items():
-                (target / name).write_text(text, "utf-8")
-                print(f"Written: {target / name}")
+            write_files({target / name: text for name, text in files.items()})
 
 
 if __name__ == "__main__":

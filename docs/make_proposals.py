@@ -15,6 +15,7 @@ import tempfile
 from pathlib import Path
 
 import polars as pl
+from written import write_files
 
 from realitygap import ResultsFolder, run_study
 from realitygap.report import compare_choices, compare_conditions, draw_choices
@@ -65,17 +66,15 @@ def main() -> None:
     """Run the studies and write their tables and figures."""
     parser = argparse.ArgumentParser(description="Tables and figures of the studies that the paper proposes.")
     parser.add_argument("studies", nargs="*", default=STUDIES, metavar="NAME", help=", ".join(STUDIES))
-    TABLES.mkdir(parents=True, exist_ok=True)
-    FIGURES.mkdir(parents=True, exist_ok=True)
     for name in parser.parse_args().studies:
         with tempfile.TemporaryDirectory() as temporary:
             folder = run_study(name, Path(temporary) / name).folder
-            for path, text in (
-                (TABLES / f"{name}.csv", table(folder)),
-                (FIGURES / f"{name}.svg", draw_choices(folder).svg + "\n"),
-            ):
-                path.write_text(text, "utf-8")
-                print(f"Written: {path}")
+            write_files(
+                {
+                    TABLES / f"{name}.csv": table(folder),
+                    FIGURES / f"{name}.svg": draw_choices(folder).svg + "\n",
+                }
+            )
 
 
 if __name__ == "__main__":

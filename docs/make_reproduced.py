@@ -19,6 +19,7 @@ from pathlib import Path
 
 import numpy as np
 import polars as pl
+from written import write_files
 
 from realitygap import ResultsFolder, run_study, write_report
 from realitygap.report import compare_conditions
@@ -187,10 +188,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as temporary:
         for target, files in zip((TABLES, FIGURES), make(Path(temporary)), strict=True):
             shutil.rmtree(target, ignore_errors=True)
-            target.mkdir(parents=True)
-            for name, text in files.items():
-                (target / name).write_text(text, "utf-8")
-                print(f"Written: {target / name}")
+            write_files({target / name: text for name, text in files.items()})
 
 
 if __name__ == "__main__":

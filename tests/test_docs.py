@@ -39,6 +39,7 @@ def _load(name):
     return sys.modules[name]
 
 
+_load("written")  # scripts import it
 make_outputs = _load("make_outputs")
 description_pages = _load("description_pages")
 task_pages = _load("task_pages")

@@ -20,7 +20,7 @@ from realitygap.runs import genome_of
 
 
 class Origin(TypedDict):
-    """Where an exported network comes from."""
+    """The origin of an exported network."""
 
     study: str
     condition: str

@@ -1,4 +1,4 @@
-"""Handling of Ctrl-C at moments at which Python would drop it."""
+"""Handling of Ctrl-C at moments at which Python would drop it, or at which it would break other code."""
 
 from __future__ import annotations
 
@@ -57,6 +57,38 @@ def kept_interrupts() -> Iterator[None]:
         _repeats.clear()
         if is_pending:
             raise KeyboardInterrupt
+
+
+@contextlib.contextmanager
+def held_interrupts() -> Iterator[None]:
+    """Hold Ctrl-C back until the end of a block; a second one is immediate.
+
+    In another library's code, such as a finalizer, it may be lost or become that library's own error. If another
+    handler is installed, and in threads other than the main one, nothing changes.
+
+    Raises:
+        KeyboardInterrupt: It came in the block.
+    """
+    is_main = threading.current_thread() is threading.main_thread()
+    handler = signal.getsignal(signal.SIGINT)
+    if not is_main or handler not in (signal.default_int_handler, on_interrupt):
+        yield
+        return
+    came = False
+
+    def note(*_: object) -> None:
+        nonlocal came
+        if came:
+            raise KeyboardInterrupt
+        came = True
+
+    signal.signal(signal.SIGINT, note)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, handler)
+    if came:
+        raise KeyboardInterrupt
 
 
 def on_interrupt(number: int, frame: FrameType | None) -> None:

@@ -5,7 +5,7 @@ import threading
 
 import pytest
 
-from realitygap.study._interrupts import held_interrupts
+from realitygap._interrupts import held_interrupts
 
 pytestmark = [
     pytest.mark.slow,

@@ -17,12 +17,12 @@ from pathlib import Path
 from typing import Any
 
 from realitygap._how_to_run import install_command
+from realitygap._interrupts import held_interrupts
 from realitygap.errors import ClusterError, StudyError
 from realitygap.records import Delivery, ResultsFolder
 from realitygap.runs import Condition
 
 from ._executors import ChunkTask, Listener
-from ._interrupts import held_interrupts
 from ._job_queue import JobQueue
 from ._order import CARRY_OUT, make_order
 

@@ -90,9 +90,9 @@ def test_the_page_has_the_table_and_the_figures_of_scores(folder, tmp_path):
 def test_first_screen_plays_the_best_trial_by_the_task(folder):
     tally = read_tally(folder)
     replay = _replay.content(tally, "wall")
-    run = next(each for each in replay["runs"] if each.name == "wall")
+    run = next(each for each in replay.runs if each.name == "wall")
     best = tally.rows_of("wall", run.replicate)["task_fitness"].max()
-    assert replay["lead"].caption.endswith(f"score of wall {best:#.4g}.")
+    assert replay.lead.caption.endswith(f"score of wall {best:#.4g}.")
 
 
 def test_a_study_of_coverage_has_no_figure_of_scores(tiny_study):

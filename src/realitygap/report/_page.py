@@ -39,6 +39,7 @@ from realitygap.report._paper_audit import AuditOnPage, paper_audit_content
 from realitygap.report._parameters import neat_parameters, settings_tables
 from realitygap.report._path_figure import draw_paths
 from realitygap.report._placed import FigureOnPage, hover_content, number_figures
+from realitygap.report._replay import ReplayOnPage
 from realitygap.report._replay import content as replay_content
 from realitygap.report._statistics_section import Statistics, statistics_content
 from realitygap.report._structures import selection_of
@@ -303,9 +304,9 @@ def _words_and_figures(tally: Tally) -> dict[str, Any]:
 # figures
 
 
-def _links(replay: Mapping[str, Any]) -> dict[tuple[str, int], str]:
+def _links(replay: ReplayOnPage) -> dict[tuple[str, int], str]:
     """Address of the best trial in the replay of each run that the page plays, by condition and replicate."""
-    return {(run.name, run.replicate): run.link for run in replay["runs"] if run.link}
+    return {(run.name, run.replicate): run.link for run in replay.runs if run.link}
 
 
 def _score_figures(tally: Tally) -> list[FigureOnPage]:

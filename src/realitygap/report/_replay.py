@@ -76,8 +76,48 @@ class Lead:
     caption: str
 
 
-def content(tally: Tally, lead: str) -> dict[str, Any]:
-    """Return the template's values for the replay, with a note on trials that cannot be recomputed and are left out.
+@dataclass(frozen=True)
+class ReplayOnPage:
+    """The replay of a page.
+
+    Attributes:
+        css: Style sheet of the player.
+        script: Script of the player.
+        script_hash: Hash of the script, as the page's policy names it.
+        data: Trials, for the script.
+        lead: Trial of the first screen; None without one.
+        runs: The typical run of each condition.
+        notes: Sentences on trials that are missing.
+        labels: Labels of the runs.
+    """
+
+    css: Markup
+    script: Markup
+    script_hash: str
+    data: Markup
+    lead: Lead | None
+    runs: list[_Run]
+    notes: list[str]
+    labels: list[str]
+
+    @property
+    def embedded(self) -> list[_Run]:
+        """The runs with trials that can be played."""
+        return [run for run in self.runs if run.data is not None]
+
+    @property
+    def n_trials(self) -> int:
+        """Number of trials that can be played."""
+        return sum(run.n_embedded for run in self.runs)
+
+    @property
+    def is_same_number(self) -> bool:
+        """True if all runs with trials have the same number of them."""
+        return len({run.n_embedded for run in self.embedded}) == 1
+
+
+def content(tally: Tally, lead: str) -> ReplayOnPage:
+    """Return the replay of a page, with a note on trials that cannot be recomputed and are left out.
 
     Args:
         tally: The study.
@@ -97,11 +137,11 @@ def content(tally: Tally, lead: str) -> dict[str, Any]:
     module = player.joinpath("player.js").read_text("utf-8").replace("export default { render };", "")
     # no module: those run last, after the script that looks for tables wider than the page
     script = f'"use strict";\n(() => {{\n{module}{template_text("replay.js")}}})();\n'
-    return {
-        "css": Markup(player.joinpath("player.css").read_text("utf-8") + template_text("replay.css")),
-        "script": Markup(script),
-        "script_hash": hash_of(script),
-        "data": as_json(
+    return ReplayOnPage(
+        css=Markup(player.joinpath("player.css").read_text("utf-8") + template_text("replay.css")),
+        script=Markup(script),
+        script_hash=hash_of(script),
+        data=as_json(
             {
                 "units": UNITS,
                 "pens": [pack_pen(pen) for pen in range(N_PENS)],
@@ -110,16 +150,11 @@ def content(tally: Tally, lead: str) -> dict[str, Any]:
                 "conditions": packed,
             }
         ),
-        "lead": first[2] if first else None,
-        "there": bool(packed),
-        "n_pens": N_PENS,
-        "runs": runs,
-        "notes": _notes(runs),
-        "n_trials": sum(run.n_embedded for run in runs),
-        "n_runs": len(packed),
-        "same_number": len({run.n_embedded for run in runs if run.data is not None}) == 1,
-        "labels": sorted({label_of(condition) for condition in candidates}),
-    }
+        lead=first[2] if first else None,
+        runs=runs,
+        notes=_notes(runs),
+        labels=sorted({label_of(condition) for condition in candidates}),
+    )
 
 
 def _notes(runs: Sequence[_Run]) -> list[str]:

@@ -18,6 +18,7 @@ import pytest
 
 from realitygap.cli import main
 from realitygap.cli._grid_editor import GridEdit, edit_cells
+from realitygap.cli._operator import ask_verdict
 from realitygap.records import LEDGER_NAME, Ledger
 from realitygap.world import paper_arena
 
@@ -434,3 +435,10 @@ def test_the_cursor_stays_in_the_grid():
     assert edit.press("enter") == "done"
     edit.press("c")
     assert edit.press("enter") is None, "an empty line is none"
+
+
+@pytest.mark.parametrize(("answers", "verdict"), [(["", "x", "D"], "driven"), (["later", "void"], "void")])
+def test_verdict_on_a_trial_is_asked_until_it_is_one(answers, verdict):
+    remaining = iter(answers)
+    assert ask_verdict(lambda: next(remaining)) == verdict
+    assert not list(remaining)

@@ -16,13 +16,13 @@ pytestmark = pytest.mark.slow
 
 
 def test_saved_trials_are_listed_corrected_voided_and_annotated(lab, visit):
-    file = lab.root / "gaps" / "first.jsonl"
+    file = lab.root / "gaps" / "first one.jsonl"
     file.parent.mkdir(parents=True)
     trials = [replace(trial(number), purpose="controller", cells=(13, 14)) for number in range(3)]
     write_observations(file, HEAD, trials)
     page = visit("gap")
     page.get_by_role("link", name="Saved trials").click()
-    page.get_by_role("link", name="gaps/first.jsonl").click()
+    page.get_by_role("link", name="gaps/first one.jsonl").click()
     page.get_by_text("3 trials", exact=True).wait_for()
     row = page.get_by_role("row").nth(2)
     row.get_by_role("checkbox").click()
@@ -47,8 +47,10 @@ def test_saved_trials_are_listed_corrected_voided_and_annotated(lab, visit):
 def test_only_plain_files_of_trials_in_the_folder_have_a_page(tmp_path):
     root, elsewhere = tmp_path / "lab", tmp_path / "elsewhere.jsonl"
     (root / "gaps").mkdir(parents=True)
+    (root / "moved" / "sim").mkdir(parents=True)
     write_observations(elsewhere, HEAD, [])
+    write_observations(root / "moved" / "sim" / "select.jsonl", HEAD, [])
     write_observations(root / "gaps" / "own.jsonl", HEAD, [])
     (root / "gaps" / "link.jsonl").symlink_to(elsewhere)
     (root / "log.jsonl").write_text("{}\n")
-    assert list(saved_files(root)) == ["gaps/own.jsonl"]
+    assert list(saved_files(root)) == ["gaps/own.jsonl", "moved/sim/select.jsonl"]

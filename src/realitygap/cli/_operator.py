@@ -102,6 +102,14 @@ def choose_operator(
     return PersonOperator(answers, note, to_stderr=quiet)
 
 
+def ask_verdict(ask: Callable[[], str]) -> Verdict:
+    """Ask until a person has decided about a trial that was cut off."""
+    while True:
+        answer = ask().lower()
+        if answer in ("v", "void", "d", "driven"):
+            return "void" if answer.startswith("v") else "driven"
+
+
 Note = Callable[[str, str, int | None], None]
 """Keeps a note: text, who, and the trial it is about."""
 
@@ -149,13 +157,8 @@ class PersonOperator(Operator):
         self._say(f"\nTrial {card.trial.trial}, {card.title}, was cut off: {problem}.")
         if self._answers.verdict is not None:
             return self._answers.verdict
-        while True:
-            answer = self._ask(
-                "v: void, drive it again; d: driven, count what it drew: ",
-                "--in-flight void or --in-flight driven",
-            ).lower()
-            if answer in ("v", "void", "d", "driven"):
-                return "void" if answer.startswith("v") else "driven"
+        words = "v: void, drive it again; d: driven, count what it drew: "
+        return ask_verdict(lambda: self._ask(words, "--in-flight void or --in-flight driven"))
 
     def place(self, card: Card) -> None:
         """Ask for the robot at its start, with the pen."""

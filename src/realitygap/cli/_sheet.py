@@ -10,7 +10,7 @@ from realitygap.records import NO_LINE
 from realitygap.trials import SheetObserver
 from realitygap.world import INCH
 
-from ._operator import pick_cells
+from ._operator import ask_verdict, pick_cells
 
 if TYPE_CHECKING:
     from realitygap.records import Observe
@@ -32,10 +32,8 @@ def _settle(problem: str, can_count: bool) -> Verdict:
     if not can_count:
         prompt(f"{problem} Enter", default="", show_default=False, err=True)
         return "void"
-    while True:
-        answer = prompt(f"{problem} v: void, drive it again; d: driven, count it", err=True).lower()
-        if answer in ("v", "void", "d", "driven"):
-            return "void" if answer.startswith("v") else "driven"
+    words = f"{problem} v: void, drive it again; d: driven, count it"
+    return ask_verdict(lambda: prompt(words, err=True))
 
 
 def _ask_for_start(plan: TrialPlan, arena: Arena, observe: Observe) -> None:

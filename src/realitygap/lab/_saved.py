@@ -18,17 +18,26 @@ LONGEST_TEXT = 1000
 
 
 def saved_files(root: Path) -> dict[str, Path]:
-    """Return the files of trials in a folder and the folders in it, by their path from it."""
-    folders = [root]
-    with contextlib.suppress(OSError):
-        folders += sorted(path for path in root.iterdir() if path.is_dir() and not path.is_symlink())
+    """Return the files of trials in a folder, and in folders down to the second level, by their path from it.
+
+    `transfer` saves trials in a folder of its folder.
+    """
+    folders = _folders(root)
     files: dict[str, Path] = {}
-    for folder in folders:
+    for folder in (root, *folders, *(path for parent in folders for path in _folders(parent))):
         for path in plain_files(folder, (".jsonl",)):
             with contextlib.suppress(RecordError):
                 if is_observations(path):
                     files[path.relative_to(root).as_posix()] = path
     return files
+
+
+def _folders(folder: Path) -> list[Path]:
+    """Return the folders in a folder, without links; none if it cannot be read."""
+    try:
+        return sorted(path for path in folder.iterdir() if path.is_dir() and not path.is_symlink())
+    except OSError:
+        return []
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Any
+from urllib.parse import quote
 
 from nicegui import run, ui
 from starlette.exceptions import HTTPException
@@ -31,7 +32,7 @@ def add_saved(lab: Lab) -> None:
         with framed(lab, "Saved trials", ""):
             hint("Trials of studies are on the page of each study.")
             for name in names:
-                ui.link(name, f"/saved/{name}")
+                ui.link(name, f"/saved/{quote(name)}")
             if not names:
                 ui.label("No saved trials yet. A gap or a calibration saves its trials.")
 

@@ -33,7 +33,7 @@ def check_is_in(page: Any) -> None:
     assert "token" not in page.url
 
 
-def test_printed_address_opens_the_lab_and_the_token_leaves_the_address_bar(lab, newcomer):
+def test_printed_address_and_the_file_with_it_open_the_lab(lab, newcomer, tmp_path):
     newcomer.goto(lab.entry(LOADED))
     newcomer.wait_for_url(lab.address + LOADED)
     check_is_in(newcomer)
@@ -42,29 +42,27 @@ def test_printed_address_opens_the_lab_and_the_token_leaves_the_address_bar(lab,
     cookie = next(each for each in newcomer.context.cookies() if each["name"].startswith("realitygap_lab"))
     assert cookie["httpOnly"]
     assert cookie["sameSite"] == "Strict"
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("what", ["token", "address"])
-def test_browser_without_the_token_sees_where_it_is_and_can_paste_it(lab, newcomer, what):
-    answer = newcomer.goto(lab.address + LOADED)
-    assert answer.status == 403
-    newcomer.get_by_role("heading", name="The lab needs its token").wait_for()
-    field = newcomer.get_by_label("Or paste the address or the token here")
-    field.fill("wrong")
-    newcomer.get_by_role("button", name="Open the lab").click()
-    newcomer.get_by_text("The token is not the one of this lab.").wait_for()
-    field.fill(lab.token if what == "token" else lab.entry())
-    newcomer.get_by_role("button", name="Open the lab").click()
-    check_is_in(newcomer)
-
-
-@pytest.mark.slow
-def test_file_with_the_address_opens_the_lab(lab, newcomer, tmp_path):
+    newcomer.context.clear_cookies()
     entry = tmp_path / "entry.html"
     entry.write_text(f'<!doctype html><meta http-equiv="refresh" content="0; url={lab.entry()}">')
     newcomer.goto(entry.as_uri())
     check_is_in(newcomer)
+
+
+@pytest.mark.slow
+def test_browser_without_the_token_sees_where_it_is_and_can_paste_it_or_the_address(lab, newcomer):
+    for what in (lab.token, lab.entry()):
+        newcomer.context.clear_cookies()
+        answer = newcomer.goto(lab.address + LOADED)
+        assert answer.status == 403
+        newcomer.get_by_role("heading", name="The lab needs its token").wait_for()
+        field = newcomer.get_by_label("Or paste the address or the token here")
+        field.fill("wrong")
+        newcomer.get_by_role("button", name="Open the lab").click()
+        newcomer.get_by_text("The token is not the one of this lab.").wait_for()
+        field.fill(what)
+        newcomer.get_by_role("button", name="Open the lab").click()
+        check_is_in(newcomer)
 
 
 @pytest.mark.slow
@@ -159,22 +157,19 @@ def make_report(root: Path, text: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("is_framed", [False, True])
-def test_hostile_report_gets_nothing(lab, visit, is_framed):
+def test_hostile_report_gets_nothing_in_a_tab_or_a_frame(lab, visit):
     make_report(lab.root, ATTACK.replace("LAB", lab.address))
     page = visit(LOADED, forgive=[""])  # the browser says what it refused
-    if is_framed:
-        page.evaluate(
-            "document.body.insertAdjacentHTML('beforeend', '<iframe src=\"/reports/foreign\"></iframe>')"
-        )
-        shown = page.query_selector("iframe").content_frame()
-        shown.wait_for_url("**/reports/foreign")
-    else:
-        shown = page.context.new_page()
-        shown.goto(lab.address + "reports/foreign")
-    shown.wait_for_function("document.title !== 'trying'", timeout=PATIENCE_MS)
-    assert shown.title() == NOTHING
-    shown.get_by_role("button", name="Send").evaluate("button => button.click()")
-    shown.get_by_role("link", name="Leave").evaluate("link => link.click()")
+    frame = '<iframe src="/reports/foreign"></iframe>'
+    page.evaluate("frame => document.body.insertAdjacentHTML('beforeend', frame)", frame)
+    framed = page.query_selector("iframe").content_frame()
+    framed.wait_for_url("**/reports/foreign")
+    tab = page.context.new_page()
+    tab.goto(lab.address + "reports/foreign")
+    for shown in (framed, tab):
+        shown.wait_for_function("document.title !== 'trying'", timeout=PATIENCE_MS)
+        assert shown.title() == NOTHING
+        shown.get_by_role("button", name="Send").evaluate("button => button.click()")
+        shown.get_by_role("link", name="Leave").evaluate("link => link.click()")
     page.wait_for_timeout(500)
     assert page.url == lab.address + LOADED

@@ -18,7 +18,7 @@ import pytest
 
 from realitygap.cli import main
 from realitygap.cli._grid_editor import GridEdit, edit_cells
-from realitygap.cli._operator import ask_verdict
+from realitygap.cli._keys import ask_verdict
 from realitygap.records import LEDGER_NAME, Ledger
 from realitygap.world import paper_arena
 
@@ -362,7 +362,7 @@ def test_an_unattended_run_tells_of_each_generation(tmp_path, study, monkeypatch
     assert re.search(r"^robot, run 0, generation 0: 2 trials, at most \d+ cells\.$", told.err, re.MULTILINE)
     quiet = run("--out", str(tmp_path / "quiet"), "--json")
     assert quiet.err == "1 of 1 runs on a robot are complete. 2 trials were driven just now.\n"
-    monkeypatch.setattr("realitygap.cli._telling._SILENCE_S", 0.0)
+    monkeypatch.setattr("realitygap.cli._operator._SILENCE_S", 0.0)
     assert "Trial 2, robot, run 0, generation 0, individual 1: " in run("--out", str(tmp_path / "slow")).err
 
 

@@ -44,7 +44,6 @@ PRINTED_BY = {
     "cli/_camera.py": ("calibrate", "drive", "gap"),
     "cli/_demo.py": ("demo",),
     "cli/_operator.py": ("drive",),
-    "cli/_telling.py": ("drive",),
     "emulator/_serve.py": ("emulate scribbler",),
     "emulator/command.py": ("emulate scribbler",),
     "gap/_measure.py": ("gap",),

@@ -126,7 +126,6 @@ def bench(
 
 
 def _check_task(task: str) -> None:
-
     known = [*realitygap.tasks.CLASSICAL_TASKS, *realitygap.tasks.MAZE_TASKS, "realism"]
     if task not in known:
         near = did_you_mean(task, known)
@@ -159,7 +158,6 @@ def _changed_setting(text: str) -> tuple[str, Any]:
 def _bench_task(
     task: str, settings: str, seeds: int | None, seed: int, changes: dict[str, Any], *, as_json: bool
 ) -> None:
-
     from ._progress import RunsBar
 
     seeds = DEFAULT_SEEDS if seeds is None else seeds
@@ -195,7 +193,6 @@ def _bench_task(
 def _bench_maze(
     task: str, settings: str, seeds: int | None, seed: int, changes: dict[str, Any], *, as_json: bool
 ) -> None:
-
     from ._progress import RunsBar
 
     with RunsBar(quiet=as_json) as bar:
@@ -233,7 +230,6 @@ def _shown(key: str, value: float | None) -> str:
 
 
 def _bench_realism(seconds: float, *, as_json: bool) -> None:
-
     figures = realitygap.study.measure_realism(seconds)
     if as_json:
         print_json(figures)
@@ -251,7 +247,6 @@ def _bench_realism(seconds: float, *, as_json: bool) -> None:
 
 
 def _bench_speed(seconds: float, *, as_json: bool) -> None:
-
     figures = realitygap.study.measure_speed(seconds)
     if as_json:
         print_json(figures)

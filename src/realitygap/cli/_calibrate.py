@@ -19,6 +19,7 @@ from realitygap.orders import ONLY_ROBOTS, CalibrateOrder
 from ._camera import CAMERA_HELP, under_camera
 from ._code import AllowPlatforms
 from ._json import print_json
+from ._observer import sheet_observer
 from ._order import command_of
 
 if TYPE_CHECKING:
@@ -70,7 +71,6 @@ def _check(order: CalibrateOrder, camera: str | None, figure: Path | None) -> No
 def _measured(order: CalibrateOrder, camera: str | None, *, quiet: bool) -> Calibration:
     """Drive the trials, and fit."""
     from ._calibration_operator import CalibrationOperator
-    from ._sheet import sheet_observer
 
     robot = order.robot or ""
     base = order.base or realitygap.platforms.class_of(robot).base_robot

@@ -10,9 +10,9 @@ import realitygap
 from realitygap._terminal import echo
 from realitygap.orders import ClosingOrder
 
-from ._browser import show_page
 from ._json import print_json
 from ._order import command_of
+from ._results import show_page
 
 if TYPE_CHECKING:
     from realitygap.study import ClosingProgress

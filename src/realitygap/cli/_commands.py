@@ -69,7 +69,7 @@ SECTIONS: dict[str, tuple[Command, ...]] = {
         Command("transfer", "Compare strategies that transfer controllers.", "_transfer", "transfer"),
         Command("closing-the-gap", "Measure and shrink the gap to many robots.", "_closing", "closing"),
         Command("try", "Drive one exported controller on any platform.", "_try", "try_genome"),
-        Command("again", "Repeat a measurement from its result.", "_again", "again", True),
+        Command("again", "Repeat a measurement from its result.", "_order", "again", True),
         Command("twin", "Sample and inspect MuJoCo twins (pseudo-reality).", "_twin", "twin"),
     ),
     "Use a robot": (

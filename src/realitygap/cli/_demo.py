@@ -15,7 +15,7 @@ from realitygap.errors import StudyError
 from realitygap.robot_families import default_family
 
 from ._app import app_for
-from ._browser import show_page
+from ._results import show_page
 
 _FAMILY = default_family()
 _ROBOT = f"{_FAMILY.named(_FAMILY.emulated)}&speed=off"

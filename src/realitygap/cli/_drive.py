@@ -11,11 +11,9 @@ import realitygap
 from realitygap._terminal import echo
 from realitygap.robot_families import ports_by_family
 
-from ._browser import show_page
 from ._camera import CAMERA_HELP, operated_under_camera
 from ._code import ALLOW_CODE_HELP, code_permission
-from ._operator import Answers, choose_operator
-from ._results import written_report
+from ._results import show_page, written_report
 from ._study import print_result
 
 
@@ -89,6 +87,8 @@ def drive(
 
     In Python: realitygap.drive_study("paper-robot", "/dev/rfcomm0", operator=operator)
     """
+    from ._operator import Answers, choose_operator
+
     answers = Answers(who, in_flight, score, wait=not no_wait, despite_preflight=despite_preflight)
     resolved = realitygap.study.load_study(study, seed=seed, replicates=replicates, randomize=randomize)
     realitygap.study.check_has_robot(resolved)

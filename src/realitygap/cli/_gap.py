@@ -16,8 +16,8 @@ from realitygap.orders import ONLY_ROBOTS, GapOrder, PlanOrder
 from ._camera import CAMERA_HELP, under_camera
 from ._code import AllowPlatforms
 from ._json import print_json
+from ._observer import attending_observer
 from ._order import command_of
-from ._target import attending_observer
 
 if TYPE_CHECKING:
     from realitygap.gap import GapResult, ReplayError, Why
@@ -80,7 +80,6 @@ def gap(
 
 
 def _print(result: GapResult, replay: ReplayError | None) -> None:
-
     one, other = result.trials
     echo(
         f"The transfer gap from {result.source} ({result.labels[0]}) to {result.target} ({result.labels[1]}): "

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal
 
+from realitygap._terminal import draw
+
+from ._keys import single_keys
+
 if TYPE_CHECKING:
-    from realitygap.world import Grid, Pose
+    from realitygap.world import Arena, Grid, Pose
 
 Outcome = Literal["done", "later"]
 
@@ -135,3 +139,11 @@ def edit_cells(
             return None
         lines = edit.lines()
         write(f"\x1b[{len(lines)}A\x1b[J" + "\n".join(lines) + "\n")
+
+
+def pick_cells(
+    arena: Arena, cells: Sequence[int] = (), *, write: Callable[[str], None] | None = None
+) -> list[int] | None:
+    """Return cells picked in the terminal; None for later."""
+    with single_keys() as keys:
+        return edit_cells(arena.grid, arena.start, keys.read, write or draw, cells)

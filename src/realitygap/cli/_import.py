@@ -113,7 +113,6 @@ def import_log(
 
 
 def _print(mapped: Sequence[MappedLog], out: Path, report: ImportReport) -> None:
-
     log_map = mapped[0].log_map
     origins = dict.fromkeys(log.origin for log in mapped)
     trials = "1 trial" if report.n_trials == 1 else f"{report.n_trials:,} trials"

@@ -1,4 +1,4 @@
-"""Lines and single keys from a terminal."""
+"""Lines, decisions, and single keys from a terminal."""
 
 from __future__ import annotations
 
@@ -6,8 +6,11 @@ import contextlib
 import os
 import select
 import sys
-from collections.abc import Iterator
-from typing import Any
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from realitygap.trials import Verdict
 
 _NAMES = {
     "\x1b[A": "up", "\x1b[B": "down", "\x1b[C": "right", "\x1b[D": "left",
@@ -117,3 +120,11 @@ else:
             yield Keys(descriptor)
         finally:
             termios.tcsetattr(descriptor, termios.TCSANOW, before)
+
+
+def ask_verdict(ask: Callable[[], str]) -> Verdict:
+    """Ask until a person has decided about a trial that was cut off."""
+    while True:
+        answer = ask().lower()
+        if answer in ("v", "void", "d", "driven"):
+            return "void" if answer.startswith("v") else "driven"

@@ -1,32 +1,38 @@
-"""The operator of a physical study: a person at a terminal, or none if the robot is emulated."""
+"""Operators of a physical study: a person at a terminal, or none if the robot is emulated."""
 
 from __future__ import annotations
 
 import getpass
 import math
 import sys
+import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import realitygap
 from realitygap._terminal import draw, echo
 from realitygap.errors import StudyError
-from realitygap.trials import Operator, WitnessObserver
+from realitygap.trials import Card, Operator, Preflight, WitnessObserver
 
-from ._grid_editor import edit_cells
-from ._keys import read_line, single_keys
+from ._grid_editor import pick_cells
+from ._keys import ask_verdict, read_line, single_keys
 
 if TYPE_CHECKING:
-    from realitygap.records import Score, TrialRecord
+    from realitygap.records import Score, Trial, TrialRecord
     from realitygap.robots import Command, Observation, Robot
-    from realitygap.trials import Card, Preflight, Verdict
+    from realitygap.trials import Verdict
     from realitygap.world import Arena
 
 _ABORTING = ("space", "escape", "q")
 
 _ARROWS = ">/^\\</v\\"
+
+
+_SILENCE_S = 10.0
+"""Time without a message after which the next trial is reported, too."""
 
 
 @dataclass(frozen=True)
@@ -81,8 +87,6 @@ def choose_operator(
             are not reported.
     """
     if realitygap.robots.is_in_this_program(port) or witness is not None:
-        from ._telling import TellingOperator
-
         remote = (
             None
             if witness is None or realitygap.robots.is_in_this_program(port)
@@ -100,14 +104,6 @@ def choose_operator(
             ledger.note(text, who, trial)
 
     return PersonOperator(answers, note, to_stderr=quiet)
-
-
-def ask_verdict(ask: Callable[[], str]) -> Verdict:
-    """Ask until a person has decided about a trial that was cut off."""
-    while True:
-        answer = ask().lower()
-        if answer in ("v", "void", "d", "driven"):
-            return "void" if answer.startswith("v") else "driven"
 
 
 Note = Callable[[str, str, int | None], None]
@@ -244,7 +240,6 @@ class PersonOperator(Operator):
     # inside
 
     def _pick(self, card: Card) -> Score | None:
-
         self._say(f"\nTrial {card.trial.trial}, {card.title}, pen: {card.pen}")
         cells = pick_cells(card.arena, write=lambda codes: draw(codes, err=self._to_stderr))
         return None if cells is None else realitygap.records.Score(cells, self._answers.name)
@@ -264,14 +259,6 @@ class PersonOperator(Operator):
 
     def _say(self, text: str, *, nl: bool = True) -> None:
         echo(text, nl=nl, err=self._to_stderr)
-
-
-def pick_cells(
-    arena: Arena, cells: Sequence[int] = (), *, write: Callable[[str], None] | None = None
-) -> list[int] | None:
-    """Return cells picked in the terminal; None for later."""
-    with single_keys() as keys:
-        return edit_cells(arena.grid, arena.start, keys.read, write or draw, cells)
 
 
 def sketch(arena: Arena) -> str:
@@ -296,3 +283,47 @@ def sketch(arena: Arena) -> str:
     lines.append(lines[0])
     lines.append(f"Start ({_ARROWS[way]}): {realitygap.trials.start_words(arena)}")
     return "\n".join(lines)
+
+
+class TellingOperator(Operator):
+    """An operator that reports each closed generation, and each trial if that takes long."""
+
+    _told = 0.0
+
+    def accept(self, preflight: Preflight) -> bool:
+        """Report what speaks against driving if it drives all the same."""
+        accepts = super().accept(preflight)
+        for problem in preflight.problems if accepts else ():
+            self._say(f"Against driving: {problem}. The robot drives anyway (--despite-preflight).")
+        return accepts
+
+    def place(self, card: Card) -> None:
+        """Put the robot at the start."""
+        self._told = self._told or time.monotonic()
+        super().place(card)
+
+    def drawn(self, card: Card, record: TrialRecord) -> Score | None:
+        """Return the cells along the driven line."""
+        score = super().drawn(card, record)
+        if score is not None and time.monotonic() - self._told > _SILENCE_S:
+            self._say(f"Trial {card.trial.trial}, {card.title}: {len(set(score.cells))} cells.")
+        return score
+
+    def close(self, cards: Sequence[Card]) -> Sequence[int]:
+        """Close it."""
+        trials = sorted((card.trial for card in cards), key=_run)
+        for (condition, replicate, generation), group in groupby(trials, key=_run):
+            counts = [len(trial.cells or ()) for trial in group]
+            self._say(
+                f"{condition}, run {replicate}, generation {generation}: {len(counts)} trials, at most {max(counts)} "
+                "cells."
+            )
+        return super().close(cards)
+
+    def _say(self, text: str) -> None:
+        echo(text, err=True)
+        self._told = time.monotonic()
+
+
+def _run(trial: Trial) -> tuple[str, int, int]:
+    return trial.condition, trial.replicate, trial.generation

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+import webbrowser
 from pathlib import Path
 from typing import Annotated
 
@@ -10,8 +11,6 @@ import typer
 
 import realitygap
 from realitygap._terminal import echo
-
-from ._browser import show_page
 
 Folder = Annotated[Path, typer.Argument(metavar="DIR", help="Folder of results, such as results/paper.")]
 
@@ -71,3 +70,14 @@ def digest(folder: Folder) -> None:
     echo(results.digest())
     if results.missing_note is not None:
         echo(f"realitygap: note: {results.missing_note}", err=True)
+
+
+def show_page(path: Path) -> None:
+    """Open a page in the user's browser; if there is no browser, print the page's address on standard error."""
+    address = path.resolve().as_uri()
+    try:
+        opened = webbrowser.open(address)
+    except (webbrowser.Error, OSError):
+        opened = False
+    if not opened:
+        echo(f"realitygap: note: no browser could be opened here. The page is at {address}", err=True)

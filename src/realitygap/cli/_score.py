@@ -14,8 +14,10 @@ import realitygap
 from realitygap._terminal import echo, prompt
 from realitygap.errors import StudyError
 
+from ._grid_editor import pick_cells
 from ._json import print_json
 from ._print_sheet import sheet_layout, study_sheet
+from ._trials import _Titles
 
 if TYPE_CHECKING:
     from realitygap.records import Ledger, Score, ScoreRole, Trial
@@ -153,7 +155,6 @@ def score(
 
 
 def _only_show(photo: Path, arena: str, pens: str | None, overlay: Path | None, *, as_json: bool) -> None:
-
     data = realitygap.vision.photo_bytes(photo)
     found = realitygap.vision.score_sheet(realitygap.vision.read_photo(data), sheet_layout(arena, pens, None))
     if overlay is not None:
@@ -203,9 +204,6 @@ def _score_trials(
     yes: bool,
     as_json: bool,
 ) -> None:
-
-    from ._trials import _Titles
-
     arena, pens = study_sheet(folder, on_sheet.waiting[0].condition)
     titles = _Titles(folder)
     data = realitygap.vision.photo_bytes(photo)
@@ -286,8 +284,6 @@ def _confirmed(
     on_sheet: SheetTrials, traces: dict[int, TraceScore], photo: Path, data: bytes, who: str, arena: Any
 ) -> Iterator[dict[int, Score]]:
     """Yield the cells of each trial, as the operator at the terminal confirms them."""
-    from ._operator import pick_cells
-
     for trial in on_sheet.waiting:
         trace = traces[trial.pen]
         cells: tuple[int, ...] | None = trace.cells
@@ -310,7 +306,6 @@ def _answer(trial: Trial, trace: TraceScore) -> str:
 
 
 def _score_of(trace: TraceScore, cells: tuple[int, ...], photo: Path, data: bytes, who: str) -> Score:
-
     count = realitygap.records.PhotoCount(
         photo.name, realitygap.vision.photo_hash(data), trace.cells, trace.doubtful, is_confirmed=True
     )

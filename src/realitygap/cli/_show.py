@@ -196,7 +196,6 @@ def _movie(
     speed: float | None,
     numbers: dict[str, Any],
 ) -> Path:
-
     if not names:
         raise StudyError(
             f"No results folder. Name one: realitygap show movie results/paper -o {shlex.quote(str(out))}"
@@ -214,7 +213,6 @@ def _divergence(
     repeats: int | None,
     numbers: dict[str, Any],
 ) -> Path:
-
     if name is None or against is None:
         raise StudyError(
             "No results folder, or no second condition or platform. For example: realitygap show divergence "

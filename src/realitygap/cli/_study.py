@@ -15,10 +15,9 @@ from realitygap._terminal import echo
 from realitygap.errors import StudyError
 from realitygap.orders import ClosingOrder
 
-from ._browser import show_page
 from ._code import ALLOW_CODE_HELP, code_permission
 from ._json import print_json
-from ._results import written_report
+from ._results import show_page, written_report
 
 if TYPE_CHECKING:
     from realitygap.records import ResultsFolder

@@ -294,7 +294,6 @@ def _marks(
     corner_size: float | None,
     corner_inset: float | None,
 ) -> Marks:
-
     place = (
         realitygap.world.load_arena(arena or "paper") if wanted is None or arena is not None else wanted.arena
     )
@@ -334,7 +333,6 @@ def _refuse_toml(path: Path) -> None:
 
 
 def _tracked(source: Source, marks: Marks, seconds: float | None) -> Tracked:
-
     try:
         tracker = realitygap.vision.Tracker(marks.tag)
         try:
@@ -376,7 +374,6 @@ def _write(
 
 
 def _save(path: Path, text: str) -> None:
-
     realitygap.records.write_whole(path, text.encode())
 
 
@@ -389,7 +386,6 @@ def _enter(
     told: str,
     role: ScoreRole,
 ) -> None:
-
     with contextlib.ExitStack() as stack:  # a file that does not do is refused before the ledger is written
         file = (
             None

@@ -13,8 +13,8 @@ from realitygap.orders import TransferOrder
 
 from ._code import AllowPlatforms
 from ._json import print_json
+from ._observer import attending_observer
 from ._order import command_of
-from ._target import attending_observer
 
 if TYPE_CHECKING:
     from realitygap.stats import Estimate

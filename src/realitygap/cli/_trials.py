@@ -17,6 +17,7 @@ from realitygap._terminal import echo
 from realitygap.errors import LedgerError, StudyError, did_you_mean
 
 from ._export_trials import export
+from ._grid_editor import pick_cells
 from ._json import print_json
 
 if TYPE_CHECKING:
@@ -277,8 +278,6 @@ def _read_file(opened: Ledger | TrialLog, path: Path) -> dict[int, list[int]]:
 
 def _pick(opened: Ledger | TrialLog, trial: str | None, role: ScoreRole) -> Iterator[dict[int, list[int]]]:
     """Yield cells picked in the terminal, of one trial or, one after the other, of all that wait."""
-    from ._operator import pick_cells
-
     if not sys.stdin.isatty():
         raise StudyError("There is no terminal in which to pick cells. Give --cells or --file.")
     for number, title, arena, cells in _waiting(opened, trial, role):

@@ -13,8 +13,8 @@ from realitygap.orders import TryOrder
 
 from ._code import AllowPlatforms
 from ._json import print_json
+from ._observer import attending_observer
 from ._order import command_of
-from ._target import attending_observer
 
 
 @command_of(TryOrder)

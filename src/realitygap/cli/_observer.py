@@ -1,21 +1,36 @@
-"""The observer of a robot that a person at a terminal looks at: they pick the cells that its line crosses."""
+"""The observer of a robot at a terminal: a person, who picks the cells that its line crosses."""
 
 from __future__ import annotations
 
 import math
+import sys
 from typing import TYPE_CHECKING
 
+import realitygap
 from realitygap._terminal import prompt
-from realitygap.records import NO_LINE
-from realitygap.trials import SheetObserver
-from realitygap.world import INCH
 
-from ._operator import ask_verdict, pick_cells
+from ._grid_editor import pick_cells
+from ._keys import ask_verdict
 
 if TYPE_CHECKING:
     from realitygap.records import Observe
-    from realitygap.trials import TrialPlan, Verdict
+    from realitygap.trials import PortObserver, SheetObserver, TrialPlan, Verdict
     from realitygap.world import Arena
+
+
+def attending_observer(spec: str, witness: str | None) -> PortObserver | None:
+    """Return the person at the terminal, if there is one and the robot has no witness.
+
+    Raises:
+        StudyError: There is no such platform.
+    """
+    if (
+        witness is not None
+        or not sys.stdin.isatty()
+        or not realitygap.platforms.platform_of(spec).needs_person
+    ):
+        return None
+    return sheet_observer(asks_for_start=True)
 
 
 def sheet_observer(*, asks_for_start: bool) -> SheetObserver:
@@ -24,7 +39,8 @@ def sheet_observer(*, asks_for_start: bool) -> SheetObserver:
     Args:
         asks_for_start: Whether to ask for the robot at the start of each trial; else that was asked before.
     """
-    return SheetObserver(pick_cells, NO_LINE, _ask_for_start if asks_for_start else None, _settle)
+    ask = _ask_for_start if asks_for_start else None
+    return realitygap.trials.SheetObserver(pick_cells, realitygap.records.NO_LINE, ask, _settle)
 
 
 def _settle(problem: str, can_count: bool) -> Verdict:
@@ -40,7 +56,8 @@ def _ask_for_start(plan: TrialPlan, arena: Arena, observe: Observe) -> None:
     """Ask for the robot at the start of a trial, and wait."""
     sheet = ", with a fresh sheet below" if observe in ("cells", "encoders") else ""
     start = plan.start or arena.start
-    x, y, heading = start.x / INCH, start.y / INCH, math.degrees(start.heading)
+    inch = realitygap.world.INCH
+    x, y, heading = start.x / inch, start.y / inch, math.degrees(start.heading)
     prompt(
         f"Put the robot {x:.1f} in from the left and {y:.1f} in from the lower wall, its front {heading:.0f} "
         f"degrees counter-clockwise from the long wall{sheet}. Enter",

@@ -14,9 +14,9 @@ import typer
 import realitygap
 from realitygap._terminal import draw, echo
 from realitygap.errors import StudyError
-from realitygap.orders import ONLY_ROBOTS, CalibrateOrder
+from realitygap.orders import CalibrateOrder
 
-from ._camera import CAMERA_HELP, under_camera
+from ._camera import CameraOfRobots, under_camera
 from ._code import AllowPlatforms
 from ._json import print_json
 from ._observer import sheet_observer
@@ -29,9 +29,7 @@ if TYPE_CHECKING:
 @command_of(CalibrateOrder)
 def calibrate(
     order: CalibrateOrder,
-    camera: Annotated[
-        str | None, typer.Option(metavar="CAMERA", help=CAMERA_HELP, rich_help_panel=ONLY_ROBOTS)
-    ] = None,
+    camera: CameraOfRobots = None,
     figure: Annotated[
         Path | None,
         typer.Option(

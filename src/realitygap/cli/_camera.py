@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
+
+import typer
 
 import realitygap
 from realitygap._terminal import echo
 from realitygap.errors import StudyError
+from realitygap.orders import ONLY_ROBOTS
 
 if TYPE_CHECKING:
     from realitygap.study import Study
@@ -16,9 +19,14 @@ if TYPE_CHECKING:
     from realitygap.vision import Marks
     from realitygap.world import Arena
 
-CAMERA_HELP = (
+_HELP = (
     'Overhead camera by number, with options of realitygap track: "0?tag=10&tag-height=0.1&lens=cam.toml".'
 )
+
+Camera = Annotated[str | None, typer.Option(metavar="CAMERA", help=_HELP)]
+CameraOfRobots = Annotated[
+    str | None, typer.Option(metavar="CAMERA", help=_HELP, rich_help_panel=ONLY_ROBOTS)
+]
 
 
 @contextlib.contextmanager

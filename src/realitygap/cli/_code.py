@@ -17,7 +17,13 @@ if TYPE_CHECKING:
     from realitygap.study import AllowCode
     from realitygap.tasks import PythonTask
 
-ALLOW_CODE_HELP = "Run the Python files of tasks without asking. The answer is not remembered."
+AllowTasks = Annotated[
+    bool,
+    typer.Option(
+        "--allow-code", help="Run the Python files of tasks without asking. The answer is not remembered."
+    ),
+]
+"""The option of commands that run studies."""
 
 
 def _allow_platforms(wanted: bool) -> None:

@@ -11,10 +11,10 @@ import realitygap
 from realitygap._terminal import echo
 from realitygap.robot_families import ports_by_family
 
-from ._camera import CAMERA_HELP, operated_under_camera
-from ._code import ALLOW_CODE_HELP, code_permission
+from ._camera import Camera, operated_under_camera
+from ._code import AllowTasks, code_permission
 from ._results import show_page, written_report
-from ._study import print_result
+from ._study import Replicates, StudyFolder, StudySeed, print_result
 
 
 def drive(
@@ -31,15 +31,9 @@ def drive(
             help=f"{ports_by_family()} A port emulator://HOST is an emulated robot in this program.",
         ),
     ],
-    replicates: Annotated[
-        int | None, typer.Option(min=1, help="Runs per condition. [default: from the study]")
-    ] = None,
-    out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Folder for the results. [default: results/NAME]")
-    ] = None,
-    seed: Annotated[
-        int | None, typer.Option(min=0, help="Seed of the study. [default: from the study]")
-    ] = None,
+    replicates: Replicates = None,
+    out: StudyFolder = None,
+    seed: StudySeed = None,
     randomize: Annotated[
         str | None, typer.Option(metavar="HOW", help="Value of --randomize in `realitygap run`, if any.")
     ] = None,
@@ -50,7 +44,7 @@ def drive(
             help="Witness of an emulator in another program. It places the robot and observes its line.",
         ),
     ] = None,
-    camera: Annotated[str | None, typer.Option(metavar="CAMERA", help=CAMERA_HELP)] = None,
+    camera: Camera = None,
     in_flight: Annotated[
         str | None,
         typer.Option(
@@ -70,7 +64,7 @@ def drive(
         str | None,
         typer.Option(metavar="NAME", help="Name to record with each score. [default: your account's name]"),
     ] = None,
-    allow_code: Annotated[bool, typer.Option("--allow-code", help=ALLOW_CODE_HELP)] = False,
+    allow_code: AllowTasks = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
     open_page: Annotated[
         bool, typer.Option("--open", help="When done, write the report and show it in the browser.")

@@ -11,9 +11,9 @@ import typer
 import realitygap
 from realitygap._terminal import echo
 from realitygap._wording import bracketed, counted, p_equation, reproduces
-from realitygap.orders import ONLY_ROBOTS, GapOrder, PlanOrder
+from realitygap.orders import GapOrder, PlanOrder
 
-from ._camera import CAMERA_HELP, under_camera
+from ._camera import CameraOfRobots, under_camera
 from ._code import AllowPlatforms
 from ._json import print_json
 from ._observer import attending_observer
@@ -28,9 +28,7 @@ if TYPE_CHECKING:
 @command_of(GapOrder)
 def gap(
     order: GapOrder,
-    camera: Annotated[
-        str | None, typer.Option(metavar="CAMERA", help=CAMERA_HELP, rich_help_panel=ONLY_ROBOTS)
-    ] = None,
+    camera: CameraOfRobots = None,
     report: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Page to write, with figures and tables (.html).")
     ] = None,

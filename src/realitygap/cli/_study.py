@@ -15,7 +15,7 @@ from realitygap._terminal import echo
 from realitygap.errors import StudyError
 from realitygap.orders import ClosingOrder
 
-from ._code import ALLOW_CODE_HELP, code_permission
+from ._code import AllowTasks, code_permission
 from ._json import print_json
 from ._results import show_page, written_report
 
@@ -26,6 +26,12 @@ if TYPE_CHECKING:
 
 _COMPUTING = "Computing"
 
+Replicates = Annotated[int | None, typer.Option(min=1, help="Runs per condition. [default: from the study]")]
+StudyFolder = Annotated[
+    Path | None, typer.Option(metavar="DIR", help="Folder for the results. [default: results/NAME]")
+]
+StudySeed = Annotated[int | None, typer.Option(min=0, help="Seed of the study. [default: from the study]")]
+
 
 def run(
     study: Annotated[
@@ -35,15 +41,9 @@ def run(
             help="Name of a study, such as paper, paper-choices or distances; or a study file (.toml).",
         ),
     ],
-    replicates: Annotated[
-        int | None, typer.Option(min=1, help="Runs per condition. [default: from the study]")
-    ] = None,
-    out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Folder for the results. [default: results/NAME]")
-    ] = None,
-    seed: Annotated[
-        int | None, typer.Option(min=0, help="Seed of the study. [default: from the study]")
-    ] = None,
+    replicates: Replicates = None,
+    out: StudyFolder = None,
+    seed: StudySeed = None,
     randomize: Annotated[
         str | None,
         typer.Option(
@@ -76,7 +76,7 @@ def run(
             rich_help_panel=_COMPUTING,
         ),
     ] = None,
-    allow_code: Annotated[bool, typer.Option("--allow-code", help=ALLOW_CODE_HELP)] = False,
+    allow_code: AllowTasks = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
     open_page: Annotated[
         bool, typer.Option("--open", help="When done, write the report and show it in the browser.")

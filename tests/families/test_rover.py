@@ -18,6 +18,7 @@ from realitygap.robots import list_ports, open_on, split_port
 from realitygap.study import calibrate, gap_between, parse_study
 from realitygap.testing import check_robot
 from realitygap.world import load_robot, paper_arena, robot_names
+from tests.lab.conftest import RunningLab
 
 PORT = "rover:emulator://rover"
 QUICK = f"{PORT}?speed=off"
@@ -97,6 +98,15 @@ def test_pages_of_the_lab_offer_the_family(tmp_path: Path) -> None:
     family = find_family("rover")
     assert family is not None
     assert len(family.range_readings[2]) == 2
+
+
+def test_page_of_the_robot_shows_the_family(tmp_path: Path) -> None:
+    lab = RunningLab(tmp_path / "studies")
+    lab.start()
+    try:
+        assert "Use an emulated Rover" in lab.read("robot")
+    finally:
+        lab.stop()
 
 
 def test_studies_can_be_on_the_platform() -> None:

@@ -98,6 +98,10 @@ class RunningLab:
         """Send a request without a body; the answer."""
         return self._get(path, method="POST")
 
+    def read(self, path: str) -> str:
+        """The text of a page, with its elements, as a browser gets it."""
+        return self._get(path).decode()
+
     def _get(self, path: str, method: str = "GET") -> bytes:
         cookie = f"{self.cookie['name']}={self.token}"
         request = Request(self.address + path, headers={"Cookie": cookie}, method=method)

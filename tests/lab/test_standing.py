@@ -11,7 +11,9 @@ from realitygap.lab import _figure_cache
 from realitygap.lab._figure_cache import keep_figures, read_figures, read_rows
 from realitygap.lab._pace import duration
 from realitygap.lab._standing import standing_of
-from realitygap.lab._studies import StudyState
+from realitygap.lab._studies import Studies, StudyState
+from realitygap.records import ResultsFolder
+from tests.study.physical import drive, small_study
 
 ROW = {"condition": "a", "label": "SIM", "n": 6, "line_median": 0.25, "line_low": None, "line_high": None}
 
@@ -59,6 +61,15 @@ def test_study_has_one_state(folder, work, word, progress):
     assert (standing.word, standing.progress) == (word, progress)
     assert bool(standing.message) == (word in ("Failed", "In use"))
     assert standing.can_resume == (word in ("Not started", "Paused", "Failed") and not folder.problem)
+
+
+def test_study_has_the_label_of_the_robot_that_drove_it(tmp_path):
+    """A driven study on an emulated robot had no label."""
+    study = small_study()
+    ResultsFolder.create(tmp_path / "small", study.description())
+    assert Studies(tmp_path).state("small").labels == ()
+    drive(study, tmp_path / "small")
+    assert Studies(tmp_path).state("small").labels == ("EMULATED",)
 
 
 def test_durations_have_the_unit_that_fits():

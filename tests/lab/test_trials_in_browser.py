@@ -296,6 +296,7 @@ def test_the_witness_of_an_emulator_counts_by_itself(lab, visit):
     page.get_by_text("All 4 trials scored.").wait_for()
     with ledger_of(lab.root) as ledger:
         assert {row["who"] for row in ledger.scores()} == {"witness"}
+    visit().locator('[data-study="by-robot"] .lab-label-emulated').wait_for()
 
 
 def test_a_trial_is_chosen_in_the_table_with_a_tap_or_a_key(lab, visit):

@@ -45,7 +45,7 @@ class StudyState:
         replicates: Runs of each condition.
         trials: How many trials of the ledger are in each state.
         used_by: The program that writes to it now, as it calls itself; empty where none does.
-        labels: Labels of its conditions, such as SIM.
+        labels: Labels of its conditions, such as SIM; that of a robot from its first trial on.
         medians: Median best coverage of each condition, in the order of the study, as its figures show it; empty
             before they were drawn.
         has_thumbnail: Whether there is a small picture of its best path.
@@ -96,13 +96,13 @@ class Studies:
 
     def names(self) -> list[str]:
         """Return the names of all studies, the last one changed first."""
-        found = []
+        studies = []
         with contextlib.suppress(OSError):
             for path in self.root.iterdir():
                 changed = _changed(path) if self.has(path.name) else None
                 if changed is not None:
-                    found.append((changed, path.name))
-        return [name for _, name in sorted(found, reverse=True)]
+                    studies.append((changed, path.name))
+        return [name for _, name in sorted(studies, reverse=True)]
 
     def has(self, name: str) -> bool:
         """Return whether there is a study of this name."""
@@ -227,9 +227,10 @@ def _state(name: str, folder: ResultsFolder) -> StudyState:
     driven = [each["name"] for each in described["conditions"] if _is_driven(each)]
     simulated = [each["name"] for each in described["conditions"] if not _is_driven(each)]
     missing = sum(len(gap) for each in simulated for gap in folder.missing(each, replicates))
-    n_complete, trials = _of_ledger(folder.path / LEDGER_NAME, driven, replicates)
+    ledger = _read_ledger(folder.path / LEDGER_NAME, driven, replicates)
+    labels = {each.get("label") for each in described["conditions"]} | ledger.labels
     n_done = replicates * len(simulated) - missing
-    rows = read_rows(folder.path, (n_done, n_complete))
+    rows = read_rows(folder.path, (n_done, ledger.n_complete))
     return StudyState(
         name=name,
         title=str(described.get("title") or name),
@@ -237,13 +238,11 @@ def _state(name: str, folder: ResultsFolder) -> StudyState:
         n_runs=replicates * len(simulated),
         n_done=n_done,
         n_driven_runs=replicates * len(driven),
-        n_driven_done=n_complete,
+        n_driven_done=ledger.n_complete,
         replicates=replicates,
-        trials=trials,
+        trials=ledger.trials,
         used_by=used_by(folder.path),
-        labels=tuple(
-            sorted({each["label"] for each in described["conditions"] if each.get("label") in LABELS})
-        ),
+        labels=tuple(sorted(set(LABELS).intersection(labels))),
         medians=tuple(float(row["line_median"]) for row in rows or () if row["line_median"] is not None),
         has_thumbnail=has_thumbnail(folder.path),
         has_report=(folder.path / "report.html").is_file(),
@@ -254,24 +253,36 @@ def _is_driven(condition: dict[str, Any]) -> bool:
     return is_physical(condition["settings"])
 
 
-def _of_ledger(path: Path, conditions: list[str], replicates: int) -> tuple[int, dict[str, int]]:
+@dataclass(frozen=True)
+class _LedgerState:
+    """Complete runs of a ledger, its trials in each state, and the labels of robots that drove."""
+
+    n_complete: int = 0
+    trials: dict[str, int] = field(default_factory=dict)
+    labels: frozenset[str | None] = frozenset()
+
+
+def _read_ledger(path: Path, conditions: list[str], replicates: int) -> _LedgerState:
     if not path.exists():
-        return 0, {}
+        return _LedgerState()
     with Ledger.open(path, writable=False) as ledger:
-        n_complete = sum(run < replicates for each in conditions for run in complete_runs(ledger, each))
-        return n_complete, dict(Counter(trial.state for trial in ledger.trials()))
+        return _LedgerState(
+            sum(run < replicates for name in conditions for run in complete_runs(ledger, name)),
+            dict(Counter(trial.state for trial in ledger.trials())),
+            frozenset(condition["label"] for condition in ledger.conditions().values()),
+        )
 
 
 def used_by(folder: Path) -> str:
     """The program that says in the folder's lock that it writes there, where it is still alive; else empty."""
     try:
-        said = read_file(folder / ".lock", _LONGEST_HOLDER, plain=True).decode("utf-8").strip()
+        program = read_file(folder / ".lock", _LONGEST_HOLDER, plain=True).decode("utf-8").strip()
     except (OSError, UnicodeDecodeError):
         return ""
-    match = _HOLDER.fullmatch(said)
+    match = _HOLDER.fullmatch(program)
     if match is None or match[2] != socket.gethostname():
-        return said
-    return said if _is_alive(int(match[1])) else ""
+        return program
+    return program if _is_alive(int(match[1])) else ""
 
 
 def _is_alive(process: int) -> bool:

@@ -9,7 +9,7 @@ import pytest
 
 from realitygap.emulator import serve_tcp
 from realitygap.families.scribbler.emulator import Emulator
-from realitygap.lab._calibration_job import CalibrationJob
+from realitygap.lab._measuring_jobs import CalibrationJob
 from realitygap.orders import CalibrateOrder
 from realitygap.records import read_observations
 

@@ -9,11 +9,9 @@ from typing import Any
 
 import pytest
 
-from realitygap.lab import _job, _measuring_job
-from realitygap.lab._calibration_job import CalibrationJob
-from realitygap.lab._gap_job import GapJob
+from realitygap.lab import _job, _measuring_jobs
 from realitygap.lab._job import Job
-from realitygap.lab._measuring_job import SILENT_S
+from realitygap.lab._measuring_jobs import SILENT_S, CalibrationJob, GapJob
 from realitygap.lab.pages._gap import _Work
 from realitygap.orders import CalibrateOrder, GapOrder
 
@@ -96,7 +94,7 @@ def test_process_interrupted_while_it_reports_a_failure_prints_no_traceback(tmp_
 def test_robot_of_a_gap_is_silent_only_in_a_trial_without_an_answer(tmp_path, monkeypatch):
     monkeypatch.setattr(_job, "Child", SilentChild)
     now = [100.0]
-    monkeypatch.setattr(_measuring_job.time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(_measuring_jobs.time, "monotonic", lambda: now[0])
     order = GapOrder(sim="sim", target="scribbler:/dev/x", n_controllers=2, trials=2)
     job = GapJob(order, tmp_path / "gap.html", tmp_path, lambda: None)
     assert job.silent_s == 0

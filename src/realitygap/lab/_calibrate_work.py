@@ -21,8 +21,7 @@ from realitygap.study import (
 from realitygap.trials import Led, Operator, SheetObserver, TrialPlan, Verdict
 from realitygap.world import INCH, Arena, Calibration, RobotModel, load_arena, load_robot
 
-from ._channel import Channel, Message
-from ._pulse import Pulse
+from ._channel import Channel, Message, Pulse
 
 _QUESTIONS = {
     "ahead": "Distance ahead of the start [in]",

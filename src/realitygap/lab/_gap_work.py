@@ -13,8 +13,7 @@ from realitygap.report import write_gap_report
 from realitygap.stats import Estimate
 from realitygap.study import GapStudy, gap_between
 
-from ._channel import Channel, Message
-from ._pulse import Pulse
+from ._channel import Channel, Message, Pulse
 
 _TOLD_S = 0.2
 """Time between two messages on the progress [s]."""

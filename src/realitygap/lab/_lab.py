@@ -18,16 +18,15 @@ from realitygap.robots import typed_port
 from realitygap.runs import NAME_PATTERN
 from realitygap.settings import shown
 
-from ._calibration_job import CalibrationJob
 from ._checks import Checks
 from ._counts import Counts
 from ._drawer import Drawer
 from ._files import plain_files, refuse_camera, refuse_outside, refuse_port
-from ._gap_job import GapJob
 from ._hand import Hand
 from ._identify_job import IdentifyJob
 from ._job import Job
 from ._live_job import LiveJob
+from ._measuring_jobs import CalibrationJob, GapJob
 from ._photos import Photos
 from ._problem import Mistakes
 from ._standing import Standing, standing_of

@@ -10,9 +10,9 @@ from nicegui import ui
 from starlette.requests import Request
 
 from realitygap.drawing import Ink, themed_color
-from realitygap.lab._calibration_job import CalibrationJob
 from realitygap.lab._gap_plan import PLACING_S
 from realitygap.lab._lab import Lab, Visitor
+from realitygap.lab._measuring_jobs import CalibrationJob
 from realitygap.orders import CalibrateOrder
 from realitygap.platforms import emulated_robots
 from realitygap.robot_families import default_family, port_platforms
@@ -24,8 +24,7 @@ from ._grid import CellGrid
 from ._handover import show_holder
 from ._notices import attempt, notify
 from ._part import LOOK_S, Part, watching
-from ._silence import Silence
-from ._steps import show_steps
+from ._status import Silence, show_steps
 
 _KINDS = {
     "path": ("Path", "The paper's method: five full steps ahead, and five that turn.", 10, 4),

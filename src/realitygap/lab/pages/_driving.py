@@ -11,7 +11,7 @@ from realitygap.lab._study_job import StudyJob
 
 from ._frame import hint
 from ._grid import CellGrid
-from ._silence import Silence
+from ._status import Silence
 
 LIVE_S = 0.05
 """Time between two updates [s]. Another process drives the robot, even if no page is open."""

@@ -12,9 +12,9 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, PlainTextResponse, Response
 
 from realitygap.lab._access import FOREIGN_HEADERS
-from realitygap.lab._gap_job import GapJob
 from realitygap.lab._gap_plan import plan_words
 from realitygap.lab._lab import Lab, Visitor
+from realitygap.lab._measuring_jobs import GapJob
 from realitygap.orders import GapOrder
 from realitygap.platforms import emulated_robots
 from realitygap.robot_families import default_family
@@ -24,8 +24,8 @@ from ._frame import framed, hint, section, text_of, visitor_of
 from ._new import CALIBRATED
 from ._notices import attempt
 from ._part import LOOK_S, Part, watching
-from ._scatter import Scatter
-from ._silence import Silence
+from ._plots import Scatter
+from ._status import Silence
 
 _FIELDS = {field.name: field for field in GapOrder.fields() if field.face.label}
 _NUMBERS = ("n_controllers", "trials")

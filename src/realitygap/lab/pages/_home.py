@@ -16,7 +16,7 @@ from realitygap.lab._standing import Standing
 from ._frame import framed, hint, section
 from ._notices import attempt
 from ._part import Part, watching
-from ._progress import Progress
+from ._status import Progress
 
 DISK_S = 2.0
 """Time between two looks at the folders of the studies [s]: other programs may write to them."""

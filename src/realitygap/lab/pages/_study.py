@@ -25,7 +25,6 @@ from realitygap.orders import Limits
 from realitygap.platforms import emulated_robots
 from realitygap.stats import runs_for_a_claim
 
-from ._curves import Curves
 from ._driving import Driving
 from ._fields import Form
 from ._frame import framed, hint, section
@@ -33,7 +32,8 @@ from ._home import show_control, show_state
 from ._notices import attempt
 from ._part import Part, watching
 from ._player import LivePlayer, Player
-from ._progress import Progress
+from ._plots import Curves
+from ._status import Progress
 
 MOST_REPLICATES = 1_000_000_000
 """Largest number of runs per condition that a study takes."""

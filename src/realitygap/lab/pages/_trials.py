@@ -28,7 +28,7 @@ from ._notices import WRONG, attempt
 from ._part import Part, watching
 from ._photos import SheetPhotos
 from ._questions import show_question
-from ._steps import show_steps
+from ._status import show_steps
 from ._videos import Videos
 
 """Emulated robot of a study whose platform has none."""

@@ -1,4 +1,4 @@
-"""Best coverage by generation, as lines that a visitor can read and filter."""
+"""Plots that a visitor can read and filter: curves by generation, and scores on two platforms."""
 
 from __future__ import annotations
 
@@ -36,3 +36,17 @@ class Curves(Element, component="curves.js"):
         """Show one condition alone; all if it is empty."""
         self._props["chosen"] = condition
         self.update()
+
+
+class Scatter(Element, component="scatter.js"):
+    """Mean score of each controller on the simulator and on the target.
+
+    Args:
+        points: Name, kind, means, and intervals of each controller.
+        sides: Names of the simulator and the target.
+        score: Name of the score.
+    """
+
+    def __init__(self, points: Sequence[dict[str, Any]], sides: Sequence[str], score: str) -> None:
+        super().__init__()
+        self._props |= {"points": list(points), "sides": list(sides), "score": score}

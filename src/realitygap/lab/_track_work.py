@@ -35,12 +35,12 @@ def work(channel: Channel, order: Message) -> None:
     wanted = {number: trial_of_ledger(folder, number) for number in numbers}
     name, marks = read_camera(str(order["spec"]), wanted[numbers[0]].arena)
     video = VideoFile(Path(order["root"]) / name)
-    found = _tracked(channel, video, marks)
-    placed, problems = _placed(wanted, found)
+    tracked = _tracked(channel, video, marks)
+    placed, problems = _placed(wanted, tracked)
     for number, trial in placed.items():
-        told = note_of_track(str(video.path), found, trial)
-        said = " ".join(found.warnings)
-        keep_proposal(folder, number, track_proposal(trial.score, told, name, told, said))
+        note = note_of_track(str(video.path), tracked, trial)
+        warnings = " ".join(tracked.warnings)
+        keep_proposal(folder, number, track_proposal(trial.score, note, name, note, warnings))
     missed = [f"Trial {number}: {problems[number]}" for number in numbers if number in problems]
     channel.say("done", found=sorted(placed), missed=missed)
 
@@ -59,14 +59,14 @@ def _tracked(channel: Channel, video: VideoFile, marks: Marks) -> Tracked:
 
 
 def _placed(
-    wanted: dict[int, TrialToTrack], found: Tracked
+    wanted: dict[int, TrialToTrack], tracked: Tracked
 ) -> tuple[dict[int, TrackedTrial], dict[int, str]]:
     """Find trials in the video, and reasons for those that are missing; of two at one time, keep the better fit."""
     placed: dict[int, TrackedTrial] = {}
     problems: dict[int, str] = {}
     for number, trial in wanted.items():
         try:
-            placed[number] = place_trial(trial, found.track)
+            placed[number] = place_trial(trial, tracked.track)
         except RealityGapError as error:
             problems[number] = str(error)
     for number in sorted(placed, key=lambda each: placed[each].beginning.agreement):

@@ -39,7 +39,7 @@ class Driving:
             ui.label(f"Trial {card['trial']} is being driven").classes("lab-section").props('role="status"')
             hint(f"{card['title']}. Pen: {card['pen']}.")
             self._bar = ui.linear_progress(0, show_value=False).props('aria-label="Steps driven"')
-            self._said = ui.label("")
+            self._step_words = ui.label("")
             self._silence = Silence()
             self._grid = CellGrid(arena, ink=card["pen"], name="Position of the robot").classes("lab-sketch")
             ui.button("Abort trial", on_click=self._job.stop_robot, color="negative").props(
@@ -58,7 +58,7 @@ class Driving:
             self._bar.value = (step["step"] + 1) / step["n_steps"]
             seen = ", ".join(f"{value:.0f}" for value in step["raw"])
             stalled = ", blocked" if step["stalled"] else ""
-            self._said.text = (
+            self._step_words.text = (
                 f"Step {step['step'] + 1} of {step['n_steps']}: sees {seen}{stalled}; "
                 f"move {step['move']:+.2f}, turn {step['turn']:+.2f}"
             )

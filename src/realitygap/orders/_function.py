@@ -65,15 +65,21 @@ def with_fields(
     """
 
     def decorate(function: Callable[P, R]) -> Callable[P, R]:
-        signature = inspect.signature(function)
+        signature = inspect.signature(function, eval_str=True)
         *own, _ = signature.parameters.values()
         names = {parameter.name for parameter in own} | set(without)
         fields = [field for field in model.fields() if field.name not in names]
+
+        @functools.wraps(function)
+        def call(*args: P.args, **values: P.kwargs) -> R:
+            return function(*args, **values)
+
         parameters = [*own, *(field.parameter for field in fields)]
-        function.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
+        del call.__wrapped__  # whose source has other defaults than the signature
+        call.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
         before, heading, after = inspect.cleandoc(function.__doc__ or "").partition("\n\nRaises:")
-        function.__doc__ = "\n".join([before, *map(_argument, fields)]) + heading + after
-        return function
+        call.__doc__ = "\n".join([before, *map(_argument, fields)]) + heading + after
+        return call
 
     return decorate
 

@@ -27,7 +27,7 @@ from realitygap.world import Arena, RobotModel
 from ._abc import Effort, Posterior
 from ._all_from_poses import WITH_SLIP, own_places, sensors_of
 from ._posterior import N_DRAWS
-from ._prior import Floats, Parameter, numbers_of, standard_of
+from ._prior import PRIOR_PRECISION, Floats, Parameter, numbers_of, standard_of
 from ._shots import shots_of
 from ._single_commands import MOST_OFF, NOISE, PARTS, SLIP, places_of, values_at
 from ._tempering import sample_posterior
@@ -62,7 +62,6 @@ N_TRIES = 50  # of slips, of which the first is taken with which the gain is wit
 N_SHAPE = 400  # places that show the shape of the minimum
 N_NOISY = 40  # robots that show the scatter of observations
 FREEDOM = 4.0  # degrees, of the t distribution
-PRIOR = 12.0  # precision of a place that is even in 0..1
 FINEST = {"readings": 0.03, "stall": 0.3, "wheels": 2e-3}
 """Differences that are taken for none: of readings and stalls, and of the way of a wheel in a step [m]."""
 
@@ -328,7 +327,7 @@ class _Fit:
 
         logs = self._made(places, t, of)
         from_prior = ((places - pull) ** 2).sum(axis=1)
-        return np.asarray(0.5 * (FREEDOM + 1.0) * logs + 0.5 * PRIOR * from_prior)
+        return np.asarray(0.5 * (FREEDOM + 1.0) * logs + 0.5 * PRIOR_PRECISION * from_prior)
 
     def _scales(self, center: Floats, t: int) -> NDArray[np.float32]:
         """Return (k, t, d) typical differences: those that are taken for none, and the scatter by noise."""

@@ -16,7 +16,7 @@ from realitygap.world import Arena, RobotModel
 from ._identify import identify_from
 from ._motion import N_DRAWS, MotionFit, fitted_parameter, nothing_known, observed_as
 from ._posterior import sample_clusters
-from ._prior import CONTACT, Parameter, parameters_of, values_at
+from ._prior import CONTACT, MAD, Parameter, parameters_of, values_at
 from ._shooting import Problem, make_problem
 from ._simulate import Bools, Floats, Simulate, motor_noise
 from ._windows import CHANNELS, make_windows, wrapped
@@ -35,7 +35,6 @@ LEAST = np.array([3e-4, 3e-4, 2e-3])  # [m, m, rad] of that scale
 PLACES = (0.15, 0.4, 0.65, 0.9)  # of each parameter, from which a fit begins where they come closest
 FLIPS = 5.0  # robust standard deviations: beyond it a window took the other way at a border
 CAP = 3.0  # robust standard deviations from which a difference counts no more, in the search for a beginning
-MAD = 1.4826  # of a median absolute deviation, to a standard deviation of a normal one
 
 
 def fit_contact(

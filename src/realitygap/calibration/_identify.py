@@ -9,14 +9,12 @@ import numpy as np
 
 from realitygap.records import CALIBRATES, Observe
 
-from ._prior import Known, Parameter, place_of
+from ._prior import IDENTIFIED, PRIOR_PRECISION, Known, Parameter, place_of
 from ._simulate import Floats
 
-TELLS = 0.5  # of the prior's interval: a posterior wider than this is said not to be identified
 LEARNED = 20.0  # times the prior's precision: a parameter that would be known if the others were
 UNLEARNED = 6.0  # times the prior's precision along a direction: below it that direction is not known
 TOGETHER = 0.1  # share of a direction from which on a parameter belongs to it
-PRIOR_PRECISION = 12.0  # of an even prior over 0..1
 
 
 @dataclass(frozen=True)
@@ -70,7 +68,7 @@ def identify_from(
         low, high = np.quantile(values, [0.05, 0.95])
         ratio = (place_of(known[name], float(high)) - place_of(known[name], float(low))) / 0.9
         partners = sorted({other for group in groups if name in group for other in group} - {name})
-        identified[name] = Identified(ratio, ratio < TELLS, tuple(partners))
+        identified[name] = Identified(ratio, ratio < IDENTIFIED, tuple(partners))
     return identified
 
 

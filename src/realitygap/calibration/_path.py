@@ -20,6 +20,7 @@ from realitygap.trials import TrialPlan
 from realitygap.world import Arena, Fitted, Pose, RobotModel
 
 from ._posterior import N_DRAWS
+from ._prior import IDENTIFIED
 from ._ruler import EXACT, Moved, moved_in
 
 Array = NDArray[np.float64]
@@ -287,7 +288,7 @@ def _in_jyro_steps(steps: Fitted) -> str:
 
 def _row(name: str, values: Array, unit: str, prior: tuple[float, float], repeats: int) -> Fitted:
     low, high = np.quantile(values[1:], ENDS)
-    identified = repeats > 1 and high - low < 0.5 * (ENDS[1] - ENDS[0]) * (prior[1] - prior[0])
+    identified = repeats > 1 and high - low < IDENTIFIED * (ENDS[1] - ENDS[0]) * (prior[1] - prior[0])
     return Fitted(
         name=name,
         estimate=float(values[0]),

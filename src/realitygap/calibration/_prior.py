@@ -231,6 +231,12 @@ MOTION_NOISE = (
 CONTACT = ("contact.friction", "contact.lat", "contact.ang", "contact.saturation")
 """Numbers that determine the contact with walls. `contact.long` is 1, because only ratios count."""
 
+PRIOR_PRECISION = 12.0
+"""Precision of a place that is even in 0..1."""
+IDENTIFIED = 0.5
+"""A parameter is identified if its interval is narrower than this share of its prior's."""
+MAD = 1.4826
+"""Factor of a median absolute deviation, to the standard deviation of a normal distribution."""
 BELOW_ONE = 1.0 - 1e-12  # distributions are asked for places below 1
 Known = Mapping[str, Parameter]
 

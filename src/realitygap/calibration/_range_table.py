@@ -14,6 +14,7 @@ from realitygap.errors import finite_numbers
 from realitygap.world import Distribution, Fitted, RobotModel
 
 from ._held_out import HeldOut, HeldOutFit
+from ._prior import IDENTIFIED
 from ._range_response import NAMES, Number, file_numbers, numbers_in_file, numbers_to_fit, wall_reading
 from ._simulate import Bools, Floats, Ints
 
@@ -27,9 +28,6 @@ LEAST_PLACES = 20
 
 BETWEEN = (0.03, 1.0)
 """Readings that are neither nothing nor full."""
-
-IDENTIFIED = 0.5
-"""A parameter is identified if its interval is narrower than this share of its prior's."""
 
 NOISE = 0.05
 """Standard deviation of readings around the response that the priors are weighed against at first."""

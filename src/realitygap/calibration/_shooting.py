@@ -15,7 +15,7 @@ import numpy as np
 from realitygap.world import RobotModel
 
 from ._posterior import BURN_IN, SWEEPS, draw_linear, walk
-from ._prior import MOTION_NOISE, Known, Parameter, own_values, place_of, values_at
+from ._prior import MOTION_NOISE, PRIOR_PRECISION, Known, Parameter, own_values, place_of, values_at
 from ._scatter import NoisePrior, Scatter
 from ._simulate import Floats, Ints, Simulate
 from ._windows import Windows, differences, simulate_windows, wheel_ways, wrapped
@@ -23,7 +23,6 @@ from ._windows import Windows, differences, simulate_windows, wheel_ways, wrappe
 STEP = 0.02  # of a finite difference, in parts of what was thought possible
 PULL = 0.1  # towards the robot's own numbers, where nothing was learned
 FIRST_NOISE = np.array([0.02, 0.03, 0.1, 0.05, 0.01, 0.001, 0.005, 0.005, 0.001])
-PRIOR_PRECISION = 12.0  # of an even prior over 0..1
 NOISE_STEP = 0.004  # likewise of the noise
 MOST_STEPS, MOST_DAMPING = 15, 1e4  # of least squares
 N_MEAN = 40  # robots that show what early and late commands do in the mean

@@ -16,7 +16,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ._prior import Floats, Parameter
+from ._prior import MAD, PRIOR_PRECISION, Floats, Parameter
 from ._shots import Shooter
 from ._tempering import sample_posterior
 from ._windows import wrapped
@@ -31,8 +31,6 @@ SLIP = "drive.slip"
 FREEDOM = 4.0  # degrees, of the t distribution
 FINEST = np.array([3e-4, 3e-4, 2e-3])  # [m, m, rad] added to the scale of differences of free robots
 COARSE = np.array([6e-3, 6e-3, 6e-2])  # likewise where robots touch something: there `sim` errs most
-MAD = 1.4826  # of a median absolute deviation, to a standard deviation of a normal one
-PRIOR = 12.0  # precision of a place that is even in 0..1
 STEP = 0.02  # of slopes, in places
 BLOCK = 10  # commands that are weighed together
 MOST_ROUNDS, LEAST_ROUNDS = 40, 8
@@ -152,8 +150,8 @@ class MotionOfCommands:
             slopes = self._slopes(places) / scales
             weight = np.sqrt(_weights(off / scales))[..., None]
             flat = (slopes * weight).reshape(len(places), -1)
-            curvature = flat @ flat.T + PRIOR * np.eye(len(places))
-            pull = flat @ (off / scales * weight).reshape(-1) + PRIOR * (0.5 - places)
+            curvature = flat @ flat.T + PRIOR_PRECISION * np.eye(len(places))
+            pull = flat @ (off / scales * weight).reshape(-1) + PRIOR_PRECISION * (0.5 - places)
             cost = _cost(off / scales, places)
             for _ in range(6):
                 damped = curvature + damping * np.diag(np.diag(curvature))
@@ -183,9 +181,9 @@ class MotionOfCommands:
         draws = np.empty((n, p))
         for k in range(n):
             shares = self.rng.exponential(size=n_blocks)
-            curvature = np.tensordot(shares, curvatures, 1) + PRIOR * np.eye(p)
+            curvature = np.tensordot(shares, curvatures, 1) + PRIOR_PRECISION * np.eye(p)
             draws[k] = _within(
-                places, curvature, shares @ pulls + PRIOR * (self.rng.uniform(size=p) - places)
+                places, curvature, shares @ pulls + PRIOR_PRECISION * (self.rng.uniform(size=p) - places)
             )
         return draws
 
@@ -246,7 +244,7 @@ def _weights(off: Floats) -> Floats:
 
 def _cost(off: Floats, places: Floats) -> float:
     logs = np.log1p((off**2).sum(axis=-1) / FREEDOM).sum()
-    return float(0.5 * (FREEDOM + 3.0) * logs + 0.5 * PRIOR * ((places - 0.5) ** 2).sum())
+    return float(0.5 * (FREEDOM + 3.0) * logs + 0.5 * PRIOR_PRECISION * ((places - 0.5) ** 2).sum())
 
 
 def _within(places: Floats, curvature: Floats, pull: Floats) -> Floats:

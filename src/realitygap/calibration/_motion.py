@@ -39,7 +39,7 @@ from ._windows import CHANNELS, make_windows
 
 METHOD = (
     "Multiple shooting (Bock 1987): each window is simulated from where the robot was seen; least squares by "
-    "Levenberg-Marquardt, draws from the posterior of the model that is linear there, with noise as `sim` has it; "
+    "trust regions, draws from the posterior of the model that is linear there, with noise as `sim` has it; "
     "widened where trials disagree by more than that (sandwich covariance, clustered by trial)."
 )
 N_DRAWS = 200

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
+import scipy
 
 from realitygap.world import RobotModel
 
@@ -24,7 +25,8 @@ STEP = 0.02  # of a finite difference, in parts of what was thought possible
 PULL = 0.1  # towards the robot's own numbers, where nothing was learned
 FIRST_NOISE = np.array([0.02, 0.03, 0.1, 0.05, 0.01, 0.001, 0.005, 0.005, 0.001])
 NOISE_STEP = 0.004  # likewise of the noise
-MOST_STEPS, MOST_DAMPING = 15, 1e4  # of least squares
+MOST_STEPS, SETTLED = 30, 1e-5  # of least squares, and the change after which they end
+INSIDE = 1e-6  # of the ends, where least squares begin
 N_MEAN = 40  # robots that show what early and late commands do in the mean
 N_SCATTER = 200  # and how they scatter
 LEAST_JITTER = 0.01  # [s] of theirs
@@ -135,41 +137,21 @@ def _lateness(problem: Problem, place: Floats, jitter: float) -> Floats:
 
 
 def best_place(problem: Problem, scatter: Scatter, noise: Floats, first: Floats) -> tuple[Floats, float]:
-    """Return the minimum of the weighted squares from a point, and half their sum (Levenberg-Marquardt)."""
+    """Return the minimum of the weighted squares from a point, and half their sum."""
 
     def off(place: Floats) -> Floats:
         rows = scatter.whitened(np.nan_to_num(problem.off(place[None])[0]), noise).ravel()
         return np.concatenate([rows, PULL * (place - problem.own)])
 
-    here = np.clip(first, 0.0, 1.0)
-    left, damping = off(here), 1e-3
-    for _ in range(MOST_STEPS):
-        rows = scatter.whitened(problem.slopes(here), noise).reshape(-1, len(here))
-        slopes = np.concatenate([rows, PULL * np.eye(len(here))])
-        curvature, slope = slopes.T @ slopes, slopes.T @ left
-        while damping < MOST_DAMPING:
-            new = np.clip(here - _step(curvature, slope, here, damping), 0.0, 1.0)
-            then = off(new)
-            if then @ then < left @ left:
-                break
-            damping *= 5.0
-        else:
-            break
-        gained, moved = left @ left - then @ then, np.abs(new - here).max()
-        here, left, damping = new, then, max(damping / 5.0, 1e-6)
-        if gained < 1e-3 or moved < 1e-7:
-            break
-    return here, float(left @ left) / 2
+    def slopes(place: Floats) -> Floats:
+        rows = scatter.whitened(problem.slopes(place), noise).reshape(-1, len(place))
+        return np.concatenate([rows, PULL * np.eye(len(place))])
 
-
-def _step(curvature: Floats, slope: Floats, here: Floats, damping: float) -> Floats:
-    """Return a step damped by each parameter's own curvature; one that would leave through its end stays."""
-    stays = ((here <= 0.0) & (slope > 0)) | ((here >= 1.0) & (slope < 0))
-    goes = np.flatnonzero(~stays)
-    step = np.zeros_like(here)
-    part = curvature[np.ix_(goes, goes)]
-    step[goes] = np.linalg.solve(part + damping * np.diag(np.diag(part)), slope[goes])
-    return step
+    result = scipy.optimize.least_squares(
+        off, np.clip(first, INSIDE, 1.0 - INSIDE), jac=slopes, bounds=(0.0, 1.0), x_scale="jac",
+        ftol=SETTLED, xtol=SETTLED, max_nfev=MOST_STEPS,
+    )  # fmt: skip
+    return np.asarray(result.x), float(result.cost)
 
 
 def typical_noise(

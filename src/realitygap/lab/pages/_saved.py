@@ -20,7 +20,7 @@ from ._frame import LONGEST_NAME, framed, hint, remember_who, section, text_of, 
 from ._grid import CellGrid
 from ._notices import attempt
 
-_COLUMNS = {"number": "Trial", "name": "Description", "state": "State", "cells": "Cells", "said": "Notes"}
+_COLUMNS = {"number": "Trial", "name": "Description", "state": "State", "cells": "Cells", "notes": "Notes"}
 
 
 def add_saved(lab: Lab) -> None:
@@ -43,19 +43,19 @@ def add_saved(lab: Lab) -> None:
             raise HTTPException(404, name)
         file = SavedFile(path)
         try:
-            found = await run.io_bound(file.read)
+            saved = await run.io_bound(file.read)
         except RealityGapError as error:
             with framed(lab, name, "", above=[("Saved trials", "/saved")]):
                 ui.label(str(error)).classes("lab-problem")
             return
-        if found is not None:
+        if saved is not None:
             with framed(lab, name, "", above=[("Saved trials", "/saved")]):
-                _Page(file, found, visitor_of(request).who).show()
+                _Page(file, saved, visitor_of(request).who).show()
 
 
 class _Page:
-    def __init__(self, file: SavedFile, found: SavedTrials, who: str) -> None:
-        self._file, self._found, self._who = file, found, who
+    def __init__(self, file: SavedFile, saved: SavedTrials, who: str) -> None:
+        self._file, self._saved, self._who = file, saved, who
         self._chosen: int | None = None
         self._cells: list[int] = []
 
@@ -79,25 +79,25 @@ class _Page:
 
     async def _reload(self) -> None:
         try:
-            found = await run.io_bound(self._file.read)
+            saved = await run.io_bound(self._file.read)
         except RealityGapError:  # it is being written; the next look reads it again
             self._file.changed_s = None
             return
-        if found is not None:
-            self._found = found
+        if saved is not None:
+            self._saved = saved
             self._table.refresh()
 
     def _show_table(self) -> None:
-        ui.label(counted(len(self._found.trials), "trial"))
+        ui.label(counted(len(self._saved.trials), "trial"))
         rows: list[dict[str, Any]] = [
             {
                 "number": trial.trial,
                 "name": trial.name,
                 "state": f"{trial.state}: {trial.reason}" if trial.reason else trial.state,
                 "cells": "" if trial.cells is None else str(len(trial.cells)),
-                "said": self._found.notes[trial.trial],
+                "notes": self._saved.notes[trial.trial],
             }
-            for trial in self._found.trials
+            for trial in self._saved.trials
         ]
         columns = [
             {"name": key, "label": label, "field": key, "align": "left"} for key, label in _COLUMNS.items()
@@ -111,7 +111,7 @@ class _Page:
         self._card.refresh()
 
     def _show_card(self) -> None:
-        trial = self._found.trial(self._chosen)
+        trial = self._saved.trial(self._chosen)
         if trial is None:
             ui.label("Select a trial to correct its cells, void it, or add a note.")
             return
@@ -121,7 +121,7 @@ class _Page:
             self._cells = list(trial.cells or ())
             with ui.element("div").classes("lab-wide"):
                 CellGrid(
-                    self._found.arena, cells=self._cells, name=f"Cells of trial {number}", change=self._marked
+                    self._saved.arena, cells=self._cells, name=f"Cells of trial {number}", change=self._marked
                 )
             ui.button("Save cells", on_click=lambda: self._score(number)).props("unelevated no-caps")
         text = ui.input("Note or reason").props("outlined dense").classes("lab-wide")

@@ -184,7 +184,7 @@ def test_numbers_that_are_none_are_null(capsys):
 
 
 def test_json_is_refused_for_entries_of_the_ledger(tmp_path):
-    with pytest.raises(StudyError, match="--json is only for list and agreement, not for note"):
+    with pytest.raises(StudyError, match="--json is only for"):
         CliRunner().invoke(
             app, ["trials", "note", str(tmp_path), "--text", "x", "--json"], catch_exceptions=False
         )

@@ -8,7 +8,7 @@ from realitygap.gap import (
     mean_maximum_rank_violation,
     rank_violation_interval,
 )
-from realitygap.gap._order import rank_violation_floor, reliability, trials_for_reliability
+from realitygap.gap._ranks import rank_violation_floor, reliability, trials_for_reliability
 
 # Success of RT-2-X, RT-1 (converged, 15 %), RT-1-X, RT-1 (begin) and Octo-Base in simulation (visual matching) and on
 # the robot: Li et al. (2024), as in `simpler_env/utils/metrics.py` of simpler-env/SimplerEnv.

@@ -351,7 +351,7 @@ def test_command_judges_and_calibrates_a_twin_and_drives_what_is_transferred(tmp
     summary = summarize_closing(tmp_path / "out")
     assert summary["n_done"] == summary["n_units"] == 4
     assert summary["label"] == "TWIN"
-    for row in goal_table(summary):
+    for row in goal_table(summary).rows:
         assert row[0] in done.output
     assert "transfer" in (tmp_path / "out" / "report.html").read_text("utf-8")
 

@@ -7,7 +7,7 @@ from ._behavior import CoverageMaps, coverage_maps
 from ._card import gap_card, pairs_picture
 from ._level import rms_interval, square_differences
 from ._measure import measure_gap
-from ._order import mean_maximum_rank_violation, rank_violation_interval
+from ._ranks import mean_maximum_rank_violation, rank_violation_interval
 from ._replay_error import ReplayError, replay_error
 from ._resampling import bootstrap
 from ._result import COVERAGE, SHOWN, GapResult

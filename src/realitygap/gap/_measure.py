@@ -26,7 +26,7 @@ from realitygap.stats import (
 from . import _resampling
 from ._behavior import energy_distances, energy_test, smallest_energy_p
 from ._level import mean_difference, rms_interval, rms_of, shares_above, square_differences
-from ._order import (
+from ._ranks import (
     mean_maximum_rank_violation,
     rank_violation_floor,
     rank_violation_interval,

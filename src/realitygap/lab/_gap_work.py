@@ -17,7 +17,7 @@ from ._channel import Channel, Message, Pulse
 
 _TOLD_S = 0.2
 """Time between two messages on the progress [s]."""
-MEASURES = ("rms", "level", "srcc", "noise_ceiling")
+ABOVE_THE_REPORT = ("rms", "level", "srcc", "noise_ceiling")
 """Measures that the page shows above the report."""
 
 
@@ -47,7 +47,9 @@ def _measured(study: GapStudy) -> dict[str, Any]:
     """Return the verdict and the measures of a gap, as its page shows them."""
     result = study.result
     measures = [
-        (shown.title, _words(getattr(result, shown.name))) for shown in SHOWN if shown.name in MEASURES
+        (shown.title, _words(getattr(result, shown.name)))
+        for shown in SHOWN
+        if shown.name in ABOVE_THE_REPORT
     ]
     rms = None if result.rms.low is None else [result.rms.value, result.rms.low, result.rms.high]
     return {"verdict": result.verdict, "measures": measures, "rms": rms, "pairs": pairs_of(study)}

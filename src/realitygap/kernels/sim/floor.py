@@ -108,7 +108,7 @@ def lay_tape(tapes, x, y, brightness):
 def answer_line(brightness, threshold, noise, word, as_level, reading):
     """1 where the floor is dark, else 0; or how dark it is.
 
-    A Scribbler compares brightness with a threshold: below it is a line (robots/scribbler-protocol.md, 6.3).
+    Robots compare brightness with a threshold: below it is a line.
 
     Args:
         brightness: (LANES,) 0..1.

@@ -6,7 +6,7 @@ its own words, so that switching one off leaves the others as they are. A readin
 on how long a step lasts.
 
 A Fluke 2 sends ten pulses of infrared light and counts those that it sees come back; a reading is one of 0, 1/10,
-..., 1 (robots/scribbler-protocol.md, section 7.2). Light that is not sent is not seen, so the error has one side: the
+..., 1. Light that is not sent is not seen, so the error has one side: the
 count is what the response says, rounded, less the pulses that were missed. Misses come in bursts: with the
 probability `burst` all pulses of a reading share one fate, which makes that the correlation of any two of them.
 """

@@ -228,6 +228,45 @@ def test_a_robot_that_runs_is_followed_and_can_be_played_afterwards(show):
 
 
 @pytest.mark.slow
+def test_a_robot_that_runs_arrives_although_the_page_draws_slowly(show):
+    widget = play(straight(0))
+    widget.live = True
+    page = show(widget)
+    message = {
+        "kind": "now",
+        "rays": [0.2, 0.1, None],
+        "stalled": False,
+        "lasts": 0.1,
+        "cells": [13],
+        "trail": [],
+    }
+    x, drawn_in_a_frame = page.evaluate(
+        """async ([first, second]) => {
+          let now = 0, step = 60, asked = 0; // each look at the clock takes 60 ms
+          performance.now = () => (now += step);
+          const ask = window.requestAnimationFrame, frame = () => new Promise((done) => ask(done));
+          window.requestAnimationFrame = (draw) => (asked += 1, ask(draw));
+          window.tell(first);
+          window.tell(second);
+          for (let k = 0; k < 5; k += 1) await frame();
+          const x = Number(document.querySelector(".rg-robot").getAttribute("transform").split("(")[1].split(" ")[0]);
+          step = 0; // it is on its way for good
+          for (let k = 0; k < 5; k += 1) window.tell(second);
+          asked = 0;
+          await frame();
+          return [x, asked];
+        }""",
+        [
+            {**message, "pose": [0.2, 0.2, 0.0], "step": 1, "time": 0.1},
+            {**message, "pose": [0.4, 0.2, 0.0], "step": 2, "time": 0.2},
+        ],
+    )
+    left, _, _, _ = page.evaluate("() => window.model.get('scene').extent")
+    assert x == pytest.approx(1000 * (0.4 - left), abs=0.2)
+    assert drawn_in_a_frame == 1, "messages that come fast do not make it draw more often"
+
+
+@pytest.mark.slow
 def test_a_view_that_is_closed_listens_no_longer(show):
     page = show(play(straight(10)))
     page.click('button[aria-label="Play trials"]')

@@ -315,6 +315,7 @@ function render({ model, el }) {
 
   let scene = {}, trials = [], lines = [];
   let live = null; // of a robot that runs: from where to where it is drawn, and since and until when
+  let frame = 0; // in which a robot that runs is drawn next
   const duration = () => Math.max(0, ...trials.map((trial) => (nRows(trial) / trial.parts) * trial.step_s));
   const stepS = () => Math.min(...trials.map((trial) => trial.step_s));
   const stage = makeStage(svg);
@@ -392,12 +393,14 @@ function render({ model, el }) {
     trials[0].poses.push(...(live.now ? [live.now.pose] : []), ...message.trail);
     trials[0].cells.push(...message.cells);
     Object.assign(live, { shown, now: message, time: message.time, since: performance.now(), until: performance.now() + 1000 * message.lasts });
+    cancelAnimationFrame(frame); // one chain of frames, although messages may come before the last one ended
     approach();
   }
   function approach() {
     if (!live || !el.contains(root)) return;
+    const isMoving = live.until > performance.now(); // asked before the drawing, so that the last one shows the pose itself
     draw();
-    if (live.until > performance.now()) requestAnimationFrame(approach);
+    if (isMoving) frame = requestAnimationFrame(approach);
   }
 
   const listeners = { "change:trials": build, "change:scene": build, "change:live": build, "msg:custom": follow };

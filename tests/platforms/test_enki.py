@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 from realitygap.errors import RobotError
-from realitygap.families.thymio import EnkiPlatform, build_enki, harness_path
+from realitygap.families.thymio import EnkiPlatform, build_enki
 from realitygap.families.thymio.enki import _build
+from realitygap.families.thymio.enki._build import harness_path
 from realitygap.families.thymio.enki._harness import Harness, arena_lines
 from realitygap.platforms import (
     SimPlatform,

@@ -5,31 +5,18 @@ lost bytes. Wheels, sensors, sound and light, identity, camera, functions of an 
 Fluke have a file each. `_robot` combines them and meets the contract. `emulator` is the robot for real client programs.
 """
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from realitygap._lazy import lazy_names
 from realitygap.robot_families import Reading, RobotFamily
 
 if TYPE_CHECKING:
     from ._codec import Blob, MotorStats, SensorBlock
     from ._device import RobotInfo
-    from ._link import Exchange, Faults
+    from ._link import Faults
     from ._platform import ScribblerPlatform
     from ._ports import find_ports, label_of
     from ._robot import Scribbler
-
-_HOME = {
-    "Blob": "._codec",
-    "Exchange": "._link",
-    "Faults": "._link",
-    "MotorStats": "._codec",
-    "RobotInfo": "._device",
-    "Scribbler": "._robot",
-    "ScribblerPlatform": "._platform",
-    "SensorBlock": "._codec",
-    "find_ports": "._ports",
-    "label_of": "._ports",
-}
 
 FAMILY = RobotFamily(
     name="scribbler",
@@ -59,7 +46,6 @@ FAMILY = RobotFamily(
 
 __all__ = [
     "Blob",
-    "Exchange",
     "Faults",
     "MotorStats",
     "RobotInfo",
@@ -70,12 +56,17 @@ __all__ = [
     "label_of",
 ]
 
-
-def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _HOME:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(_HOME[name], __name__), name)
+__getattr__, __dir__ = lazy_names(
+    __name__,
+    {
+        "Blob": "._codec",
+        "Faults": "._link",
+        "MotorStats": "._codec",
+        "RobotInfo": "._device",
+        "Scribbler": "._robot",
+        "ScribblerPlatform": "._platform",
+        "SensorBlock": "._codec",
+        "find_ports": "._ports",
+        "label_of": "._ports",
+    },
+)

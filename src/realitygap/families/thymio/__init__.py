@@ -3,9 +3,9 @@
 `playground` starts that simulator, and `enki` is its engine alone, as a platform.
 """
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from realitygap._lazy import lazy_names
 from realitygap.robot_families import NetworkProgram, Reading, RobotFamily
 
 if TYPE_CHECKING:
@@ -13,24 +13,9 @@ if TYPE_CHECKING:
     from ._platform import ThymioPlatform
     from ._ports import find_ports
     from ._robot import Thymio, ThymioInfo
-    from .enki._build import build_enki, harness_path
+    from .enki._build import build_enki
     from .enki._platform import EnkiPlatform
     from .playground._playground import Playground
-    from .playground._port import open_playground
-
-_HOME = {
-    "EnkiPlatform": ".enki._platform",
-    "Playground": ".playground._playground",
-    "Thymio": "._robot",
-    "ThymioInfo": "._robot",
-    "ThymioPlatform": "._platform",
-    "aseba_error": "._aseba",
-    "build_enki": ".enki._build",
-    "find_ports": "._ports",
-    "harness_path": ".enki._build",
-    "open_playground": ".playground._port",
-    "to_aseba": "._aseba",
-}
 
 FAMILY = RobotFamily(
     name="thymio",
@@ -71,17 +56,20 @@ __all__ = [
     "aseba_error",
     "build_enki",
     "find_ports",
-    "harness_path",
-    "open_playground",
     "to_aseba",
 ]
 
-
-def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _HOME:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(_HOME[name], __name__), name)
+__getattr__, __dir__ = lazy_names(
+    __name__,
+    {
+        "EnkiPlatform": ".enki._platform",
+        "Playground": ".playground._playground",
+        "Thymio": "._robot",
+        "ThymioInfo": "._robot",
+        "ThymioPlatform": "._platform",
+        "aseba_error": "._aseba",
+        "build_enki": ".enki._build",
+        "find_ports": "._ports",
+        "to_aseba": "._aseba",
+    },
+)

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from realitygap.logs import Log, clock_offset, diagnose
+from realitygap.logs import Log, diagnose
+from realitygap.logs._clock_offset import clock_offset
 from tests.logs.made import SPEED, STEP_S, TRACK, drive
 
 NOTHING = np.empty((0, 2))

@@ -13,16 +13,16 @@ from realitygap.vision import (
     Lens,
     Marks,
     RobotTag,
-    Sightings,
     Track,
     Tracker,
     VideoFile,
     corner_tags,
     find_beginning,
-    fit_camera,
-    track_of,
     track_video,
 )
+from realitygap.vision.track._camera import fit_camera
+from realitygap.vision.track._track import track_of
+from realitygap.vision.track._tracker import Sightings
 from realitygap.world import Grid, load_arena, paper_arena
 
 SMALL = FilmedCamera(width=960, height=540, noise=3.0)

@@ -5,7 +5,6 @@ column is what. `read_logs` yields its trials on one regular grid, `diagnose` na
 makes an observed trial of one. `write_bag` writes a trial for programs of ROS. This package fits nothing.
 """
 
-from ._clock_offset import ClockOffset, clock_offset
 from ._files import MappedLog, mapped_logs, mapping_of
 from ._guess import guess_log_map
 from ._import import ImportReport, import_log, import_logs, robot_of, target_of
@@ -24,7 +23,6 @@ __all__ = [
     "WHEEL_DIAMETER_MM",
     "BagReport",
     "Batch",
-    "ClockOffset",
     "Commands",
     "Diagnosis",
     "ImportReport",
@@ -42,7 +40,6 @@ __all__ = [
     "TextFormat",
     "Wheels",
     "arena_of",
-    "clock_offset",
     "diagnose",
     "guess_log_map",
     "head_of",

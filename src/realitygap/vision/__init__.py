@@ -26,12 +26,12 @@ from ._tag_print import print_tags
 from ._tags import CORNER_FAMILY, CORNER_SIZE_M, FAMILIES, RobotTag, corner_tags, tag_bits
 from ._trace import Trace, follow_traces
 from .track._align import Beginning, find_beginning
-from .track._camera import Camera, fit_camera
+from .track._camera import Camera
 from .track._lens import Lens, fit_lens, read_lens
 from .track._overlay import draw_overlay, save_overlay
 from .track._source import CameraDevice, Source, VideoFile, open_source
-from .track._track import Track, track_of
-from .track._tracker import Sightings, Tracker, gray_of
+from .track._track import Track
+from .track._tracker import Tracker, gray_of
 from .track._video import LiveTrack, Marks, Tracked, track_video
 
 __all__ = [
@@ -51,7 +51,6 @@ __all__ = [
     "SheetLayout",
     "SheetScore",
     "SheetTrials",
-    "Sightings",
     "Source",
     "Trace",
     "TraceScore",
@@ -65,7 +64,6 @@ __all__ = [
     "draw_overlay",
     "find_beginning",
     "find_sheet",
-    "fit_camera",
     "fit_lens",
     "follow_traces",
     "gray_of",
@@ -88,7 +86,6 @@ __all__ = [
     "sheet_tiles",
     "tag_bits",
     "to_pixels",
-    "track_of",
     "track_video",
     "trials_on_sheet",
     "visited_cells",

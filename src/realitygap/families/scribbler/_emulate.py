@@ -64,7 +64,8 @@ def emulate(
 
     In Python: realitygap.emulator.serve_pty(realitygap.families.scribbler.emulator.Emulator("s2", "2"))
     """
-    from .emulator import LiveView, make_emulator
+    from .emulator._port import make_emulator
+    from .emulator._view import LiveView
 
     options = {"arena": arena, "seed": str(seed), "timing": timing, "faults": faults}
     if fluke is not None:

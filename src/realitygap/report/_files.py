@@ -51,8 +51,8 @@ def export_individual(
     * onnx: the network, as `to_onnx` makes it, in double precision.
     * graphml: the genome as a graph, as `to_networkx` makes it.
     * c: the network as a header of C99, as `to_c` makes it, in double precision; files end in .c or .h.
-    * A family of robots can add formats: the network as a program that its robots run without a computer, such as aseba
-      of `realitygap.families.thymio`; files end in .aesl. A command lasts as long as on the platform of the condition.
+    * A family of robots can add formats: the network as a program that its robots run without a computer, such as
+      aseba, whose files end in .aesl. A command lasts as long as on the platform of the condition.
 
     Each has the names of inputs and outputs, and says which individual it is.
 

@@ -35,7 +35,8 @@ from realitygap.logs import (
     write_bag,
 )
 from realitygap.records import ObservationsHead, TrialRecord, read_observations, write_observations
-from realitygap.robots import Recorder, read_recording
+from realitygap.robots import read_recording
+from realitygap.robots._recording import Recorder
 from realitygap.robots.twin import load_twin, sample_twin
 from realitygap.study import load_study, study_template
 from realitygap.vision import Lens, Track, read_lens, read_map, save_map

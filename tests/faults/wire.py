@@ -14,7 +14,7 @@ from typing import Any
 import serial
 
 import realitygap.emulator  # noqa: F401  # its ports are known from then on
-from realitygap.emulator._time import nanoseconds
+from realitygap.emulator import nanoseconds
 from realitygap.errors import RobotError
 from realitygap.families.scribbler import Scribbler
 from realitygap.families.scribbler.emulator._faults import Faults, FaultyLink

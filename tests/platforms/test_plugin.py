@@ -15,12 +15,12 @@ from realitygap.lab._live_work import open_robot
 from realitygap.platforms import (
     Opening,
     allow_code,
-    load_platform,
     open_target,
     platform_class,
     platform_names,
     platform_of,
 )
+from realitygap.platforms._python import load_platform
 from realitygap.runs import Condition
 from realitygap.study import calibrate, gap_between, parse_study, run_study, transfer, try_on
 from realitygap.testing import PlatformContractError, check_platform

@@ -15,11 +15,11 @@ from realitygap.platforms import (
     SimPlatform,
     SimRobot,
     retry_genomes,
-    sim_scene,
     trace_genome,
     trace_genomes,
     try_genomes,
 )
+from realitygap.platforms.sim._scene import sim_scene
 from realitygap.robots import Command, Robot
 from realitygap.testing import check_robot
 from realitygap.trials import NoiseKey

@@ -18,7 +18,8 @@ from realitygap.evolution import NeatSettings
 from realitygap.kernels.math.lanes import LANES
 from realitygap.kernels.sim.lanes import SimRules, make_sim_room
 from realitygap.kernels.sim.trial import start_sim, step_sim
-from realitygap.platforms import SimPlatform, sim_scene
+from realitygap.platforms import SimPlatform
+from realitygap.platforms.sim._scene import sim_scene
 from realitygap.world import Arena, Obstacle, RobotModel, load_robot, paper_arena
 from tests.reference import contact as reference
 from tests.reference.effort import cases

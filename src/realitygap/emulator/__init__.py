@@ -4,11 +4,9 @@ Importing this package lets pyserial open ports whose names begin with `emulator
 """
 
 from ._arena import open_arena
-from ._client import run_client
-from ._emulated import EmulatedRobot
+from ._emulated import MILLISECOND, SECOND, EmulatedRobot, nanoseconds
 from ._port import EmulatedPort, number_in, register
-from ._serve import PtyChannel, Server, TcpChannel, WitnessDoor, serve_pty, serve_tcp
-from ._time import MILLISECOND, SECOND, nanoseconds
+from ._serve import Server, WitnessDoor, serve_pty, serve_tcp
 from ._witness import Witness, cells_at_times, connect_witness
 
 register()
@@ -18,9 +16,7 @@ __all__ = [
     "SECOND",
     "EmulatedPort",
     "EmulatedRobot",
-    "PtyChannel",
     "Server",
-    "TcpChannel",
     "Witness",
     "WitnessDoor",
     "cells_at_times",
@@ -28,7 +24,6 @@ __all__ = [
     "nanoseconds",
     "number_in",
     "open_arena",
-    "run_client",
     "serve_pty",
     "serve_tcp",
 ]

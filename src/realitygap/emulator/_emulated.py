@@ -9,6 +9,15 @@ from numpy.typing import NDArray
 
 from realitygap.world import Arena, Pose, cells_along
 
+# Times are whole nanoseconds, so that what happens does not depend on when the robot was switched on.
+SECOND = 1_000_000_000  # [ns]
+MILLISECOND = 1_000_000  # [ns]
+
+
+def nanoseconds(seconds: float) -> int:
+    """Return a duration as whole nanoseconds."""
+    return round(seconds * SECOND)
+
 
 class EmulatedRobot(ABC):
     """A robot as a client sees it through its port, as a function of bytes and time.

@@ -18,8 +18,7 @@ from serial.serialutil import PortNotOpenError, SerialBase, SerialException, Tim
 from realitygap.errors import RobotError, did_you_mean
 from realitygap.robots import SystemClock
 
-from ._emulated import EmulatedRobot
-from ._time import SECOND, nanoseconds
+from ._emulated import SECOND, EmulatedRobot, nanoseconds
 from ._witness import DirectWitness
 
 SCHEME = "emulator"

@@ -15,8 +15,7 @@ from threading import Event, RLock, Thread
 from realitygap._closed_on_exit import ClosedOnExit
 from realitygap.errors import RobotError, check_finite
 
-from ._emulated import EmulatedRobot
-from ._time import SECOND, nanoseconds
+from ._emulated import SECOND, EmulatedRobot, nanoseconds
 from ._witness import DirectWitness, ServedWitness, answer_witness
 
 HOST = "127.0.0.1"

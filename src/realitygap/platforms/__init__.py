@@ -3,9 +3,9 @@
 from ._fleet import Array, Fleet, Outline, Points
 from ._platform import Opening, Platform
 from ._port import PortPlatform
-from ._python import PYTHON, allow_code, load_platform
+from ._python import PYTHON, allow_code
+from ._recorded import RecordedPlatform, RecordedTarget
 from ._registry import (
-    GROUP,
     built_in_platforms,
     emulated_robot,
     emulated_robots,
@@ -15,7 +15,7 @@ from ._registry import (
 )
 from ._repeats import retry_genomes, score_genomes
 from ._settings import PlatformSettings
-from ._simulated import SimTarget, SimulatedPlatform
+from ._simulated import SimTarget
 from ._spec import (
     class_of,
     described_platform,
@@ -29,36 +29,27 @@ from ._spec import (
 from ._try import open_trials, scores_of, trace_genome, trace_genomes, traced_at_once, try_genomes
 from .jyro._platform import JyroPlatform
 from .jyro._robot import JyroRobot
-from .jyro._settings import STEP_S, JyroSettings
-from .jyro._trials import JyroTrials, jyro_rules, jyro_scene
-from .recorded._platform import RecordedPlatform
-from .recorded._target import RecordedTarget
+from .jyro._trials import jyro_rules, jyro_scene
 from .sim._ensemble import Play, Rehearsal, SimEnsemble
 from .sim._platform import SimPlatform, as_sim
 from .sim._robot import SimRobot
-from .sim._scene import SimScene, sim_scene
-from .sim._settings import ARENA, DEFAULT_ROBOT, NOISE, SimSettings, as_numbers
+from .sim._settings import ARENA, DEFAULT_ROBOT, NOISE, as_numbers
 from .sim._trials import SimTrials
 from .sim._world import SimWorld, SimWorldRobot
 from .twin._open import SimTwin, open_twin
 from .twin._platform import TwinPlatform
-from .twin._robots import TwinRobots
 from .twin._target import TwinTarget
 from .twin._trials import close_twins, release_twins
 
 __all__ = [
     "ARENA",
     "DEFAULT_ROBOT",
-    "GROUP",
     "NOISE",
     "PYTHON",
-    "STEP_S",
     "Array",
     "Fleet",
     "JyroPlatform",
     "JyroRobot",
-    "JyroSettings",
-    "JyroTrials",
     "Opening",
     "Outline",
     "Platform",
@@ -72,16 +63,12 @@ __all__ = [
     "SimEnsemble",
     "SimPlatform",
     "SimRobot",
-    "SimScene",
-    "SimSettings",
     "SimTarget",
     "SimTrials",
     "SimTwin",
     "SimWorld",
     "SimWorldRobot",
-    "SimulatedPlatform",
     "TwinPlatform",
-    "TwinRobots",
     "TwinTarget",
     "allow_code",
     "as_numbers",
@@ -96,7 +83,6 @@ __all__ = [
     "jyro_rules",
     "jyro_scene",
     "known_specs",
-    "load_platform",
     "names_a_port",
     "open_target",
     "open_trials",
@@ -108,7 +94,6 @@ __all__ = [
     "retry_genomes",
     "score_genomes",
     "scores_of",
-    "sim_scene",
     "split_spec",
     "study_platforms",
     "trace_genome",

@@ -30,7 +30,7 @@ _SIMULATORS = {
     "sim": f"{__package__}.sim._platform:SimPlatform",
     "twin": f"{__package__}.twin._platform:TwinPlatform",
 }
-_RECORDED = {"recorded": f"{__package__}.recorded._platform:RecordedPlatform"}
+_RECORDED = {"recorded": f"{__package__}._recorded:RecordedPlatform"}
 
 
 @functools.cache

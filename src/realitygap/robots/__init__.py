@@ -1,6 +1,7 @@
 """The contract of a robot, and what drivers of all families share: ports, recordings, guardians, clocks."""
 
 from . import twin
+from ._bases import PortDriver, ProgramRobot
 from ._clock import HEAR_S, Clock, SystemClock, VirtualClock
 from ._contract import (
     Command,
@@ -15,13 +16,20 @@ from ._contract import (
 from ._exits import EXITS
 from ._guardian import Guardian, descriptor_of
 from ._guardian_process import GIVE_UP_S, SILENT_S
-from ._in_program import ProgramRobot
-from ._port_driver import PortDriver
-from ._ports import PortGuess, Terminal, is_in_this_program, list_ports, open_on, split_port, typed_port
+from ._ports import (
+    PortGuess,
+    Terminal,
+    is_in_this_program,
+    list_ports,
+    open_on,
+    reason_of,
+    serial_port,
+    split_port,
+    typed_port,
+)
 from ._recorded_robot import RecordedRobot
-from ._recording import Recorder, Recording, read_recording
+from ._recording import Recording, read_recording
 from ._recording_mcap import export_mcap
-from ._serial_port import reason_of, serial_port
 
 __all__ = [
     "EXITS",
@@ -37,7 +45,6 @@ __all__ = [
     "PortGuess",
     "ProgramRobot",
     "RecordedRobot",
-    "Recorder",
     "Recording",
     "Robot",
     "SystemClock",

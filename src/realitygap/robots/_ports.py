@@ -1,13 +1,19 @@
-"""Robots on ports of any family, and the functions of each family that `realitygap robot` needs."""
+"""Ports: of pyserial, of any family of robots, and the functions of each family that `realitygap robot` needs."""
 
 from __future__ import annotations
 
+import os
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
 from realitygap.errors import RobotError
 from realitygap.robot_families import default_family, find_family, load, robot_families
+
+_EMULATOR = "realitygap.emulator"
+"""The package that pyserial imports for names that begin with emulator://."""
+_NUMBER = re.compile(r"\[Errno (\d+)\]|\((\d+), '")
 
 
 class PortGuess(NamedTuple):
@@ -96,3 +102,23 @@ def open_on(port: str, record: Path | None = None, watchdog_s: float | None = No
     family = find_family(name) or default_family()
     terminal = load(family.terminal)
     return terminal, terminal.open_robot(rest, record, watchdog_s)
+
+
+def serial_port(name: str, baud: int, timeout_s: float) -> Any:
+    """Return a port of pyserial that is not open yet.
+
+    Raises:
+        ValueError: The name has an unknown scheme.
+    """
+    import serial
+
+    if _EMULATOR not in serial.protocol_handler_packages:
+        serial.protocol_handler_packages.append(_EMULATOR)
+    return serial.serial_for_url(name, do_not_open=True, baudrate=baud, timeout=timeout_s)
+
+
+def reason_of(error: Exception) -> str:
+    """Return the reason without the numbers, names, and calls that pyserial puts around it."""
+    if number := _NUMBER.search(str(error)):
+        return os.strerror(int(number[1] or number[2]))
+    return str(error)

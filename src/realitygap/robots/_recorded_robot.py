@@ -9,9 +9,9 @@ from typing import Any
 from realitygap.errors import RecordError, RobotError
 from realitygap.world import Pose
 
+from ._bases import ProgramRobot
 from ._clock import VirtualClock
 from ._contract import Command, Label, Observation, check_command
-from ._in_program import ProgramRobot
 from ._recording import Recording, read_recording
 
 NAME = "recording:"

@@ -19,9 +19,9 @@ import pytest
 from realitygap.emulator import Server, serve_pty, serve_tcp
 from realitygap.errors import RobotError
 from realitygap.families.scribbler import Scribbler
-from realitygap.families.scribbler._holder import LOCKS
 from realitygap.families.scribbler._link import STOP_ANSWER
 from realitygap.families.scribbler._link import STOP_BYTES as STOP
+from realitygap.families.scribbler._ports import LOCKS
 from realitygap.families.scribbler.emulator import Emulator
 from realitygap.families.scribbler.opcodes import Op
 from realitygap.robots import Command

@@ -12,30 +12,18 @@ count forever. Myro cannot recover from this; see `Link._release_counter`.
 from __future__ import annotations
 
 import contextlib
-import errno
 import re
 import threading
-import time
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, NamedTuple, TypeVar
+from typing import NamedTuple, TypeVar
 
 from realitygap.errors import ProtocolError, RobotError, RobotWarning
-from realitygap.robots import (
-    GIVE_UP_S,
-    SILENT_S,
-    Clock,
-    Guardian,
-    SystemClock,
-    descriptor_of,
-    reason_of,
-    serial_port,
-)
+from realitygap.robots import SILENT_S, Clock, Guardian, SystemClock, descriptor_of
 
 from . import _codec as codec
 from ._codec import Request
-from ._holder import LOCKS, holder_of, holder_words
 from ._reading import GAP_S, Fault, HangUp, Port, read_answer
 from .opcodes import COUNTED, JPEG_HEADER, PACKET, Op
 
@@ -47,7 +35,6 @@ wrote only a part of its last packet, the first bytes complete that one, and the
 STOP_ANSWER = re.escape(STOP_BYTES) + rb"[\0\1]{2}.{6}[\0\1]{3}"
 """The echo of the packet and a sensor block, of which five bytes are 0 or 1."""
 
-BAUD = 38400
 QUIET_S = 0.5
 """Silence after which no more bytes are expected [s]. Source: Myro's manual_flush."""
 FORGET_S = 1.2
@@ -62,8 +49,6 @@ MAX_PROBES = 12
 """More than the bytes that any of the Fluke's counters can still expect."""
 DOUBT_S = 2.0
 """Time without an answer after which a warning states that the motors may be running [s]."""
-WRITE_S = 2.0
-"""Maximum time for which a port may refuse a command [s]."""
 ATTEMPTS = 5
 """Attempts for a command that is safe to repeat: enough if half a percent of all bytes are lost."""
 RECOVERIES = 8
@@ -80,10 +65,6 @@ STRANGER_PROBES = 8
 """Number of probes: enough to release a Fluke, and less than a packet for a robot without a Fluke."""
 PSEUDO_TERMINALS = ("/dev/pts/", "/dev/ttys")
 """First letters of the names of pseudo-terminals, on Linux and macOS."""
-LOCKED_S = 0.05
-"""Time between two attempts to open a port that the guardian of an ended program still holds [s]."""
-UNKNOWN_HOLDER_S = 2.0
-"""Time to retry if the system does not report which process locked the port [s]."""
 
 
 try:
@@ -149,78 +130,11 @@ class _LostStep(Exception):  # noqa: N818
         self.fault = fault
 
 
-class _Locked(Exception):  # noqa: N818
-    """Another process has locked the port."""
-
-
-def open_port(name: str) -> Any:
-    """Open a port with pyserial, with DTR low, as a cabled S2 requires.
-
-    If the guardian of an ended program still holds the port, this waits for it.
-
-    Raises:
-        RobotError: The port cannot be opened. The message states the next step.
-    """
-    give_up_s = time.monotonic() + (GIVE_UP_S + 1.0 if LOCKS.exists() else UNKNOWN_HOLDER_S)
-    while True:
-        try:
-            return _open_once(name)
-        except _Locked as error:
-            holder = holder_of(name)
-            if holder is not None or time.monotonic() > give_up_s:
-                raise RobotError(f"{name} cannot be opened: it is in use. {holder_words(holder)}") from error
-        time.sleep(LOCKED_S)
-
-
-def _open_once(name: str) -> Any:
-    if name.startswith("rfc2217://"):
-        raise RobotError(
-            f"{name} cannot be opened: RFC 2217 is not supported, as its ports cannot be handed to the process that "
-            "stops a robot whose program was killed. Offer the port as raw TCP and name it socket://HOST:PORT."
-        )
-    port: Any = None
-    try:
-        port = serial_port(name, BAUD, GAP_S)
-        port.write_timeout = WRITE_S
-        port.dtr = False
-        with contextlib.suppress(AttributeError, NotImplementedError, ValueError):
-            port.exclusive = True
-        port.open()
-    except (OSError, ValueError, AttributeError) as error:
-        if getattr(error, "errno", None) == errno.EAGAIN:
-            raise _Locked from error
-        raise RobotError(f"{name} cannot be opened: {reason_of(error)}. {_advice(name, error)}") from error
-    return port
-
-
-def is_serial_port(port: object) -> bool:
-    """Return whether a port is one of pyserial's, whose name identifies the device."""
-    import serial
-
-    return isinstance(port, serial.SerialBase)
-
-
-def serial_devices() -> list[Any]:
-    """Return the serial ports of the system, as pyserial describes them."""
-    from serial.tools import list_ports
-
-    return list(list_ports.comports())
-
-
-def _advice(name: str, error: Exception) -> str:
-    text = str(error).lower()
-    if "permission" in text or "denied" in text:
-        return "May this account use it? On Linux: sudo usermod -aG dialout $USER, then log in again."
-    if "://" in name:
-        return "Is the address right, and does something listen there?"
-    return "Is the robot on, paired and connected? `realitygap robot list` lists the existing ports."
-
-
 class Link:
     """A port with a robot at its other end. Every method may be called from any thread.
 
     Args:
-        port: A result of `open_port`, or any object with the same methods. Its attribute `clock` is the clock.
+        port: A port that is open, or any object with the same methods. Its attribute `clock` is the clock.
         name: Name of the port, for messages.
 
     Attributes:

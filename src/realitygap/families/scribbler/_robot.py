@@ -16,8 +16,8 @@ from ._camera import Camera
 from ._channels import Channels
 from ._device import RobotInfo
 from ._driving import Driving
-from ._link import Link, is_serial_port, open_port
-from ._ports import label_of, port_name
+from ._link import Link
+from ._ports import is_serial_port, label_of, open_port, port_name
 from ._sound import SoundAndLight
 from ._watchdog import Watchdog, WatchedClock
 

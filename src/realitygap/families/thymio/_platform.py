@@ -1,20 +1,44 @@
-"""The platform `thymio`: a Thymio II, driven over its own protocol."""
+"""The platform `thymio`: a Thymio II, driven over its own protocol; and what all platforms with a Thymio share."""
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 from pydantic import Field, PrivateAttr
 
-from realitygap.platforms import Opening, PortPlatform
-from realitygap.world import Arena
-
-from ._body import ThymioBody
+from realitygap.platforms import Opening, Platform, PortPlatform
+from realitygap.world import Arena, Body, RangeSensors, RobotModel, load_robot
 
 if TYPE_CHECKING:
     from realitygap.trials import Target
 
     from ._robot import Thymio
+
+
+class ThymioBody(Platform):
+    """A platform whose robot is a Thymio II."""
+
+    base_robot: ClassVar[str] = "thymio"
+
+    @cached_property
+    def _model(self) -> RobotModel:
+        return load_robot(self.base_robot)
+
+    @property
+    def body(self) -> Body:
+        """The outline of the Thymio in figures."""
+        return Body(tuple(self._model.body[0].corners))
+
+    @property
+    def sensors(self) -> RangeSensors:
+        """The mounts of its infrared sensors in figures."""
+        return RangeSensors(self._model.mounts, self._model.reach)
+
+    @property
+    def outline_words(self) -> str:
+        """The origin of the outline in figures, for their captions."""
+        return "Enki’s"
 
 
 class ThymioPlatform(ThymioBody, PortPlatform):
@@ -65,9 +89,9 @@ class ThymioPlatform(ThymioBody, PortPlatform):
 
     def in_arena(self, arena: Arena) -> Self:
         """Return the platform with the arena with which a playground in this program begins."""
-        found = self.model_copy()
-        found._arena = arena
-        return found
+        platform = self.model_copy()
+        platform._arena = arena
+        return platform
 
     def open(self, arena: Arena, how: Opening) -> Target:
         """Open the robot for trials one by one, with its observer or its witness."""

@@ -10,15 +10,14 @@ import numpy as np
 
 from realitygap.world import Arena, Pose
 
-from ._encoders import Encoders
 from ._ir import IrSensors
 from ._model import TwinModel
 from ._motors import NOMINAL, Servo
 from ._physics import Floats, Physics
 from ._random import DELAYS, numbers_for
 from ._robot import FULL_SCALE
+from ._senses import Encoders, Idler
 from ._shape import STEP_S
-from ._stall import Idler
 
 EMITTERS = ("left", "center", "right")
 JITTER_STEPS = 100  # time until the next delay is drawn: half a second

@@ -10,20 +10,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realitygap.errors import whole_number
+from realitygap.robots._bases import ProgramRobot
 from realitygap.robots._clock import VirtualClock
 from realitygap.robots._contract import Command, Label, Observation, check_command
-from realitygap.robots._in_program import ProgramRobot
 from realitygap.world import Arena, Pose, cells_along
 
-from ._ambient import Ambient, names_of
-from ._encoders import Encoders
 from ._ir import IrSensors
 from ._model import TwinModel
 from ._motors import NOMINAL, TICK_S, PlainSpeeds, Servo, SpeedSteps
 from ._physics import Physics
 from ._random import DELAYS, numbers_for
+from ._senses import Ambient, Encoders, Idler, names_of
 from ._shape import STEP_S
-from ._stall import Idler
 
 FULL_SCALE = 6400.0  # of a Fluke's obstacle reading
 TICK_STEPS = round(TICK_S / STEP_S)
@@ -206,7 +204,7 @@ class TwinRobot(ProgramRobot):
     @property
     def encoders(self) -> tuple[float, float]:
         """Way of the left and the right wheel since the start of the trial, as its encoders tell it [m]."""
-        return self._encoders.told
+        return self._encoders.distances
 
     @property
     def wheels(self) -> tuple[float, float]:

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from realitygap.world import Arena
 
-from .._body import ThymioBody
+from .._platform import ThymioBody
 
 if TYPE_CHECKING:
     from realitygap.robots import Robot

@@ -1,13 +1,14 @@
-"""Earlier trials as a target: it runs nothing, and returns the trials of a file."""
+"""The platform `recorded`: it runs nothing, and returns the earlier trials of a file."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, ClassVar, cast
 
 import numpy as np
+from pydantic import Field
 
 from realitygap.errors import RecordError
 from realitygap.evolution import Genome
@@ -22,10 +23,29 @@ from realitygap.records import (
     those_that_count,
 )
 from realitygap.robots import Label
-from realitygap.trials import RepeatableTarget, TellTrial, TrialPlan, check_plans
+from realitygap.trials import RepeatableTarget, Target, TellTrial, TrialPlan, check_plans
 from realitygap.world import Arena
 
+from ._platform import Opening, Platform
+
 MOST_NUMBER = 2**63 - 1
+
+
+class RecordedPlatform(Platform):
+    """The trials in a file of observed trials."""
+
+    name: ClassVar[str] = "recorded"
+    summary: ClassVar[str] = "earlier trials: looked up in a file or a log"
+    rest: ClassVar[str] = "FILE"
+    rest_setting: ClassVar[str] = "file"
+    needs_rest: ClassVar[bool] = True
+    is_for_studies: ClassVar[bool] = False
+
+    file: str = Field("", description="File of the trials.")
+
+    def open(self, arena: Arena, how: Opening) -> Target:
+        """Open the file; the arena is the one that it names."""
+        return RecordedTarget(self.file, name=how.name)
 
 
 class RecordedTarget(RepeatableTarget):
@@ -52,11 +72,10 @@ class RecordedTarget(RepeatableTarget):
     inputs = None
 
     def __init__(self, path: str | Path, name: str = "") -> None:
-        found = (
-            read_observations(path) if is_observations(path) or not Path(path).exists() else _imported(path)
-        )
+        is_own = is_observations(path) or not Path(path).exists()
+        record = read_observations(path) if is_own else _imported(path)
         whole = {
-            (trial.genome, trial.number): trial for trial in those_that_count(found.trials) if trial.genome
+            (trial.genome, trial.number): trial for trial in those_that_count(record.trials) if trial.genome
         }
         if not whole:
             raise RecordError(
@@ -66,9 +85,9 @@ class RecordedTarget(RepeatableTarget):
         self._path = Path(path)
         self._trials = list(whole.values())
         self.name = name or f"recorded:{path}"
-        self.label = cast("Label", found.head.label)
-        self.identity = found.head.identity
-        self.arena = Arena.from_dict(cast("dict[str, Any]", dict(found.head.arena)))
+        self.label = cast("Label", record.head.label)
+        self.identity = record.head.identity
+        self.arena = Arena.from_dict(cast("dict[str, Any]", dict(record.head.arena)))
         self.step_s = float(np.median([trial.step_s for trial in self._trials]))
         self.n_sensors = self._trials[0].readings.shape[1]
         counted: Observe = "track" if all(trial.cells for trial in self._trials) else "readings"
@@ -87,26 +106,26 @@ class RecordedTarget(RepeatableTarget):
         """
         check_plans(plans, observe, self, MOST_NUMBER)
         taken: Counter[str] = Counter()
-        found = []
+        trials = []
         for k, plan in enumerate(plans):
             genome = "" if plan.genome is None else plan.genome.to_json()
-            there = [
+            matches = [
                 trial
                 for trial in self._trials
                 if genome and trial.genome == genome and len(trial.commands) == plan.steps
             ]
-            if taken[genome] >= len(there):
+            if taken[genome] >= len(matches):
                 raise RecordError(
-                    f"{self._path} has {len(there)} trials of {plan.steps} steps of a controller, but one more "
+                    f"{self._path} has {len(matches)} trials of {plan.steps} steps of a controller, but one more "
                     f"was requested; most of its trials have {self.steps} steps. Request fewer, or record "
                     "more."
                 )
-            trial = there[taken[genome]].seen_as(observe)
+            trial = matches[taken[genome]].seen_as(observe)
             taken[genome] += 1
-            found.append(trial)
+            trials.append(trial)
             if tell is not None:
                 tell(k, trial)
-        return found
+        return trials
 
     def close(self) -> None:
         """Nothing is held."""

@@ -1,4 +1,4 @@
-"""Base class of drivers of robots on a port: the recording of a session, and the end of a `with` block."""
+"""Base classes of robots: in this program, and behind a port. They stop, close, and are recorded in one way."""
 
 from __future__ import annotations
 
@@ -9,12 +9,35 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
+from realitygap._closed_on_exit import ClosedOnExit
 from realitygap.errors import RecordError, RobotError
 
 from ._clock import Clock
 from ._recording import NoRecorder, Recorder
 
 _SET_UP = ("label", "step_s", "n_sensors", "reading_max")
+
+
+class ProgramRobot(ClosedOnExit):
+    """A robot that lives in this program. Using it after it was closed is an error."""
+
+    _is_open = True
+    _closed = "This simulated robot is closed: make a new one."
+
+    def stop(self) -> None:
+        """Do nothing, because the robot moves only while a command lasts.
+
+        This is safe at any moment, and if called twice.
+        """
+
+    def close(self) -> None:
+        """Stop the robot and release it. This is safe if called twice."""
+        self.stop()
+        self._is_open = False
+
+    def _check_open(self) -> None:
+        if not self._is_open:
+            raise RobotError(self._closed)
 
 
 class PortDriver:
@@ -33,7 +56,7 @@ class PortDriver:
         return self._recorder
 
     def _record_set_up(self, name: str, **more: Any) -> None:
-        set_up: Mapping[str, Any] = {each: getattr(self, each) for each in _SET_UP}
+        set_up: Mapping[str, Any] = {key: getattr(self, key) for key in _SET_UP}
         self._recorder.begin({"port": name, "robot": asdict(self.info), **set_up, **more})
 
     def _record_failure(self, name: str, error: BaseException) -> None:

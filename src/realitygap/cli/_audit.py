@@ -11,6 +11,7 @@ import realitygap
 from realitygap._terminal import echo
 
 from ._json import print_json
+from ._options import Json
 
 if TYPE_CHECKING:
     from realitygap.report import Audit, AuditProgress
@@ -27,7 +28,7 @@ def audit_results(
         int | None,
         typer.Option(min=1, metavar="N", help="Report the values that are not k/N. The paper has N = 72."),
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the audit as JSON.")] = False,
+    as_json: Json = False,
 ) -> None:
     """Report what a small table of results can show.
 

@@ -14,6 +14,7 @@ from realitygap._terminal import echo
 from realitygap.errors import RealityGapError
 
 from ._json import print_json
+from ._options import Json
 
 WIDEST = 110
 """Letters of a line of prose, on a terminal that has more."""
@@ -49,7 +50,7 @@ def audit_distance(
         ),
     ] = 0.6,
     seed: Annotated[int, typer.Option(min=0, metavar="N", help="Seed of the random walks and pairs.")] = 1,
-    as_json: Annotated[bool, typer.Option("--json", help="Print everything as JSON.")] = False,
+    as_json: Json = False,
 ) -> None:
     """Report what a behavior distance weighs.
 

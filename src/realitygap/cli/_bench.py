@@ -12,6 +12,7 @@ from realitygap._terminal import echo
 from realitygap.errors import StudyError, did_you_mean
 
 from ._json import print_json
+from ._options import Json
 
 DEFAULT_SEEDS = 100
 _ONLY_TASKS = "Only with a task"
@@ -54,7 +55,7 @@ def bench(
             metavar="KEY=VALUE", help="Change one setting of NEAT. Repeatable.", rich_help_panel=_ONLY_TASKS
         ),
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the figures as JSON.")] = False,
+    as_json: Json = False,
     seconds: Annotated[
         float | None,
         typer.Option(

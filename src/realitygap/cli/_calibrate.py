@@ -20,6 +20,7 @@ from ._camera import CameraOfRobots, under_camera
 from ._code import AllowPlatforms
 from ._json import print_json
 from ._observer import sheet_observer
+from ._options import Json
 from ._order import command_of
 
 if TYPE_CHECKING:
@@ -38,7 +39,7 @@ def calibrate(
         ),
     ] = None,
     allow_code: AllowPlatforms = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
+    as_json: Json = False,
 ) -> None:
     """Calibrate, print the result, and draw the figure."""
     _check(order, camera, figure)

@@ -11,6 +11,7 @@ from realitygap._terminal import echo
 from realitygap.orders import ClosingOrder
 
 from ._json import print_json
+from ._options import Json
 from ._order import command_of
 from ._results import show_page
 
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 @command_of(ClosingOrder)
 def closing(
     order: ClosingOrder,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
+    as_json: Json = False,
     open_page: Annotated[
         bool, typer.Option("--open", help="When done, show the page in the browser.")
     ] = False,

@@ -13,8 +13,9 @@ from realitygap.robot_families import ports_by_family
 
 from ._camera import Camera, operated_under_camera
 from ._code import AllowTasks, code_permission
+from ._options import Json, OpenPage, Replicates, StudyFolder, StudySeed, who_option
 from ._results import show_page, written_report
-from ._study import Replicates, StudyFolder, StudySeed, print_result
+from ._study import print_result
 
 
 def drive(
@@ -60,15 +61,10 @@ def drive(
     despite_preflight: Annotated[
         bool, typer.Option("--despite-preflight", help="Drive even if the pre-flight check fails.")
     ] = False,
-    who: Annotated[
-        str | None,
-        typer.Option(metavar="NAME", help="Name to record with each score. [default: your account's name]"),
-    ] = None,
+    who: Annotated[str | None, who_option()] = None,
     allow_code: AllowTasks = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
-    open_page: Annotated[
-        bool, typer.Option("--open", help="When done, write the report and show it in the browser.")
-    ] = False,
+    as_json: Json = False,
+    open_page: OpenPage = False,
 ) -> None:
     """Drive the conditions of a study that are on a robot.
 

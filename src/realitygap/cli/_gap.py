@@ -17,6 +17,7 @@ from ._camera import CameraOfRobots, under_camera
 from ._code import AllowPlatforms
 from ._json import print_json
 from ._observer import attending_observer
+from ._options import Json
 from ._order import command_of
 
 if TYPE_CHECKING:
@@ -33,7 +34,7 @@ def gap(
         Path | None, typer.Option(metavar="FILE", help="Page to write, with figures and tables (.html).")
     ] = None,
     allow_code: AllowPlatforms = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
+    as_json: Json = False,
 ) -> None:
     """Measure the gap, print the result, and write the page."""
     if report is not None:
@@ -121,7 +122,7 @@ def _print_why(why: Why) -> None:
 def plan(
     order: PlanOrder,
     allow_code: AllowPlatforms = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the plan as JSON.")] = False,
+    as_json: Json = False,
 ) -> None:
     """Plan, and print the table."""
     found = realitygap.study.plan_gap(order, allow_code=allow_code)

@@ -14,6 +14,7 @@ from realitygap._terminal import echo
 from realitygap.errors import LogError
 
 from ._json import print_json
+from ._options import Json
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -62,7 +63,7 @@ def import_log(
     show_map: Annotated[
         bool, typer.Option("--show-map", help="Print the mapping as TOML, and write nothing.")
     ] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the report as JSON.")] = False,
+    as_json: Json = False,
 ) -> None:
     """Turn a log of a real robot into trials.
 

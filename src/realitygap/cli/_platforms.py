@@ -12,6 +12,7 @@ from realitygap.errors import StudyError
 
 from ._code import AllowPlatforms
 from ._json import print_json
+from ._options import Json
 
 
 def platforms(
@@ -22,7 +23,7 @@ def platforms(
         ),
     ] = None,
     arena: Annotated[str, typer.Option(metavar="NAME", help="Arena for --check.")] = "paper",
-    as_json: Annotated[bool, typer.Option("--json", help="Print the list as JSON.")] = False,
+    as_json: Json = False,
     allow_code: AllowPlatforms = False,
 ) -> None:
     """List the platforms that can run trials.

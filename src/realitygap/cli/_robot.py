@@ -16,6 +16,7 @@ from realitygap.errors import RobotError
 from realitygap.robot_families import default_family, own_families, ports_by_family, robot_families
 
 from ._json import print_json
+from ._options import Json
 
 robot = typer.Typer(
     name="robot",
@@ -37,7 +38,6 @@ Port = Annotated[
 Record = Annotated[
     Path | None, typer.Option(metavar="FILE", help="New file to record the session in, for show-recording.")
 ]
-Json = Annotated[bool, typer.Option("--json", help="Print data as JSON.")]
 
 LONGEST_DRIVE_S = 3600.0
 

@@ -16,6 +16,7 @@ from realitygap.errors import StudyError
 
 from ._grid_editor import pick_cells
 from ._json import print_json
+from ._options import correct_option, second_option, who_option
 from ._print_sheet import sheet_layout, study_sheet
 from ._trials import _Titles
 
@@ -86,30 +87,9 @@ def score(
             rich_help_panel=_WITH_STUDY,
         ),
     ] = False,
-    who: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME",
-            help="Name to record with each score. [default: your account's name]",
-            rich_help_panel=_WITH_STUDY,
-        ),
-    ] = None,
-    second: Annotated[
-        bool,
-        typer.Option(
-            "--second",
-            help="Enter the cells as a second count, only for the agreement.",
-            rich_help_panel=_WITH_STUDY,
-        ),
-    ] = False,
-    correct: Annotated[
-        bool,
-        typer.Option(
-            "--correct",
-            help="Enter the cells as a correction, after the generation was closed.",
-            rich_help_panel=_WITH_STUDY,
-        ),
-    ] = False,
+    who: Annotated[str | None, who_option(_WITH_STUDY)] = None,
+    second: Annotated[bool, second_option(_WITH_STUDY)] = False,
+    correct: Annotated[bool, correct_option(_WITH_STUDY)] = False,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print JSON. Enters nothing without --yes.")
     ] = False,

@@ -17,6 +17,7 @@ from realitygap.orders import ClosingOrder
 
 from ._code import AllowTasks, code_permission
 from ._json import print_json
+from ._options import Json, OpenPage, Replicates, StudyFolder, StudySeed
 from ._results import show_page, written_report
 
 if TYPE_CHECKING:
@@ -25,12 +26,6 @@ if TYPE_CHECKING:
 
 
 _COMPUTING = "Computing"
-
-Replicates = Annotated[int | None, typer.Option(min=1, help="Runs per condition. [default: from the study]")]
-StudyFolder = Annotated[
-    Path | None, typer.Option(metavar="DIR", help="Folder for the results. [default: results/NAME]")
-]
-StudySeed = Annotated[int | None, typer.Option(min=0, help="Seed of the study. [default: from the study]")]
 
 
 def run(
@@ -77,10 +72,8 @@ def run(
         ),
     ] = None,
     allow_code: AllowTasks = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,
-    open_page: Annotated[
-        bool, typer.Option("--open", help="When done, write the report and show it in the browser.")
-    ] = False,
+    as_json: Json = False,
+    open_page: OpenPage = False,
 ) -> None:
     """Run a study, or resume one that was interrupted.
 

@@ -17,6 +17,7 @@ from realitygap._terminal import echo
 from realitygap.errors import StudyError
 
 from ._json import print_json
+from ._options import Json, second_option
 
 if TYPE_CHECKING:
     from realitygap.records import ScoreRole
@@ -129,18 +130,11 @@ def track(
             rich_help_panel=_TRIAL,
         ),
     ] = None,
-    second: Annotated[
-        bool,
-        typer.Option(
-            "--second",
-            help="Enter the cells as a second count, only for the agreement.",
-            rich_help_panel=_TRIAL,
-        ),
-    ] = False,
+    second: Annotated[bool, second_option(_TRIAL)] = False,
     who: Annotated[
         str, typer.Option(metavar="NAME", help="Name to record with the score.", rich_help_panel=_TRIAL)
     ] = "camera",
-    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
+    as_json: Json = False,
 ) -> None:
     """Track a tagged robot in a video or camera stream.
 

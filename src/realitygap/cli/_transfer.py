@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
@@ -14,6 +14,7 @@ from realitygap.orders import TransferOrder
 from ._code import AllowPlatforms
 from ._json import print_json
 from ._observer import attending_observer
+from ._options import Json
 from ._order import command_of
 
 if TYPE_CHECKING:
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
 def transfer(
     order: TransferOrder,
     allow_code: AllowPlatforms = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
+    as_json: Json = False,
 ) -> None:
     """Run the transfer, and print the result."""
     try:

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import statistics
-from typing import Annotated
-
-import typer
 
 import realitygap
 from realitygap._terminal import echo
@@ -14,6 +11,7 @@ from realitygap.orders import TryOrder
 from ._code import AllowPlatforms
 from ._json import print_json
 from ._observer import attending_observer
+from ._options import Json
 from ._order import command_of
 
 
@@ -21,7 +19,7 @@ from ._order import command_of
 def try_genome(
     order: TryOrder,
     allow_code: AllowPlatforms = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the coverage as JSON.")] = False,
+    as_json: Json = False,
 ) -> None:
     """Drive the trials, and print the coverage."""
     observer = attending_observer(order.on, order.witness)

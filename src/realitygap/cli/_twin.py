@@ -15,6 +15,7 @@ from realitygap.errors import RealityGapError
 from realitygap.robot_families import load, robot_families
 
 from ._json import print_json
+from ._options import Json
 
 twin = typer.Typer(
     name="twin",
@@ -37,7 +38,7 @@ def families(
             metavar="FAMILY", help="Family to describe; or every, for the numbers that all twins draw."
         ),
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print data as JSON.")] = False,
+    as_json: Json = False,
 ) -> None:
     """List the families of twins.
 

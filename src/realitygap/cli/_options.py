@@ -1,0 +1,43 @@
+"""Options that several commands have in the same words."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
+OpenPage = Annotated[
+    bool, typer.Option("--open", help="When done, write the report and show it in the browser.")
+]
+Replicates = Annotated[int | None, typer.Option(min=1, help="Runs per condition. [default: from the study]")]
+StudyFolder = Annotated[
+    Path | None, typer.Option(metavar="DIR", help="Folder for the results. [default: results/NAME]")
+]
+StudySeed = Annotated[int | None, typer.Option(min=0, help="Seed of the study. [default: from the study]")]
+
+
+def who_option(panel: str | None = None) -> Any:
+    """Return the option of the person who counts cells."""
+    return typer.Option(
+        metavar="NAME",
+        help="Name to record with each entry. [default: your account's name]",
+        rich_help_panel=panel,
+    )
+
+
+def second_option(panel: str) -> Any:
+    """Return the option of a second count."""
+    return typer.Option(
+        "--second", help="Enter the cells as a second count, only for the agreement.", rich_help_panel=panel
+    )
+
+
+def correct_option(panel: str) -> Any:
+    """Return the option of a correction."""
+    return typer.Option(
+        "--correct",
+        help="Enter the cells as a correction, after the generation was closed. Only reports use it.",
+        rich_help_panel=panel,
+    )

@@ -116,7 +116,7 @@ def mistakes(
         if problem["type"] == "too_short" and problem["loc"] in within:
             continue  # a list whose entries have mistakes is not too short
         place, last, owner = _place(model, problem["loc"])
-        found.setdefault(place, []).append(_explained(problem, owner))
+        found.setdefault(place, []).append(explained(problem, owner))
         is_setting[place] = last in owner.model_fields
     lines = []
     for place, texts in found.items():
@@ -195,7 +195,13 @@ def _value_at(values: Mapping[str, Any], place: str) -> Any:
     return found
 
 
-def _explained(problem: Any, model: type[BaseModel]) -> str:
+def explained(problem: Any, model: type[BaseModel] = BaseModel) -> str:
+    """Return a mistake that pydantic found, in words: "expected a whole number, got 'two'.".
+
+    Args:
+        problem: One of `ValidationError.errors()`.
+        model: Model that the setting belongs to. Its settings and tables are part of some messages.
+    """
     kind = problem["type"]
     context = problem.get("ctx", {})
     came = shown(problem["input"])
@@ -208,7 +214,7 @@ def _explained(problem: Any, model: type[BaseModel]) -> str:
     if kind == "value_error":
         # the value of a whole model is too long to show
         is_table = not problem["loc"] or isinstance(problem["input"], Mapping | BaseModel)
-        said = str(context["error"])
+        said = str(context["error"]).removesuffix(".")
         if is_table:
             return said if said.endswith("?") else f"{said}."
         # a message that already includes the value needs no addition

@@ -46,7 +46,7 @@ def test_usage_errors_state_the_given_value():
     done = run("paper", "--resolution", "0", "-o", "a.yaml")
     assert done.exit_code == 2
     assert "Invalid value for '--resolution'" in done.stderr
-    assert done.stderr.endswith("greater than or equal to 0.0001, got '0'\n")
+    assert done.stderr.endswith(": expected at least 0.0001, got '0'.\n")
 
 
 def test_an_arena_by_the_name_of_a_map_says_how_to_convert_it():

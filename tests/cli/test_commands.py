@@ -170,10 +170,22 @@ def test_every_number_of_every_command_must_be_finite():
                         words = ["--", *(wrong for word in needed)]
                     done = CliRunner().invoke(app, [*path, *words])
                     assert done.exit_code == 2, f"{path} {words}: {done.output}"
-                    assert "finite number" in done.output or "Input should be" in done.output, (
-                        f"{path} {words}"
-                    )
+                    assert "finite number" in done.output or ": expected " in done.output, f"{path} {words}"
     assert n_numbers > 20
+
+
+def test_every_command_refuses_words_for_whole_numbers_as_study_files_do():
+    n_options = 0
+    for path, command in members():
+        hints = get_type_hints(command.callback) if command.params and command.callback else {}
+        for parameter in command.params:
+            hint = hints.get(parameter.name)
+            if parameter.opts[0].startswith("-") and int in (hint, *get_args(hint)):
+                n_options += 1
+                done = CliRunner().invoke(app, [*path, f"{parameter.opts[0]}=two"])
+                assert done.exit_code == 2, f"{path}: {done.output}"
+                assert "expected a whole number, got 'two'." in done.output, f"{path} {parameter.opts[0]}"
+    assert n_options > 20
 
 
 def test_option_version_prints_the_version():

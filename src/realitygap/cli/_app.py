@@ -43,7 +43,9 @@ class _RootGroup(TyperGroup):
             from pydantic import ValidationError  # here, because its import takes long
 
             if isinstance(error.__cause__, ValidationError):
-                error.message += f", got {error.__cause__.errors()[0]['input']!r}"
+                from realitygap.settings import explained
+
+                error.message = explained(error.__cause__.errors()[0])
             _make_printable(error)
             raise
         except Exception as error:

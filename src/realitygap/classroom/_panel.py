@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import math
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import cache
 from importlib import resources
 from typing import Any
@@ -14,7 +14,7 @@ from realitygap._how_to_run import install_command
 from realitygap.classroom.jyro import Camera, JyroWorld, SceneRobot
 from realitygap.drawing import theme_rules, themed
 from realitygap.errors import RealityGapError
-from realitygap.playback import widget_modules
+from realitygap.playback import widget_class
 
 FILES = resources.files(__package__)
 """Files of the pages of the widgets."""
@@ -34,43 +34,38 @@ _MAX_FRAMES = 10
 
 @cache
 def panel_class() -> type:
-    """Return the class of the widget; it is made when it is first needed, because anywidget is an extra.
+    """Return the class of the widget.
 
     Raises:
         RealityGapError: anywidget is not installed.
     """
-    anywidget, traitlets = widget_modules(
+    return widget_class(
+        "Panel",
         f"A panel needs anywidget, which is not installed: {install_command('notebook')}. Without a notebook, "
-        "drive on the page Robot of `realitygap lab`."
+        "drive on the page Robot of `realitygap lab`.",
+        FILES.joinpath("panel.js").read_text("utf-8"),
+        theme_rules(".rg-panel") + FILES.joinpath("panel.css").read_text("utf-8"),
+        title="",
+        svg="",
+        camera="",
+        clock="",
+        problem="",
+        robots=[],
+        has_time=False,
     )
-
-    class Panel(anywidget.AnyWidget):  # type: ignore[name-defined, misc]  # anywidget is an extra
-        """A panel in a notebook."""
-
-        _esm = FILES.joinpath("panel.js").read_text("utf-8")
-        _css = theme_rules(".rg-panel") + FILES.joinpath("panel.css").read_text("utf-8")
-        title = traitlets.Unicode().tag(sync=True)
-        svg = traitlets.Unicode().tag(sync=True)
-        camera = traitlets.Unicode().tag(sync=True)
-        clock = traitlets.Unicode().tag(sync=True)
-        problem = traitlets.Unicode().tag(sync=True)
-        robots = traitlets.List().tag(sync=True)
-        has_time = traitlets.Bool(False).tag(sync=True)
-
-    return Panel
 
 
 class _Panel:
     """A panel, and the answers to the messages of its page."""
 
-    def __init__(self, title: str, **traits: Any) -> None:
-        self.widget: Any = panel_class()(title=title, **traits)
+    def __init__(self, title: str, **values: object) -> None:
+        self.widget: Any = panel_class()(title=title, **values)
         self.widget.on_msg(self._hear)
 
-    def _repr_mimebundle_(self, **options: Any) -> Any:
+    def _repr_mimebundle_(self, **options: object) -> object:
         return self.widget._repr_mimebundle_(**options)
 
-    def _hear(self, _widget: Any, content: dict[str, Any], _buffers: Any) -> None:
+    def _hear(self, _widget: object, content: Mapping[str, object], _buffers: object) -> None:
         try:
             self._obey(str(content.get("kind")), content)
             self.widget.problem = ""
@@ -79,7 +74,7 @@ class _Panel:
         finally:
             self.widget.send({"kind": "heard", "n": content.get("n", 0)})
 
-    def _obey(self, kind: str, content: dict[str, Any]) -> None:
+    def _obey(self, kind: str, content: Mapping[str, object]) -> None:
         raise NotImplementedError
 
 
@@ -112,7 +107,7 @@ class DrivePanel(_Panel):
         self._timer: threading.Timer | None = None
         super().__init__(title, svg="" if picture is None else themed(picture()))
 
-    def _obey(self, kind: str, content: dict[str, Any]) -> None:
+    def _obey(self, kind: str, content: Mapping[str, object]) -> None:
         if kind == "drive":
             with self._lock:
                 self._wait_again()
@@ -183,7 +178,7 @@ class WorldPanel(_Panel):
         super().__init__("World", robots=names, has_time=True)
         self._show()
 
-    def _obey(self, kind: str, content: dict[str, Any]) -> None:
+    def _obey(self, kind: str, content: Mapping[str, object]) -> None:
         if kind == "drive":
             self.robot.move(
                 _share(content.get("ahead")) * self._speed, _share(content.get("turn")) * self._turn
@@ -212,7 +207,7 @@ class WorldPanel(_Panel):
         self.widget.clock = f"{self.world.time:.1f} s, step {self.world.n_steps}{stalled}"
 
 
-def _share(value: Any) -> float:
+def _share(value: object) -> float:
     """Return a deflection that a page sent, limited to -1 to 1; 0 if it is no number."""
     if isinstance(value, int | float) and math.isfinite(value):
         return min(max(float(value), -1.0), 1.0)

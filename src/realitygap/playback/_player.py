@@ -66,42 +66,50 @@ FILES = resources.files("realitygap.playback")
 """Files of the pages of the widgets."""
 
 
-def widget_modules(missing: str) -> tuple[Any, Any]:
-    """Return the modules anywidget and traitlets, which are an extra.
+_TRAITS = {str: "Unicode", float: "Float", bool: "Bool", list: "List", dict: "Dict"}
+
+
+def widget_class(name: str, missing: str, esm: str, css: str = "", **values: object) -> type:
+    """Return the class of a widget in a notebook, which its page and the kernel share values with.
+
+    Args:
+        name: Name of the class.
+        missing: Message if anywidget, which is an extra, is not installed.
+        esm, css: Script and styles of the page.
+        values: First value of each shared one, by its name.
 
     Raises:
-        RealityGapError: They are not installed.
+        RealityGapError: anywidget is not installed.
     """
     try:
-        return import_module("anywidget"), import_module("traitlets")
+        anywidget, traitlets = import_module("anywidget"), import_module("traitlets")
     except ImportError as error:
         raise RealityGapError(missing) from error
+    traits = {
+        key: getattr(traitlets, _TRAITS[type(value)])(value).tag(sync=True) for key, value in values.items()
+    }
+    return type(name, (anywidget.AnyWidget,), {"_esm": esm, "_css": css, **traits})
 
 
 @cache
 def player_class() -> type:
-    """Return the class of the widget; made when it is first needed, because anywidget is an extra.
+    """Return the class of the player.
 
     Raises:
         RealityGapError: anywidget is not there.
     """
-    anywidget, traitlets = widget_modules(
+    return widget_class(
+        "Player",
         f"Trials are shown in a notebook by anywidget, which is not installed: {install_command('notebook')}. "
-        "realitygap.write_movie needs none."
+        "realitygap.write_movie needs none.",
+        FILES.joinpath("player.js").read_text("utf-8"),
+        theme_rules(".rg-player") + FILES.joinpath("player.css").read_text("utf-8"),
+        scene={},
+        trials=[],
+        speed=1.0,
+        live=False,
+        was_live=False,
     )
-
-    class Player(anywidget.AnyWidget):  # type: ignore[name-defined, misc]  # anywidget is an extra
-        """Trials in motion in a notebook."""
-
-        _esm = FILES.joinpath("player.js").read_text("utf-8")
-        _css = theme_rules(".rg-player") + FILES.joinpath("player.css").read_text("utf-8")
-        scene = traitlets.Dict().tag(sync=True)
-        trials = traitlets.List().tag(sync=True)
-        speed = traitlets.Float(1.0).tag(sync=True)
-        live = traitlets.Bool(False).tag(sync=True)
-        was_live = traitlets.Bool(False).tag(sync=True)
-
-    return Player
 
 
 class PackedLine(TypedDict):

@@ -4,7 +4,7 @@ import IPython.display
 import pytest
 
 import realitygap.classroom.myro as myro
-from realitygap.classroom.myro import MyroError, _joystick, initialize
+from realitygap.classroom.myro import MyroError, _gamepad, initialize
 from realitygap.classroom.myro._robot import robot_or_none
 from tests.classroom.test_panel import tell
 
@@ -15,7 +15,7 @@ NAMES = ["joyStick", "Joystick", "joystick", "gamepad"]
 def panels(monkeypatch):
     """The panels that are shown, as in a notebook, for a simulated robot."""
     shown = []
-    monkeypatch.setattr(_joystick, "notebook_shell", lambda: object())
+    monkeypatch.setattr(_gamepad, "notebook_shell", lambda: object())
     monkeypatch.setattr(IPython.display, "display", shown.append)
     initialize("sim", speed="off", start="center", view="off")
     yield shown

@@ -9,11 +9,9 @@ from . import _picture  # noqa: F401  # registers the picture of a world
 from ._camera import Camera, Column, DepthCamera, LampSeen
 from ._driven import DrivenRobot
 from ._gripper import Gripper
-from ._light import LightMode, LightSensor
-from ._mounted import MountedSensors
-from ._range import Bumper, RangeSensor
 from ._robot import Device, Edge, Lamp, Mount, SceneRobot
 from ._robots import Blimp, Pioneer, Puck, Scribbler
+from ._sensors import Bumper, LightMode, LightSensor, MountedSensors, RangeSensor
 from ._stock import (
     MyroBumper,
     MyroIR,

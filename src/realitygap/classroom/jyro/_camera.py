@@ -150,9 +150,8 @@ class Camera(Device):
 
     def _shade(self, column: Column) -> tuple[int, int, int]:
         red, green, blue = rgb_of(column.color)
-        if not self.fade:
-            return red, green, blue
-        return tuple(int(part * column.closeness) for part in (red, green, blue))  # type: ignore[return-value]
+        share = column.closeness if self.fade else 1.0
+        return int(red * share), int(green * share), int(blue * share)
 
     def _lamp(self, draw: ImageDraw, lamp: LampSeen) -> None:
         x, y = self.width / 2 - lamp.angle / (self.field / 2) * self.width / 2, self.height / 2

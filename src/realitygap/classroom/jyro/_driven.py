@@ -10,8 +10,8 @@ from realitygap.errors import RobotError
 from realitygap.robots import Command, Label, Observation, ProgramRobot, check_command
 from realitygap.world import Pose
 
-from ._range import RangeSensor
 from ._robot import SceneRobot
+from ._sensors import RangeSensor
 
 
 class DrivenRobot(ProgramRobot):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, Protocol, TypeVar
+from typing import Any, ClassVar, Literal, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -125,7 +125,7 @@ class SceneRobot:
         heading: Start heading [rad, counter-clockwise from +x].
         name: Key of the robot in `world[name]`. Default: its kind and a number.
         color: An X11 name or `#rrggbb`, for pictures and for cameras.
-        body: Corners of a closed outline in order, forward and left of the center [m].
+        body: Corners of a closed outline in order, forward and left of the center [m]. Default: that of its kind.
         segments: Single edges that belong to the body as well, forward and left of both ends [m].
         brain: Function of the robot, called in each step before the robot moves.
 
@@ -145,6 +145,8 @@ class SceneRobot:
     """
 
     kind = "robot"
+    kind_body: ClassVar[Sequence[Sequence[float]]] = ()
+    """Outline of all robots of a kind; empty if they have none."""
 
     def __init__(
         self,
@@ -154,15 +156,16 @@ class SceneRobot:
         *,
         name: str | None = None,
         color: str = "red",
-        body: Sequence[Sequence[float]] = (),
+        body: Sequence[Sequence[float]] | None = None,
         segments: Sequence[Sequence[float]] = (),
         brain: Callable[[Any], object] | None = None,
     ) -> None:
         hex_of(color)  # refused here, not in the middle of a step
         self.name = name
         self.color = color
-        check_finite({"body": tuple(map(tuple, body))})
-        self.body = tuple((float(forward), float(left)) for forward, left in body)
+        corners = self.kind_body if body is None else body
+        check_finite({"body": tuple(map(tuple, corners))})
+        self.body = tuple((float(forward), float(left)) for forward, left in corners)
         self.brain = brain
         self.devices: list[Device] = []
         self.keep_trail = False

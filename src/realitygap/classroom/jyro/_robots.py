@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from typing import Any
+from dataclasses import replace
 
 from realitygap.drawing import Ink, Shape
 from realitygap.world.jyro_stock import ROBOT_BODIES
@@ -14,32 +13,16 @@ from ._robot import SceneRobot
 _Corners = list[tuple[float, float]]
 
 
-class _StockRobot(SceneRobot):
-    """A robot with a fixed body."""
-
-    body_name: str
-
-    def __init__(
-        self,
-        x: float,
-        y: float,
-        heading: float = 0.0,
-        *,
-        name: str | None = None,
-        color: str = "red",
-        segments: Sequence[Sequence[float]] = (),
-        brain: Callable[[Any], object] | None = None,
-    ) -> None:
-        box = ROBOT_BODIES[self.body_name]
-        body = list(zip(box["x"], box["y"], strict=True))
-        super().__init__(x, y, heading, name=name, color=color, body=body, segments=segments, brain=brain)
+def _body_of(name: str) -> _Corners:
+    box = ROBOT_BODIES[name]
+    return list(zip(box["x"], box["y"], strict=True))
 
 
-class Scribbler(_StockRobot):
+class Scribbler(SceneRobot):
     """A box of 0.18 x 0.16 m, drawn with a rounded outline."""
 
     kind = "scribbler"
-    body_name = "Scribbler"
+    kind_body = _body_of("Scribbler")
 
     def outlines(self) -> list[Shape]:
         """Return the rounded outline, and two wheels."""
@@ -50,22 +33,22 @@ class Scribbler(_StockRobot):
         return shapes
 
 
-class Pioneer(_StockRobot):
+class Pioneer(SceneRobot):
     """A box of 0.45 x 0.35 m; it is drawn white while it is stalled."""
 
     kind = "pioneer"
-    body_name = "Pioneer"
+    kind_body = _body_of("Pioneer")
 
     def outlines(self) -> list[Shape]:
         """Return an octagon."""
         return [self.polygon(_PIONEER, "white" if self.stalled else self.color)]
 
 
-class Blimp(_StockRobot):
+class Blimp(SceneRobot):
     """A disc of 0.44 m without a body: it collides with nothing, and no robot sees it."""
 
     kind = "blimp"
-    body_name = "Blimp"
+    kind_body = _body_of("Blimp")
     radius = 0.44
 
     def outlines(self) -> list[Shape]:
@@ -86,14 +69,8 @@ class Puck(SceneRobot):
         """Return the disc, and the body if it has one."""
         shapes: list[Shape] = [self.polygon(_circle(self.radius), self.color)]
         if self.body:
-            shapes.append(_without_fill(self))
+            shapes.append(replace(self.polygon(self.body, self.color, Ink.MUTED), fill=None))
         return shapes
-
-
-def _without_fill(robot: SceneRobot) -> Shape:
-    from dataclasses import replace
-
-    return replace(robot.polygon(robot.body, robot.color, Ink.MUTED), fill=None)
 
 
 def _circle(radius: float, n: int = 40) -> _Corners:

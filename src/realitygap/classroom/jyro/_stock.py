@@ -6,8 +6,7 @@ from typing import ClassVar
 
 from realitygap.world.jyro_stock import DEVICES, SONAR_RANGE
 
-from ._light import LightMode, LightSensor
-from ._range import Bumper, RangeSensor
+from ._sensors import Bumper, LightMode, LightSensor, RangeSensor
 
 _PARTS = (
     "all", "front", "front-left", "front-right", "front-all", "left", "right", "left-front", "right-front",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import math
 import time
 from collections.abc import Collection, Iterator, Sequence
@@ -12,16 +13,18 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from realitygap.drawing import Ink, Line, Picture, Shape, hex_of, picture_of
+from realitygap.drawing import Ink, Line, Picture, Shape, hex_of, picture_of, to_image, to_png
 from realitygap.errors import RobotError, check_finite, real_number
 from realitygap.kernels.jyro import scene as kernel
+from realitygap.records import write_whole
 from realitygap.world import Arena
 
-from ._files import save_movie, save_picture
 from ._robot import Lamp, SceneRobot
 
 AnyRobot = TypeVar("AnyRobot", bound=SceneRobot)
 STEP_S = 0.1
+_HUNDREDTH = 10
+"""A hundredth of a second, the unit of time in a GIF [ms]."""
 
 
 @dataclass(frozen=True)
@@ -368,7 +371,13 @@ class JyroWorld:
             ValueError: The path ends in something else.
             RecordError: It cannot be written, or belongs to a study's results.
         """
-        return save_picture(self.picture(), path, width)
+        path = Path(path)
+        ending = path.suffix.lower()
+        if ending not in (".svg", ".png"):
+            raise ValueError(f"{path} ends in {ending or 'nothing'}, expected .svg or .png.")
+        picture = self.picture()
+        write_whole(path, [picture.to_svg().encode() if ending == ".svg" else to_png(picture, width)])
+        return path
 
     def save_movie(self, path: str | Path, n_steps: int, *, every: int = 1, width: int = 480) -> Path:
         """Advance the world by some steps, and write them as a GIF that runs at the simulated speed.
@@ -385,7 +394,20 @@ class JyroWorld:
         """
         if n_steps < 1 or every < 1:
             raise ValueError(f"n_steps is {n_steps} and every {every}, expected 1 or more.")
-        return save_movie(self._pictures(n_steps, every), path, self.step_s * every, width)
+        from PIL.Image import Dither  # takes a while
+
+        path = Path(path)
+        if path.suffix.lower() != ".gif":
+            raise ValueError(f"{path} ends in {path.suffix or 'nothing'}, expected .gif.")
+        first, *others = [
+            to_image(picture, width).quantize(dither=Dither.NONE)
+            for picture in self._pictures(n_steps, every)
+        ]
+        file = io.BytesIO()
+        duration = max(20, round(100 * self.step_s * every) * _HUNDREDTH)
+        first.save(file, "GIF", save_all=True, append_images=others, duration=duration, loop=0)
+        write_whole(path, [file.getvalue()])
+        return path
 
     def _pictures(self, n_steps: int, every: int) -> Iterator[Picture]:
         yield self.picture()

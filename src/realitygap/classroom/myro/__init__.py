@@ -16,13 +16,12 @@ from __future__ import annotations
 
 from typing import Any
 
-from ._ask import ask, askQuestion, pickAColor, pickAFile, pickAFolder
-from ._catalog import LEFT_OUT, names
+from ._catalog import LEFT_OUT, left_out, names
 from ._chance import even, flipCoin, heads, odd, pickOne, pickOneInRange, randomNumber, tails
 from ._colors import *
-from ._computer import Computer, beepScale, computer
+from ._flow import currentTime, doTogether, getFilenames, loop, timer, timeRemaining, wait
 from ._functions import *
-from ._gamepad import getGamepad, getGamepadNow
+from ._gamepad import Joystick, gamepad, getGamepad, getGamepadNow, joyStick, joystick
 from ._graphics import (
     Circle,
     GraphWin,
@@ -47,16 +46,22 @@ from ._graphics import (
     makeWindow,
     undraw,
 )
-from ._joystick import Joystick, gamepad, joyStick, joystick
-from ._left_out import left_out
 from ._mistakes import MyroError, show_mistakes_plainly
 from ._pictures import *
 from ._robot import Scribbler, SimScribbler, init, initialize, makeRobot, simulator, stop, stop_robot
 from ._show import forget_cells, repaint, show
 from ._songs import getNoteFromFrequency, makeSong, readSong, saveSong, song2text, text2song
-from ._speech import makeStory, numberGame, speak, stopSpeaking
-from ._time import currentTime, timer, timeRemaining, wait
-from ._together import doTogether, getFilenames, loop
+from ._talk import (
+    ask,
+    askQuestion,
+    makeStory,
+    numberGame,
+    pickAColor,
+    pickAFile,
+    pickAFolder,
+    speak,
+    stopSpeaking,
+)
 
 __all__ = [*names(), "MyroError"]
 

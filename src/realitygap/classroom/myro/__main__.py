@@ -21,10 +21,10 @@ from realitygap.errors import RealityGapError
 
 from . import _robot
 from ._base import TimeUp
+from ._flow import currentTime, wait
 from ._mistakes import explanation
 from ._ports import force_port
 from ._simulation import is_simulation
-from ._time import currentTime, wait
 
 _EXAMPLE = """example:
   python -m realitygap.classroom.myro dance.py --port sim

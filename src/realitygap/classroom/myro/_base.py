@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from realitygap.families.scribbler import Scribbler as Driver
@@ -36,10 +36,10 @@ class Part(threading.Thread):
         is_over: True if it may no longer use a robot.
     """
 
-    def __init__(self, function: Callable[[], Any]) -> None:
+    def __init__(self, function: Callable[[], object]) -> None:
         super().__init__(daemon=True)
         self._function = function
-        self.result: Any = None
+        self.result: object = None
         self.error: BaseException | None = None
         self.is_over = False
 

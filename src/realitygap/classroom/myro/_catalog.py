@@ -7,6 +7,11 @@ Source: myro/__init__.py, graphics.py, media.py, speech.py, chat.py and system.p
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import NoReturn
+
+from ._mistakes import MyroError
+
 DONE: dict[str, tuple[str, ...]] = {
     "Robots": (
         "initialize", "init", "simulator", "Scribbler", "SimScribbler", "makeRobot", "openConnection",
@@ -136,3 +141,19 @@ LEFT_OUT: dict[str, str] = {
 def names() -> list[str]:
     """Return every name that is done or left out."""
     return [name for group in DONE.values() for name in group] + list(LEFT_OUT)
+
+
+def left_out(name: str) -> Callable[..., NoReturn]:
+    """Return a function of this name that refuses with its reason.
+
+    Raises:
+        KeyError: Nothing of that name is left out.
+    """
+    reason = LEFT_OUT[name]
+
+    def function(*args: object, **kwargs: object) -> NoReturn:
+        raise MyroError(f"{name}() is left out. {reason}")
+
+    function.__name__ = function.__qualname__ = name
+    function.__doc__ = f"Left out. {reason}"
+    return function

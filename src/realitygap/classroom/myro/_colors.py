@@ -4,9 +4,20 @@ from __future__ import annotations
 
 import colorsys
 from collections.abc import Sequence
-from typing import Any
+from typing import Protocol, TypeGuard
 
 from ._mistakes import MyroError, number, whole
+
+Rgb = tuple[int, int, int]
+Rgba = tuple[int, int, int, int]
+
+
+class HasColor(Protocol):
+    """A pixel or a color."""
+
+    def getRGB(self) -> Rgb: ...
+
+    def getRGBA(self) -> Rgba: ...
 
 
 class Color:
@@ -20,9 +31,9 @@ class Color:
 
     __slots__ = ("alpha", "rgb")
 
-    def __init__(self, *rgb: Any) -> None:
+    def __init__(self, *rgb: float | str | Sequence[float] | HasColor) -> None:
         parts = _parts(rgb)
-        self.rgb: tuple[int, int, int] = tuple(_channel(part) for part in parts[:3])  # type: ignore[assignment]
+        self.rgb: Rgb = (_channel(parts[0]), _channel(parts[1]), _channel(parts[2]))
         self.alpha = _channel(parts[3]) if len(parts) == 4 else 255
 
     def __repr__(self) -> str:
@@ -30,26 +41,26 @@ class Color:
         return f"<Color instance (r={red}, g={green}, b={blue}, a={self.alpha})>"
 
     def __eq__(self, other: object) -> bool:
-        return self.getRGBA() == other.getRGBA() if _has_color(other) else NotImplemented  # type: ignore[attr-defined]
+        return self.getRGBA() == other.getRGBA() if has_color(other) else NotImplemented
 
     def __hash__(self) -> int:
         return hash(self.getRGBA())
 
-    def __add__(self, other: Any) -> Color:
+    def __add__(self, other: HasColor) -> Color:
         return Color(*(mine + theirs for mine, theirs in zip(self.getRGB(), other.getRGB(), strict=True)))
 
-    def __sub__(self, other: Any) -> Color:
+    def __sub__(self, other: HasColor) -> Color:
         return Color(*(mine - theirs for mine, theirs in zip(self.getRGB(), other.getRGB(), strict=True)))
 
     def getColor(self) -> Color:
         """Return a copy of the color."""
         return Color(*self.getRGBA())
 
-    def setColor(self, color: Any) -> None:
+    def setColor(self, color: HasColor) -> None:
         """Become another color."""
         self.setRGBA(color.getRGBA())
 
-    def getRGB(self) -> tuple[int, int, int]:
+    def getRGB(self) -> Rgb:
         """Return red, green and blue, each 0 to 255."""
         return self.rgb
 
@@ -57,7 +68,7 @@ class Color:
         """Set red, green and blue, each 0 to 255."""
         self.rgb = Color(rgb).rgb
 
-    def getRGBA(self) -> tuple[int, int, int, int]:
+    def getRGBA(self) -> Rgba:
         """Return red, green, blue and alpha, each 0 to 255."""
         return (*self.rgb, self.alpha)
 
@@ -83,13 +94,13 @@ class Color:
         self.rgb = darker(self.rgb)
 
 
-def _parts(rgb: tuple[Any, ...]) -> Sequence[Any]:
+def _parts(rgb: Sequence[object]) -> Sequence[object]:
     if len(rgb) == 1:
         (only,) = rgb
         if isinstance(only, str):
             return _from_text(only)
-        if _has_color(only):
-            return only.getRGBA()  # type: ignore[no-any-return]
+        if has_color(only):
+            return only.getRGBA()
         rgb = tuple(only) if isinstance(only, Sequence) else rgb
     if len(rgb) not in (3, 4):
         raise MyroError(
@@ -98,7 +109,8 @@ def _parts(rgb: tuple[Any, ...]) -> Sequence[Any]:
     return rgb
 
 
-def _has_color(value: object) -> bool:
+def has_color(value: object) -> TypeGuard[HasColor]:
+    """Return whether something is a pixel or a color."""
     return hasattr(value, "getRGBA")
 
 
@@ -118,13 +130,13 @@ def _channel(value: object) -> int:
     return int(min(max(number("A part of a color", value), 0.0), 255.0))
 
 
-def lighter(rgb: tuple[int, int, int]) -> tuple[int, int, int]:
+def lighter(rgb: Rgb) -> Rgb:
     """Return red, green and blue, each moved by 35 % towards 255."""
     red, green, blue = (int((255 - part) * 0.35 + part) for part in rgb)
     return (red, green, blue)
 
 
-def darker(rgb: tuple[int, int, int]) -> tuple[int, int, int]:
+def darker(rgb: Rgb) -> Rgb:
     """Return 65 % of red, green and blue."""
     red, green, blue = (int(part * 0.65) for part in rgb)
     return (red, green, blue)

@@ -1,14 +1,17 @@
-"""Myro's functions that speak to the robot in use: each does what the robot's method of that name does."""
+"""Myro's functions that speak to the robot in use, or play tones on the computer if there is none."""
 
 from __future__ import annotations
 
 import builtins
+import sys
 from typing import Any
 
+from realitygap._version import __version__
+
 from . import _robot
-from ._computer import computer
-from ._mistakes import MyroError
+from ._mistakes import MyroError, number
 from ._robot import Scribbler, of_robot
+from ._sound import Plays
 
 forward = of_robot(Scribbler.forward)
 backward = of_robot(Scribbler.backward)
@@ -117,13 +120,11 @@ def scaleDown(loopCount: int) -> None:
     beep(0.5, 9000 - 200 * loopCount)
 
 
-def getInfo(*item: str) -> Any:
+def getInfo(*item: str) -> str | list[str] | dict[str, str]:
     """Return the robot's identity and versions, by name; without a robot only Myro's version."""
     robot = _robot.robot_or_none()
     if robot is not None:
         return robot.getInfo(*item)
-    from realitygap._version import __version__
-
     return {"myro": __version__}
 
 
@@ -142,3 +143,32 @@ def set(*args: Any) -> Any:
             f"set() was given {len(args)} values, expected an item, a position and perhaps a value."
         )
     return _robot.robot_for("set").set(*args)
+
+
+class Computer(Plays):
+    """The computer as a player of tones: it rings the terminal's bell and waits as long as the tone lasts."""
+
+    def _tone(self, duration: float, hz: float, hz2: float | None) -> None:
+        if hz:
+            sys.stdout.write("\a")
+            sys.stdout.flush()
+        _robot.sleep(duration)
+
+    def speak(self, message: object, async_: bool = False) -> None:
+        """Print what the computer would say."""
+        print(message)
+
+
+computer = Computer()
+
+
+def beepScale(duration: float, start: float, stop: float, factor: float = 2) -> None:
+    """Let the computer play tones from one frequency to another; `factor` is the ratio of neighboring tones."""
+    if number("beepScale: the factor", factor) <= 1 or number("beepScale: the start", start) <= 0:
+        raise MyroError(
+            f"beepScale: starts at {start!r} and grows by {factor!r}, expected a start above 0 and a factor above 1."
+        )
+    hz = start
+    while hz <= stop:
+        computer.beep(duration, hz)
+        hz *= factor

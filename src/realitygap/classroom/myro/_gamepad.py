@@ -1,4 +1,4 @@
-"""Gamepads of the computer that runs the program: what their sticks and buttons are, now or after a change.
+"""Gamepads of the computer that runs the program, and joysticks: panels below the cell of a notebook.
 
 Source: `getGamepad` and `getGamepadNow` of Myro 2.9.9 (myro/__init__.py), and the joystick interface of Linux
 (Documentation/input/joydev/joystick-api.rst of the kernel). Differs: Myro reads gamepads by pygame; here no other
@@ -15,8 +15,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from realitygap.errors import RealityGapError
+
 from . import _robot
-from ._mistakes import MyroError, choice, number
+from ._mistakes import MyroError, choice, notebook_shell, number
+from ._view import to_svg
 
 _FOLDER = Path("/dev/input")
 
@@ -222,3 +225,68 @@ def _either(after: Any, before: Any) -> Any:
     if isinstance(after, (list, tuple)):
         return type(after)(_either(*pair) for pair in zip(after, before, strict=True))
     return after or before if isinstance(after, int) else after
+
+
+_BEAT_S = 0.1  # between two messages of a panel
+
+
+def joyStick(showSensors: object = False) -> None:
+    """Show a joystick below the cell: drag it, use the arrow keys, or tick *Gamepad*; let go, and the robot stops.
+
+    The robot also stops if the notebook loses the focus or its page is closed. While a cell runs, the joystick does
+    nothing. In Myro it opens a window.
+
+    Args:
+        showSensors: Ignored.
+
+    Raises:
+        MyroError: There is no robot, no notebook, or anywidget is not installed.
+    """
+    _show_panel("joyStick")
+
+
+def Joystick(showSensors: object = False) -> None:
+    """Show a joystick; as `joyStick`."""
+    _show_panel("Joystick")
+
+
+def joystick(showSensors: object = False) -> None:
+    """Show a joystick; as `joyStick`."""
+    _show_panel("joystick")
+
+
+def gamepad(*phrases: object) -> None:
+    """Show a joystick that reads a gamepad after you tick *Gamepad*; as `joyStick`.
+
+    The left stick drives the robot, and each button stops it.
+
+    Args:
+        phrases: Ignored.
+    """
+    _show_panel("gamepad")
+
+
+def _show_panel(function: str) -> None:
+    robot = _robot.robot_for(function)
+    if notebook_shell() is None:
+        raise MyroError(
+            f"{function}() needs a notebook, such as JupyterLab. Elsewhere, drive on the page Robot of `realitygap "
+            "lab`."
+        )
+    from realitygap.classroom import DrivePanel  # takes time that most programs can do without
+
+    simulation = robot.simulation
+
+    def drive(ahead: float, turn: float) -> None:
+        robot.move(ahead, turn)
+        if simulation is not None and not simulation.is_timed:
+            robot.pause(_BEAT_S)
+
+    picture = None if simulation is None else lambda: to_svg(simulation)
+    try:
+        panel = DrivePanel(drive, robot.stop, title=robot.getName(), picture=picture)
+    except RealityGapError as error:
+        raise MyroError(str(error)) from error
+    from IPython.display import display
+
+    display(panel)

@@ -7,8 +7,9 @@ import html
 import math
 from base64 import b64encode
 from collections.abc import Sequence
-from typing import Any, Self
+from typing import Self
 
+from ._colors import HasColor, has_color
 from ._mistakes import MyroError, number, whole
 from ._pictures import Picture
 from ._show import show_markup
@@ -41,7 +42,7 @@ class GraphWin:
     def _repr_svg_(self) -> str:
         return self.to_svg()
 
-    def setBackground(self, color: Any) -> None:
+    def setBackground(self, color: str | HasColor) -> None:
         """Set the color behind the shapes."""
         self.background = _color(color)
         self.redraw()
@@ -65,7 +66,7 @@ class GraphWin:
         down = (y2 - y) / (y2 - y1) if upwards else (y - y1) / (y2 - y1)
         return (x - x1) / (x2 - x1) * self.width, down * self.height
 
-    def plot(self, x: float, y: float, color: Any = "black") -> None:
+    def plot(self, x: float, y: float, color: str | HasColor = "black") -> None:
         """Draw a point."""
         point = Point(x, y)
         point.setFill(color)
@@ -142,12 +143,12 @@ class GraphicsObject:
         self.line_width = 1.0
         self.window: GraphWin | None = None
 
-    def setFill(self, color: Any) -> None:
+    def setFill(self, color: str | HasColor) -> None:
         """Set the color inside: a name as "red", text as "#ff8000" or makeColor(255, 128, 0)."""
         self._fill = _color(color)
         self._changed()
 
-    def setOutline(self, color: Any) -> None:
+    def setOutline(self, color: str | HasColor) -> None:
         """Set the color of the outline."""
         self.outline = _color(color)
         self._changed()
@@ -324,10 +325,8 @@ class Circle(Oval):
 class Polygon(GraphicsObject):
     """A shape with three or more corners, given one by one or as a list."""
 
-    def __init__(self, *points: Any) -> None:
-        corners: Sequence[Point] = (
-            points[0] if len(points) == 1 and isinstance(points[0], Sequence) else points
-        )
+    def __init__(self, *points: Point | Sequence[Point]) -> None:
+        corners = points[0] if len(points) == 1 and isinstance(points[0], Sequence) else points
         if len(corners) < 3:
             raise MyroError(f"Polygon was given {len(corners)} points, expected three or more.")
         super().__init__(*corners)
@@ -385,7 +384,7 @@ class Text(GraphicsObject):
         self.style = style
         self._changed()
 
-    def setTextColor(self, color: Any) -> None:
+    def setTextColor(self, color: str | HasColor) -> None:
         """Set the color of its letters."""
         self.setFill(color)
 
@@ -430,9 +429,9 @@ def _tip(tail: tuple[float, float], head: tuple[float, float], size: float, colo
     return f'<polygon points="{corners}" fill="{color}"/>'
 
 
-def _color(color: Any) -> str:
+def _color(color: str | HasColor) -> str:
     """Return a color as SVG has it, from a name, from text as "#ff8000", or from a color of Myro."""
-    if hasattr(color, "getRGB"):
+    if has_color(color):
         return "#{:02x}{:02x}{:02x}".format(*color.getRGB())
     if not isinstance(color, str) or not color.lstrip("#").isalnum():
         raise MyroError(

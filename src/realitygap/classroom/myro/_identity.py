@@ -1,13 +1,15 @@
-"""The robot's name and its memory."""
+"""The robot's name, its versions, and its memory."""
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Literal
+
+from realitygap._version import __version__
 
 from ._base import Base
 from ._mistakes import MyroError, choice, number, whole
 
-_FORWARDNESS: dict[Any, Literal["fluke", "scribbler"]] = {
+_FORWARDNESS: dict[str | int, Literal["fluke", "scribbler"]] = {
     "fluke-forward": "fluke", 1: "fluke",
     "scribbler-forward": "scribbler", 0: "scribbler",
 }  # fmt: skip
@@ -33,7 +35,7 @@ class Identity(Base):
         """Give the robot a password of up to 16 characters."""
         self.driver.set_password(_short("setPassword: the password", password))
 
-    def getData(self, *position: int) -> Any:
+    def getData(self, *position: int) -> int | list[int]:
         """Return the eight bytes that the robot keeps, or those at positions 0 to 7. Four correct its motors."""
         data = [int(value) for value in self.driver.data]
         picked = [data[whole("getData: the position", place, 0, 7)] for place in position]
@@ -61,7 +63,7 @@ class Identity(Base):
 
     def getFudge(self) -> tuple[float, float, float, float]:
         """Return the values that `setFudge` set, as the robot stores them."""
-        values = [value / 127 if value else 1.0 for value in self.getData(0, 1, 2, 3)]
+        values = [value / 127 if value else 1.0 for value in self.driver.data[:4]]
         f1, f2, f3, f4 = values if self.driver.info.fluke == "none" else values[::-1]
         return (f1, f2, f3, f4)
 
@@ -80,6 +82,38 @@ class Identity(Base):
         """
         models = {"s1": "SCRIBBLER-1", "s2": "SCRIBBLER-2"}
         return models.get(self.driver.info.model or "", "UNKNOWN")
+
+    def _facts(self) -> dict[str, str]:
+        """Return the info line by its keys, and our version."""
+        info = self.driver.info
+        facts = {"fluke": info.fluke_version} if info.fluke != "none" else {}
+        if info.model is not None:
+            facts |= {
+                "robot-version": info.robot_version,
+                "robot": "Scribbler2" if info.model == "s2" else "Scribbler",
+                "mode": "Serial",
+            }
+        return facts | {"myro": __version__}
+
+    def getVersion(self) -> str:
+        """Return the version of the robot's firmware."""
+        return str(self.driver.info.robot_version)
+
+    def getInfo(self, *item: str) -> str | list[str] | dict[str, str]:
+        """Return the robot's identity by name: "robot", "robot-version", "fluke", "mode"; and "myro", ours.
+
+        Args:
+            item: Names of what is wanted; one gives its value, several a list, none all in a dictionary.
+
+        Raises:
+            MyroError: The robot says nothing of that.
+        """
+        info = self._facts()
+        for name in item:
+            if name.lower() not in info:
+                raise MyroError(f"getInfo: this robot says nothing of {name!r}, only of {', '.join(info)}.")
+        values = [info[name.lower()] for name in item]
+        return info if not item else values[0] if len(values) == 1 else values
 
 
 def _short(name: str, value: object) -> str:

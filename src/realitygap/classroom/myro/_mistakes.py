@@ -15,6 +15,7 @@ from typing import Any, TypeVar
 from realitygap._foreign_text import printable
 from realitygap.errors import RealityGapError, did_you_mean
 
+K = TypeVar("K")
 T = TypeVar("T")
 
 _OURS = str(Path(__file__).resolve().parents[2])
@@ -74,7 +75,7 @@ def whole(name: str, value: object, least: int, most: int) -> int:
     return int(result)
 
 
-def choice(name: str, value: object, choices: Mapping[Any, T]) -> T:
+def choice(name: str, value: object, choices: Mapping[K, T]) -> T:
     """Return the meaning of a word or a number; words in any case.
 
     Args:
@@ -86,8 +87,9 @@ def choice(name: str, value: object, choices: Mapping[Any, T]) -> T:
         MyroError: It is none of them; the text names them.
     """
     key = value.lower() if isinstance(value, str) else value
-    if isinstance(key, (str, numbers.Real)) and key in choices:
-        return choices[key]  # 1.0 finds 1
+    for word, meaning in choices.items():
+        if isinstance(key, (str, numbers.Real)) and key == word:  # 1.0 finds 1
+            return meaning
     words = [repr(word) for word in choices if isinstance(word, str)]
     digits = [str(digit) for digit in choices if not isinstance(digit, str)]
     hint = (

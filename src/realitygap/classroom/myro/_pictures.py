@@ -3,19 +3,28 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol, cast
 
 import numpy as np
 import PIL.Image
+from numpy.typing import NDArray
 
 from realitygap._image_file import eight_bits, open_image, plain
 
-from ._colors import Color, darker, lighter
+from ._colors import Color, HasColor, Rgb, Rgba, darker, has_color, lighter
 from ._mistakes import MyroError, whole
 
 _LARGEST = 20_000  # [pixels] along a side: beyond it a program asks for more memory than a computer has
+
+
+class _Pixels(Protocol):
+    """Pillow's access to the pixels of a picture with red, green, blue and alpha, by column and row."""
+
+    def __getitem__(self, place: tuple[int, int], /) -> Rgba: ...
+
+    def __setitem__(self, place: tuple[int, int], color: Rgba, /) -> None: ...
 
 
 class Picture:
@@ -38,10 +47,10 @@ class Picture:
 
     def _reload(self) -> None:
         self.width, self.height = self.image.size
-        self.pixels: Any = self.image.load()
+        self.pixels = cast(_Pixels, self.image.load())
 
     @classmethod
-    def from_array(cls, array: np.ndarray[Any, Any]) -> Picture:
+    def from_array(cls, array: NDArray[np.uint8]) -> Picture:
         """Return a picture from a camera.
 
         Args:
@@ -94,11 +103,11 @@ class Picture:
         """Return the color of a pixel."""
         return self.getPixel(x, y).getColor()
 
-    def setColor(self, x: int, y: int, newColor: Any) -> None:
+    def setColor(self, x: int, y: int, newColor: HasColor) -> None:
         """Color a pixel."""
         self.getPixel(x, y).setColor(newColor)
 
-    def getRGB(self, x: int, y: int) -> tuple[int, int, int]:
+    def getRGB(self, x: int, y: int) -> Rgb:
         """Return red, green and blue of a pixel."""
         return self.getPixel(x, y).getRGB()
 
@@ -106,7 +115,7 @@ class Picture:
         """Set red, green and blue of a pixel."""
         self.getPixel(x, y).setRGB(rgb)
 
-    def getRGBA(self, x: int, y: int) -> tuple[int, int, int, int]:
+    def getRGBA(self, x: int, y: int) -> Rgba:
         """Return red, green, blue and alpha of a pixel."""
         return self.getPixel(x, y).getRGBA()
 
@@ -155,14 +164,14 @@ class Pixel:
         return f"<Pixel instance (r={red}, g={green}, b={blue}, a={alpha}) at ({self.x}, {self.y})>"
 
     def __eq__(self, other: object) -> bool:
-        return self.getRGBA() == other.getRGBA() if hasattr(other, "getRGBA") else NotImplemented
+        return self.getRGBA() == other.getRGBA() if has_color(other) else NotImplemented
 
     __hash__ = None  # type: ignore[assignment]  # equal pixels may differ a moment later
 
-    def __add__(self, other: Any) -> Color:
+    def __add__(self, other: HasColor) -> Color:
         return Color(self.getColor() + other)
 
-    def __sub__(self, other: Any) -> Color:
+    def __sub__(self, other: HasColor) -> Color:
         return Color(self.getColor() - other)
 
     def getX(self) -> int:
@@ -181,25 +190,25 @@ class Pixel:
         """Return its color."""
         return Color(self.getRGBA())
 
-    def setColor(self, newColor: Any) -> None:
+    def setColor(self, newColor: HasColor) -> None:
         """Give it a color, or that of another pixel."""
-        if not hasattr(newColor, "getRGBA"):
+        if not has_color(newColor):
             raise MyroError(
                 f"setColor: the color is {newColor!r}, expected one made by makeColor(red, green, blue)."
             )
         self.picture.pixels[self.x, self.y] = newColor.getRGBA()
 
-    def getRGB(self) -> tuple[int, int, int]:
+    def getRGB(self) -> Rgb:
         """Return red, green and blue, each 0 to 255."""
-        return self.picture.pixels[self.x, self.y][:3]  # type: ignore[no-any-return]
+        return self.picture.pixels[self.x, self.y][:3]
 
     def setRGB(self, rgb: Sequence[float]) -> None:
         """Set red, green and blue; the pixel becomes opaque."""
         self.setColor(Color(rgb))
 
-    def getRGBA(self) -> tuple[int, int, int, int]:
+    def getRGBA(self) -> Rgba:
         """Return red, green, blue and alpha, each 0 to 255."""
-        return self.picture.pixels[self.x, self.y]  # type: ignore[no-any-return]
+        return self.picture.pixels[self.x, self.y]
 
     def setRGBA(self, rgba: Sequence[float]) -> None:
         """Set red, green, blue and alpha."""
@@ -255,7 +264,7 @@ def makePicture(*args: Any) -> Picture:
     if len(args) == 3 and isinstance(args[2], (int, float)):
         gray = whole("makePicture: the gray", args[2], 0, 255)
         return _filled(args[0], args[1], (gray, gray, gray, 255))
-    if len(args) == 3 and (hasattr(args[2], "getRGBA") or len(args[2]) == 3):
+    if len(args) == 3 and (has_color(args[2]) or len(args[2]) == 3):
         return _filled(args[0], args[1], Color(args[2]).getRGBA())
     if len(args) in (3, 4):
         return _from_bytes(*args)
@@ -273,11 +282,11 @@ def _from_file_or_web(filename: str) -> Picture:
     return Picture(filename)
 
 
-def _filled(width: object, height: object, rgba: tuple[int, int, int, int]) -> Picture:
+def _filled(width: object, height: object, rgba: Rgba) -> Picture:
     return Picture(PIL.Image.new("RGBA", (_side("width", width), _side("height", height)), rgba))
 
 
-def _from_bytes(width: object, height: object, data: Any, mode: str = "color") -> Picture:
+def _from_bytes(width: object, height: object, data: bytes | Iterable[int], mode: str = "color") -> Picture:
     size = (_side("width", width), _side("height", height))
     form, per_pixel = ("RGB", 3) if mode.lower() == "color" else ("L", 1)
     raw = bytes(data)
@@ -318,11 +327,12 @@ def savePicture(picture: Picture | Sequence[Picture | str], filename: str) -> No
     if not pictures:
         raise MyroError("savePicture: the list is empty, expected pictures.")
     images = [_flat(item.image, filename) for item in pictures]
-    more: dict[str, Any] = (
-        {"save_all": True, "append_images": images[1:], "loop": 0} if len(images) > 1 else {}
-    )
+    path = Path(filename).expanduser()
     try:
-        images[0].save(Path(filename).expanduser(), **more)
+        if len(images) > 1:
+            images[0].save(path, save_all=True, append_images=images[1:], loop=0)
+        else:
+            images[0].save(path)
     except (OSError, ValueError) as error:
         raise MyroError(
             f"savePicture: {filename!r} cannot be written: {getattr(error, 'strerror', None) or error}. "
@@ -399,7 +409,7 @@ def getPixels(picture: Picture) -> Iterator[Pixel]:
     return _a_picture("getPixels", picture).getPixels()
 
 
-def setPixel(picture: Picture, x: int, y: int, color: Any) -> None:
+def setPixel(picture: Picture, x: int, y: int, color: HasColor) -> None:
     """Color the pixel in column x and row y."""
     _a_picture("setPixel", picture).setColor(x, y, color)
 
@@ -444,12 +454,12 @@ def getColor(pixel: Pixel | Color) -> Color:
     return _colored("getColor", pixel).getColor()
 
 
-def getRGB(pixel_or_color: Pixel | Color) -> tuple[int, int, int]:
+def getRGB(pixel_or_color: Pixel | Color) -> Rgb:
     """Return red, green and blue of a pixel or a color, each 0 to 255."""
     return _colored("getRGB", pixel_or_color).getRGB()
 
 
-def getRGBA(pixel_or_color: Pixel | Color) -> tuple[int, int, int, int]:
+def getRGBA(pixel_or_color: Pixel | Color) -> Rgba:
     """Return red, green, blue and alpha of a pixel or a color, each 0 to 255."""
     return _colored("getRGBA", pixel_or_color).getRGBA()
 
@@ -482,7 +492,7 @@ def setAlpha(pixel: Pixel | Color, value: float) -> None:
     _colored("setAlpha", pixel).setAlpha(value)
 
 
-def setColor(pixel: Pixel | Color, color: Any) -> None:
+def setColor(pixel: Pixel | Color, color: HasColor) -> None:
     """Give a pixel a color."""
     _colored("setColor", pixel).setColor(color)
 
@@ -510,7 +520,7 @@ def makeDarker(color: Pixel | Color) -> None:
 class Array:
     """Numbers in rows, or a picture as columns: `Array(2, 3)[0][1]`, `Array(picture)[x][y]`."""
 
-    def __init__(self, n: int | Picture = 0, *more: int, value: Any = 0) -> None:
+    def __init__(self, n: int | Picture = 0, *more: int, value: object = 0) -> None:
         self.data: Any = n if isinstance(n, Picture) else _nested((n, *more), value)
 
     def __len__(self) -> int:
@@ -519,7 +529,7 @@ class Array:
     def __getitem__(self, index: int) -> Any:
         return _Column(self.data, index) if isinstance(self.data, Picture) else self.data[index]
 
-    def __setitem__(self, index: int, value: Any) -> None:
+    def __setitem__(self, index: int, value: object) -> None:
         self.data[index] = value
 
 
@@ -531,11 +541,11 @@ class _Column:
         return self.picture.getPixel(self.column, row)
 
 
-def _nested(sizes: tuple[int, ...], value: Any) -> list[Any]:
+def _nested(sizes: tuple[int, ...], value: object) -> list[object]:
     size = whole("makeArray: a size", sizes[0], 0, _LARGEST**2)
     return [value] * size if len(sizes) == 1 else [_nested(sizes[1:], value) for _ in range(size)]
 
 
-def makeArray(*sizes: Any, value: Any = 0) -> Array:
+def makeArray(n: int | Picture = 0, *more: int, value: object = 0) -> Array:
     """Return an array of one or more sizes, filled with a value: `makeArray(2, 3)[0][1]`; or a picture's columns."""
-    return Array(*sizes, value=value)
+    return Array(n, *more, value=value)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import sys
-from typing import Any
 
 from realitygap._foreign_text import printable
 from realitygap.errors import RobotError
@@ -12,7 +11,7 @@ from realitygap.families.scribbler import Scribbler as Driver
 from realitygap.families.scribbler import find_ports
 
 from ._mistakes import MyroError
-from ._simulation import Simulation, is_simulation, parse_simulation
+from ._simulation import Option, Simulation, is_simulation, parse_simulation
 
 _forced: str | None = None
 
@@ -23,7 +22,7 @@ def force_port(port: str | None) -> None:
     _forced = port
 
 
-def open_port(port: str | int | None, **options: Any) -> tuple[Driver, Simulation | None]:
+def open_port(port: str | int | None, **options: Option) -> tuple[Driver, Simulation | None]:
     """Open a robot.
 
     Args:

@@ -6,8 +6,8 @@ import builtins
 import contextlib
 import functools
 import inspect
-from collections.abc import Callable
-from typing import Any, Concatenate, ParamSpec, TypeVar
+from collections.abc import Callable, Mapping
+from typing import Concatenate, ParamSpec, TypeVar
 
 from realitygap._closed_on_exit import ClosedOnExit
 from realitygap._foreign_text import printable
@@ -15,16 +15,14 @@ from realitygap.errors import RobotError
 from realitygap.robots import SystemClock
 
 from ._base import Base
-from ._camera import Camera
-from ._driving import Driving
-from ._fluke import Fluke
+from ._driving import Driving, Paths
+from ._fluke import Camera, Fluke
 from ._identity import Identity
-from ._lights import Lights
 from ._mistakes import MyroError, choice
-from ._paths import Paths
 from ._ports import open_port
 from ._senses import Senses
-from ._sound import Sound
+from ._simulation import Option
+from ._sound import Lights, Sound
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -51,7 +49,7 @@ class Scribbler(Driving, Senses, Sound, Lights, Camera, Identity, Paths, Fluke, 
         MyroError: The robot cannot be opened; the text says what to try.
     """
 
-    def __init__(self, port: str | int | None = None, **options: Any) -> None:
+    def __init__(self, port: str | int | None = None, **options: Option) -> None:
         before = robot_or_none()
         if before is not None:
             with contextlib.suppress(RobotError):  # a robot that is gone shall not keep the next one away
@@ -113,7 +111,7 @@ class Scribbler(Driving, Senses, Sound, Lights, Camera, Identity, Paths, Fluke, 
         """Stop the robot, from anywhere in a program."""
         self.stop()
 
-    def set(self, item: str, position: Any, value: Any = None) -> None:
+    def set(self, item: str, position: str | float, value: str | float | None = None) -> None:
         """Set something by its name: `set("led", "left", "on")` is `setLED("left", "on")`.
 
         Args:
@@ -127,7 +125,7 @@ class Scribbler(Driving, Senses, Sound, Lights, Camera, Identity, Paths, Fluke, 
         else:
             setter(position)
 
-    def _setters(self) -> dict[str | int, Any]:
+    def _setters(self) -> Mapping[str | int, Callable[..., None]]:
         return {
             "led": self.setLED,
             "name": self.setName,
@@ -140,7 +138,7 @@ class Scribbler(Driving, Senses, Sound, Lights, Camera, Identity, Paths, Fluke, 
             "data": self.setData,
         }
 
-    def _getters(self) -> dict[str | int, Any]:
+    def _getters(self) -> Mapping[str | int, Callable[..., object]]:
         return {
             "all": self.getAll,
             "light": self.getLight,
@@ -226,7 +224,7 @@ def of_robot(method: Callable[Concatenate[Scribbler, P], T]) -> Callable[P, T]:
     return function
 
 
-def initialize(id: str | int | None = None, **options: Any) -> None:
+def initialize(id: str | int | None = None, **options: Option) -> None:
     """Open a robot, which from now on obeys Myro's functions, and greet.
 
     Args:
@@ -243,7 +241,7 @@ def initialize(id: str | int | None = None, **options: Any) -> None:
 init = initialize
 
 
-def simulator(id: object = None, **options: Any) -> None:
+def simulator(id: object = None, **options: Option) -> None:
     """Open a simulated robot: `initialize("sim")`.
 
     Args:
@@ -265,7 +263,7 @@ def makeRobot(kind: str, port: str | int | None = None) -> Scribbler:
     return Scribbler("sim" if simulated else port)
 
 
-def SimScribbler(id: object = None, **options: Any) -> Scribbler:
+def SimScribbler(id: object = None, **options: Option) -> Scribbler:
     """Return a simulated robot as an object: `robot = SimScribbler()`."""
     return Scribbler("sim", **options)
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
 from urllib.parse import parse_qsl, urlencode
 
 import numpy as np
+from numpy.typing import NDArray
 
 from realitygap.errors import RobotError
 from realitygap.families.scribbler import Scribbler as Driver
@@ -15,6 +15,9 @@ from realitygap.world import NAMED_STARTS, Arena, Pose, is_inside
 
 from ._mistakes import MyroError, choice, number, whole
 from ._view import View, best_view, text_map
+
+Option = str | float | Sequence[float] | None
+"""Value of an option of a simulated robot, as a program or the name of a port gives it."""
 
 _WORDS = ("sim", "simulator", "simulation")
 _OPTIONS = ("seed", "start", "speed", "model", "fluke", "arena", "view")
@@ -27,13 +30,13 @@ def is_simulation(name: str) -> bool:
     return name.partition("?")[0].lower() in _WORDS
 
 
-def parse_simulation(name: str) -> dict[str, Any]:
+def parse_simulation(name: str) -> dict[str, Option]:
     """Return the options behind the question mark of "sim?seed=3&speed=off".
 
     Raises:
         MyroError: One of them is not known.
     """
-    options = dict(parse_qsl(name.partition("?")[2], keep_blank_values=True))
+    options: dict[str, Option] = dict(parse_qsl(name.partition("?")[2], keep_blank_values=True))
     for key in options:
         choice('initialize("sim"): the option', key, dict.fromkeys(_OPTIONS))
     return options
@@ -61,13 +64,13 @@ class Simulation:
 
     def __init__(
         self,
-        seed: Any = 0,
-        start: Any = None,
-        speed: Any = 1,
-        model: str = "s2",
-        fluke: Any = 2,
-        arena: str = "paper",
-        view: Any = None,
+        seed: Option = 0,
+        start: Option = None,
+        speed: Option = 1,
+        model: Option = "s2",
+        fluke: Option = 2,
+        arena: Option = "paper",
+        view: Option = None,
     ) -> None:
         self.seed = whole('initialize("sim"): the seed', _plain(seed), 0, 2**31 - 1)
         choice('initialize("sim"): the model', model, {"s1": "s1", "s2": "s2"})
@@ -109,7 +112,7 @@ class Simulation:
         """Return the share of the arena's cells that the pen went through, 0 to 1."""
         return len(self.cells()) / self.arena.grid.n_cells
 
-    def path(self) -> np.ndarray[Any, np.dtype[np.float64]]:
+    def path(self) -> NDArray[np.float64]:
         """Return time [s], x [m], y [m], heading [rad] along the path, (t, 4)."""
         return np.asarray(self.witness.path(), dtype=np.float64).reshape(-1, 4)
 
@@ -128,7 +131,7 @@ class Simulation:
             self._view.close()
             self._view = None
 
-    def _start(self, start: Any) -> Pose:
+    def _start(self, start: object) -> Pose:
         if start is None:
             return self.arena.start
         if start == "random":
@@ -153,7 +156,7 @@ def _opened(url: str) -> Driver:
         raise MyroError(f'initialize("sim"): {error}') from error
 
 
-def _plain(value: Any) -> Any:
+def _plain(value: object) -> object:
     """Return a number from the text of an option after a question mark. Other values are returned unchanged."""
     if isinstance(value, str):
         try:
@@ -180,7 +183,7 @@ def _random_pose(arena: Arena, seed: int) -> Pose:
     raise MyroError(f"The arena {arena.name} has no place where the robot fits.")
 
 
-def _nearest(walls: np.ndarray[Any, Any], x: float, y: float) -> float:
+def _nearest(walls: NDArray[np.float64], x: float, y: float) -> float:
     start, along = walls[:, :2], walls[:, 2:] - walls[:, :2]
     to = np.array([x, y]) - start
     share = np.clip((to * along).sum(axis=1) / np.maximum((along**2).sum(axis=1), 1e-12), 0, 1)

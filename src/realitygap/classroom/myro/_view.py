@@ -5,10 +5,15 @@ from __future__ import annotations
 import math
 import threading
 import time
+from collections.abc import Callable
 from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
 
 from realitygap.drawing import Disc, Ink, Line, Picture, Shape
 from realitygap.errors import RealityGapError
+from realitygap.families.scribbler.emulator import SCRIBBLER_BODY
 from realitygap.world import Arena, Pose, obstacle_shapes
 
 from ._mistakes import choice, notebook_shell
@@ -40,7 +45,7 @@ class Watched(Protocol):
     def catch_up(self) -> None: ...
     def pose(self) -> Pose: ...
     def cells(self) -> tuple[int, ...]: ...
-    def path(self) -> Any: ...
+    def path(self) -> NDArray[np.float64]: ...
 
 
 class View(Protocol):
@@ -55,7 +60,7 @@ class View(Protocol):
         ...
 
 
-def best_view(simulation: Watched, wanted: Any = None) -> View | None:
+def best_view(simulation: Watched, wanted: object = None) -> View | None:
     """Return the view that fits the program's environment: live in a notebook, none elsewhere.
 
     Args:
@@ -119,30 +124,23 @@ class NotebookView:
                 self._screen(to_svg(self._simulation))
 
 
-def _screen(svg: str) -> Any:
+def _screen(svg: str) -> Callable[[str], object]:
     """Return a function that shows an SVG, and each later one in the same place."""
     from IPython.display import HTML, display
 
+    from realitygap.playback import widget_class  # takes time that most programs can do without
+
     try:
-        import anywidget
-        import traitlets
-    except ImportError:
+        widget: Any = widget_class("RobotView", "", _WIDGET, svg="")(svg=svg)
+    except RealityGapError:  # anywidget is an extra
         handle = display(HTML(svg), display_id=True)
         return lambda picture: handle.update(HTML(picture))
-
-    class RobotView(anywidget.AnyWidget):  # type: ignore[misc]  # anywidget comes with the extra 'notebook'
-        _esm = _WIDGET
-        svg = traitlets.Unicode().tag(sync=True)
-
-    widget = RobotView(svg=svg)
     display(widget)
     return lambda picture: widget.set_trait("svg", picture)
 
 
 def to_svg(simulation: Watched) -> str:
     """Return the arena, the line that the pen drew, and the robot, as SVG."""
-    from realitygap.families.scribbler.emulator import SCRIBBLER_BODY
-
     arena, grid = simulation.arena, simulation.arena.grid
     left, bottom, right, top = _bounds(simulation)
     cell = grid.cell

@@ -78,7 +78,7 @@ def no_replay(monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(condition: Any, row: Mapping[str, Any]) -> None:
         raise RecordError("The trial cannot be recomputed.")
 
-    monkeypatch.setattr("realitygap.report._path_figure.replay", refuse)
+    monkeypatch.setattr("realitygap.report._chosen_run.replay", refuse)
     monkeypatch.setattr("realitygap.report._replay.replay", refuse)
 
 

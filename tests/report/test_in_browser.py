@@ -16,7 +16,6 @@ import pytest
 from axe_playwright_python.sync_playwright import Axe
 
 from realitygap.report import _replay, write_report
-from realitygap.report._path_figure import typical_replicate
 from realitygap.report._tally import read_tally, settings_of
 from realitygap.runs import Condition, replay
 from realitygap.study import parse_study, run_study
@@ -62,7 +61,7 @@ def trials(tiny_study) -> Callable[[str, int, int], tuple[str, Trajectory]]:
     tally = read_tally(tiny_study)
 
     def trial(name: str, generation: int, individual: int) -> tuple[str, Trajectory]:
-        run = typical_replicate(tally, name)
+        run = tally.typical_replicate(name)
         row = next(
             row
             for row in tally.folder.read(name, [run]).iter_rows(named=True)

@@ -12,7 +12,6 @@ import pytest
 
 from realitygap.errors import RecordError
 from realitygap.report import _replay, write_report
-from realitygap.report._path_figure import typical_replicate
 from realitygap.report._tally import read_tally, settings_of
 from realitygap.runs import Condition, replay
 from tests.report.results import describe, random_runs, write_results
@@ -45,14 +44,14 @@ def tiny(tiny_study, tiny_html):
 
 
 def rows_of(tally, name):
-    return tally.folder.read(name, [typical_replicate(tally, name)])
+    return tally.folder.read(name, [tally.typical_replicate(name)])
 
 
 def test_the_typical_run_of_each_condition_is_embedded_whole(tiny):
     tally, data = tiny
     assert [condition["name"] for condition in data["conditions"]] == ["coverage", "novelty", "turn", "ends"]
     for condition in data["conditions"]:
-        assert condition["run"] == typical_replicate(tally, condition["name"])
+        assert condition["run"] == tally.typical_replicate(condition["name"])
         rows = rows_of(tally, condition["name"])
         assert [tuple(trial[:2]) for trial in condition["trials"]] == rows.select(
             "generation", "individual"

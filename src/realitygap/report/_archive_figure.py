@@ -12,16 +12,13 @@ import polars as pl
 from realitygap._wording import counted
 from realitygap.drawing import Ink
 from realitygap.evolution import DISTANCES, Member, NoveltySettings, archive_members
-from realitygap.report._path_figure import TracedPath, say_origin, trace_paths, typical_replicate
-from realitygap.report._structures import selection_of
-from realitygap.report._tally import Results, Tally, label_of, read_tally, settings_of
+from realitygap.report._chosen_run import ChosenRun, TracedPath, choose_run
+from realitygap.report._tally import Results, Tally, read_tally, settings_of
 from realitygap.report.charts.arena import draw_arena, draw_start
 from realitygap.report.charts.cells import draw_shares
 from realitygap.report.charts.house import Drawing, draw_wide, shorten
 from realitygap.report.charts.lines import draw_line, head, pen_style
 from realitygap.report.charts.sheet import IS_WIDE, Sheet
-from realitygap.runs import Condition
-from realitygap.world import Arena, Body
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -46,42 +43,35 @@ def draw_archive(folder: Results, condition: str | None = None, replicate: int |
         ValueError: there is no such condition or run, or it has no archive.
     """
     tally = read_tally(folder)
-    chosen = _chosen(tally, condition)
-    described = tally.condition(chosen)
-    resolved = Condition.from_settings(chosen, dict(settings_of(described)))
-    replicate = typical_replicate(tally, chosen) if replicate is None else replicate
-    rows = tally.rows_of(chosen, replicate)
-    members = _members(resolved, rows)
+    run = choose_run(tally, _chosen(tally, condition), replicate)
+    members = _members(run)
     different = list(dict.fromkeys(members))
     entered = [generation for generation, _ in members]
-    paths, problem = trace_paths(
-        tally, resolved, _rows_of(rows, different[-_MOST_PATHS:]), f"coverage_{tally.measure}"
-    )
-    novelty = _mean_novelty(tally, resolved.novelty)
-    unit = DISTANCES[resolved.novelty.distance].unit
+    paths, origin = run.trace(_rows_of(run.rows, different[-_MOST_PATHS:]))
+    novelty = _mean_novelty(tally, run.condition.novelty)
+    unit = DISTANCES[run.condition.novelty.distance].unit
     drawn = f", of which {len(paths)} are drawn" if len(paths) < len(different) else ""
     caption = (
-        f"Left (on a phone, above), condition {chosen}, run {replicate}: what the archive holds at its end, "
+        f"Left (on a phone, above), condition {run.name}, run {run.replicate}: what the archive holds at its end, "
         f"{len(members)} behaviors, {len(different)} of them different{drawn}, from generations {min(entered)} to "
-        f"{max(entered)}; a cell is the darker, the more of them visit it. {label_of(described)}, n = 1 run. "
-        f"{say_origin(described, paths, problem)} Right (below), the mean novelty of the individuals of each "
+        f"{max(entered)}; a cell is the darker, the more of them visit it. {run.label}, n = 1 run. "
+        f"{origin} Right (below), the mean novelty of the individuals of each "
         f"generation, over all runs that measure it alike. n = {counted(_n_runs(tally, novelty), 'run')}, no interval."
     )
     alt = (
-        f"The archive of run {replicate} of {chosen} holds {len(members)} behaviors, of generations {min(entered)} to "
-        f"{max(entered)}. Mean novelty in the last generation: "
+        f"The archive of run {run.replicate} of {run.name} holds {len(members)} behaviors, of generations "
+        f"{min(entered)} to {max(entered)}. Mean novelty in the last generation: "
         + ", ".join(f"{each} {values[-1]:.2f}" for each, values in novelty.items())
         + "."
     )
-    arena, body, label = resolved.placed_arena, resolved.on.body, label_of(described)
 
     def draw(width: float) -> Sheet:
         if width >= IS_WIDE:
             sheet = Sheet(width, [["field", "curves"]], [None], widths=[0.53, 0.47], gap=0.4)
         else:
             sheet = Sheet(width, [["field"], ["curves"]], [None, _HEIGHT])
-        _draw_field(sheet.panels["field"], paths, arena, body)
-        head(sheet.panels["field"], "archived", f"{label}, n = {len(paths)}")
+        _draw_field(sheet.panels["field"], paths, run)
+        head(sheet.panels["field"], "archived", f"{run.label}, n = {len(paths)}")
         _draw_curves(sheet.panels["curves"], novelty, unit)
         return sheet
 
@@ -90,12 +80,7 @@ def draw_archive(folder: Results, condition: str | None = None, replicate: int |
 
 def _chosen(tally: Tally, condition: str | None) -> str:
     """A condition that selects by novelty and has runs."""
-    with_runs = set(tally.runs["condition"])
-    novel = [
-        str(each["name"])
-        for each in tally.conditions
-        if selection_of(each) == "novelty" and each["name"] in with_runs
-    ]
+    novel = [each["name"] for each in tally.selecting_by("novelty")]
     if condition is None and novel:
         return novel[0]
     if condition is None:
@@ -105,14 +90,15 @@ def _chosen(tally: Tally, condition: str | None) -> str:
     return condition
 
 
-def _members(condition: Condition, rows: pl.DataFrame) -> list[Member]:
+def _members(run: ChosenRun) -> list[Member]:
     """Return the members of the archive at the end of a run."""
+    condition = run.condition
     by_position = DISTANCES[condition.novelty.distance].compares == "position"
     column = "behavior" if by_position else "cells"
     grid = condition.arena.arena().grid
     generations = [
         part.sort("individual")[column].to_list()
-        for _, part in rows.sort("generation").group_by("generation", maintain_order=True)
+        for _, part in run.rows.sort("generation").group_by("generation", maintain_order=True)
     ]
     return archive_members(generations, condition.novelty, columns=grid.columns, rows=grid.rows)[-1]
 
@@ -158,8 +144,9 @@ def _n_runs(tally: Tally, novelty: Mapping[str, object]) -> int:
 # drawing
 
 
-def _draw_field(axes: Axes, paths: Sequence[TracedPath], arena: Arena, body: Body) -> None:
+def _draw_field(axes: Axes, paths: Sequence[TracedPath], run: ChosenRun) -> None:
     """Cells by how many of the archived visit them, and their paths."""
+    arena = run.arena
     draw_arena(axes, arena)
     counts = np.zeros(arena.grid.n_cells)
     for path in paths:
@@ -167,7 +154,7 @@ def _draw_field(axes: Axes, paths: Sequence[TracedPath], arena: Arena, body: Bod
     draw_shares(
         axes, arena.grid, np.where(counts > 0, 0.06 + 0.44 * counts / max(len(paths), 1), 0.0), Ink.PEN1
     )
-    draw_start(axes, arena, body)
+    draw_start(axes, arena, run.condition.on.body)
     for k, path in enumerate(paths):
         for poses, _ in path.tracks:
             draw_line(axes, *poses.T[:2], **pen_style(k, 1.0))

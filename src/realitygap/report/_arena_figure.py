@@ -23,7 +23,7 @@ def draw_arena_and_robot(tally: Tally, condition: str, *, name: str) -> Drawing:
         RecordVersionError: its settings are not those of this version.
     """
     described = tally.condition(condition)
-    resolved = Condition.from_settings(condition, dict(settings_of(described)))
+    resolved = tally.resolved(condition)
     robot = resolved.on.picture()
     picture = arena_picture(resolved.placed_arena, resolved.on.body, resolved.on.sensors)
     alt = f"{picture.description} {robot.description}"

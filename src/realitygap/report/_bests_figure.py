@@ -158,11 +158,12 @@ def _draw(rows: Sequence[_Row], positions: Sequence[npt.NDArray[np.float64]], wi
 
 
 def _caption(tally: Tally, rows: Sequence[_Row]) -> str:
-    counted = "along the line driven" if tally.measure == "line" else "at the ends of steps"
     labels = " and ".join(sorted({row.label for row in rows}))
     counts = sorted({len(row.values) for row in rows if len(row.values)})
     n = f"n = {counts[0]:,}" if len(counts) == 1 else f"n = {counts[0]:,} to {counts[-1]:,}"
-    parts = [f"Best coverage of each run by condition, counted {counted}. {labels}, {n} runs per condition."]
+    parts = [
+        f"Best coverage of each run by condition, counted {tally.counted}. {labels}, {n} runs per condition."
+    ]
     if any(row.n_drawn < len(row.values) for row in rows):
         most = max(row.n_drawn for row in rows)
         parts.append(f"Dots: the first {most:,} runs of a condition; medians and intervals are of all runs.")

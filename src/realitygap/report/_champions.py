@@ -10,7 +10,7 @@ import polars as pl
 
 from realitygap.errors import RecordError, RecordVersionError
 from realitygap.platforms import retry_genomes
-from realitygap.report._tally import DescribedCondition, Results, Tally, label_of, read_tally, settings_of
+from realitygap.report._tally import DescribedCondition, Results, Tally, label_of, read_tally
 from realitygap.runs import Condition, genome_of, partners_of
 from realitygap.stats import Estimate, bca_interval, bca_mean, difference_of_means
 from realitygap.trials import NoiseKey
@@ -80,18 +80,17 @@ def retry_champions(folder: Results) -> list[Champions]:
         RecordError: there is no such folder, a file in it is damaged, or it holds no trials yet.
     """
     tally = read_tally(folder)
-    with_runs = set(tally.runs["condition"])
-    return [_retry(tally, each) for each in tally.conditions if each["name"] in with_runs]
+    return [_retry(tally, each) for each in tally.with_runs]
 
 
 def _retry(tally: Tally, described: DescribedCondition) -> Champions:
     name, label = described["name"], label_of(described)
     try:
-        condition = Condition.from_settings(name, dict(settings_of(described)))
+        condition = tally.resolved(name)
         if condition.is_physical:
             raise RecordError("a robot drove it, and no program drives its champions again")
         rows = _champion_rows(tally, condition)
-        reported, fresh = _try_again(condition, rows, f"coverage_{tally.measure}")
+        reported, fresh = _try_again(condition, rows, tally.coverage_column)
     except (RecordError, ValueError) as error:
         problem = (
             "its settings are another version’s" if isinstance(error, RecordVersionError) else str(error)
@@ -103,7 +102,7 @@ def _retry(tally: Tally, described: DescribedCondition) -> Champions:
 
 def _champion_rows(tally: Tally, condition: Condition) -> pl.DataFrame:
     """The best individual of each of the first runs, the first of several alike."""
-    column = f"coverage_{tally.measure}"
+    column = tally.coverage_column
     replicates = [int(run) for run in tally.replicates(condition.name)[:MOST_RUNS]]
     columns = ["replicate", "generation", "individual", column, "key", *condition.genome_columns]
     rows = tally.folder.read(condition.name, replicates, columns)

@@ -339,13 +339,12 @@ def _alt(groups: list[list[Choice]]) -> str:
 
 def _caption(tally: Tally, groups: list[list[Choice]]) -> str:
     choices = [choice for group in groups for choice in group]
-    cells = "along the line driven" if tally.measure == "line" else "at the ends of steps"
     labels = " and ".join(sorted({choice.label for choice in choices}))
     counts = sorted({choice.n for choice in choices})
     n = counted(counts[-1], "run") if len(counts) == 1 else f"{counts[0]} to {counted(counts[-1], 'run')}"
     parts = [
         "Each row changes one choice and leaves all others as in the baseline. Dot: the median over runs of "
-        f"the best coverage of a run, counted {cells}. {labels}, n = {n} for each condition.",
+        f"the best coverage of a run, counted {tally.counted}. {labels}, n = {n} for each condition.",
         "Bar: its exact 95 % interval from order statistics. Band: the baseline’s. "
         if min(counts) >= MEDIAN_SMALLEST_N
         else f"No interval below {MEDIAN_SMALLEST_N} runs. ",

@@ -26,7 +26,7 @@ from realitygap.playback import (
 from realitygap.records import ResultsFolder, refuse_results
 from realitygap.report._driven import refuse_replay
 from realitygap.report._formats import captioned, check_ending, save_drawing
-from realitygap.report._tally import Tally, read_tally, settings_of
+from realitygap.report._tally import Tally, read_tally
 from realitygap.report._trial_figure import ChosenTrial, choose_trial
 from realitygap.report.charts.arena import draw_arena, draw_cells
 from realitygap.report.charts.house import WIDE, Drawing, draw_wide, shorten
@@ -159,7 +159,7 @@ def _beside(tally: Tally, own: Condition, against: str) -> Condition:
     """Return the condition on which the network is tried for comparison."""
     names = [condition["name"] for condition in tally.conditions]
     if against in names:
-        return Condition.from_settings(against, dict(settings_of(tally.condition(against))))
+        return tally.resolved(against)
     if _is_platform(against):
         fresh = Condition.model_validate({"name": own.name, "platform": against})
         return own.model_copy(update={"platform": fresh.platform, "noise": fresh.noise, "on": fresh.on})

@@ -94,7 +94,6 @@ def find(
         fresh: Comparisons of these networks, from `compare_champions`.
         tasks: Scores of other tasks than coverage, the rows of `summarize_tasks`.
     """
-    with_runs = [each for each in tally.conditions if len(tally.replicates(each["name"]))]
     basis = basis_of(champions)
     study = _Study(tally, basis, tuple(fresh if basis.is_fresh else comparisons), tuple(comparisons))
     possible: list[Finding | None] = [_best(study, champions)]
@@ -103,11 +102,11 @@ def find(
     elif study.compared:
         possible.insert(0, _nothing(study))
     if tasks:
-        is_mixed = any(task_of(each) == "coverage" for each in with_runs)
+        is_mixed = any(task_of(each) == "coverage" for each in tally.with_runs)
         possible = [*_best_scores(tasks), *(possible if is_mixed else possible[:-1])]
     findings = tuple(each for each in possible if each is not None)[:MOST_FINDINGS]
     caveats = [each.basis.caveat for each in findings if each.basis.caveat]
-    return Findings(findings, _limits(study, with_runs, caveats))
+    return Findings(findings, _limits(study, tally.with_runs, caveats))
 
 
 @dataclass(frozen=True)

@@ -71,12 +71,7 @@ def content(tally: Tally) -> dict[str, Any]:
 
 def _first(tally: Tally, selection: str, *, noise: float | None = None, driven: bool = False) -> str | None:
     """The first condition with runs and this selection; rather one that a robot drove (or not), and with this noise."""
-    with_runs = set(tally.runs["condition"])
-    candidates = [
-        each
-        for each in tally.conditions
-        if each["name"] in with_runs and settings_of(each).get("selection") == selection
-    ]
+    candidates = tally.selecting_by(selection)
     candidates = [each for each in candidates if (each["name"] in tally.driven) == driven] or candidates
     wanted = [each for each in candidates if settings_of(each).get("noise") == noise]
     return str((wanted or candidates)[0]["name"]) if candidates else None

@@ -406,9 +406,8 @@ def _draw_best_of_runs(axes: Axes, bests: npt.NDArray[np.float64], x: float) -> 
 def _caption(tally: Tally, panels: list[Panel], points: Points) -> str:
     labels = sorted({label_of(condition) for condition in tally.conditions})
     each = "Best coverage of each generation" if points == "best-of-generation" else "Best coverage so far"
-    counted = "along the line driven" if tally.measure == "line" else "at the ends of steps"
     parts = [
-        f"{each}, counted {counted}, by generation (from 0). {' and '.join(labels)}.",
+        f"{each}, counted {tally.counted}, by generation (from 0). {' and '.join(labels)}.",
         _say_runs(panels),
         f"Blue: the median over the runs{_say_interval(panels)}.",
         "Gray column, “run”: the best of whole runs, with its median, interval and quartiles"

@@ -11,15 +11,9 @@ import numpy.typing as npt
 import polars as pl
 
 from realitygap.drawing import PENS, Ink
-from realitygap.report._path_figure import (
-    TracedPath,
-    draw_path,
-    path_key,
-    say_origin,
-    trace_paths,
-    typical_replicate,
-)
-from realitygap.report._tally import DescribedCondition, Results, Tally, label_of, read_tally, settings_of
+from realitygap.report._chosen_run import ChosenRun, TracedPath, choose_run
+from realitygap.report._path_figure import draw_path, path_key
+from realitygap.report._tally import Results, Tally
 from realitygap.report.charts.arena import arena_extent, arena_panels, draw_cells, draw_start
 from realitygap.report.charts.house import Drawing, draw_wide, shorten
 from realitygap.report.charts.lines import (
@@ -36,8 +30,7 @@ from realitygap.report.charts.lines import (
     write,
 )
 from realitygap.report.charts.sheet import Sheet
-from realitygap.runs import Condition
-from realitygap.world import Arena, Body
+from realitygap.world import Arena
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -71,38 +64,23 @@ def draw_individuals(
         RecordError: there is no such folder, a file in it is damaged, or it holds no trials yet.
         ValueError: there is no such condition or run.
     """
-    tally = read_tally(folder)
-    condition = tally.name_of(condition)
-    described = tally.condition(condition)
-    resolved = Condition.from_settings(condition, dict(settings_of(described)))
-    typical = replicate is None
-    replicate = typical_replicate(tally, condition) if replicate is None else replicate
-    column = f"coverage_{tally.measure}"
-    rows = tally.rows_of(condition, replicate)
+    run = choose_run(folder, condition, replicate)
+    rows = run.rows
     n_generations, population = int(rows["generation"].n_unique()), int(rows["individual"].n_unique())
     shown = np.linspace(0, n_generations - 1, min(n_generations, _MOST_PANELS)).round().astype(int).tolist()
     rows = rows.filter(pl.col("generation").is_in(shown), pl.col("individual") < _MOST_PATHS)
-    paths, problem = trace_paths(tally, resolved, rows, column)
+    paths, origin = run.trace(rows)
     panels = [list(group) for _, group in itertools.groupby(paths, key=lambda path: path.generation)]
-    caption = _individuals_caption(
-        tally,
-        described,
-        replicate,
-        panels,
-        (n_generations, population),
-        _which(tally, condition, typical=typical),
-        problem,
-    )
+    caption = _individuals_caption(run, panels, (n_generations, population), origin)
     alt = (
-        f"Paths of all individuals of each generation of run {replicate} of {condition}, in {len(panels)} panels. "
+        f"Paths of all individuals of each generation of run {run.replicate} of {run.name}, in {len(panels)} panels. "
         "Best coverage: "
         + ", ".join(
             f"generation {panel[0].generation} {max(path.coverage for path in panel):.3f}" for panel in panels
         )
         + "."
     )
-    arena, body, label = resolved.placed_arena, resolved.on.body, label_of(described)
-    return draw_wide(lambda width: _draw_generations(panels, arena, body, label, width), name, caption, alt)
+    return draw_wide(lambda width: _draw_generations(run, panels, width), name, caption, alt)
 
 
 def draw_better(
@@ -120,40 +98,34 @@ def draw_better(
         ValueError: there is no such condition or run.
         RecordVersionError: its settings are not those of this version.
     """
-    described = tally.condition(condition)
-    resolved = Condition.from_settings(condition, dict(settings_of(described)))
-    typical = replicate is None
-    replicate = typical_replicate(tally, condition) if replicate is None else replicate
-    column = f"coverage_{tally.measure}"
-    rows = tally.rows_of(condition, replicate)
-    n_individuals = rows.height
+    run = choose_run(tally, condition, replicate)
+    rows, column = run.rows, tally.coverage_column
     best = (
         rows.sort(column, descending=True, maintain_order=True)
         .unique("cells", keep="first", maintain_order=True)
         .head(_N_BETTER)
     )
-    paths, problem = trace_paths(tally, resolved, best, column)
+    paths, origin = run.trace(best)
     caption = (
-        f"Condition {condition}, run {replicate}: the {len(paths)} individuals of highest coverage among all "
-        f"{n_individuals} of the run, best first, coverage counted {_counted(tally)}; of those that visit the same "
-        f"cells in the same order only the first is shown. {label_of(described)}, n = 1 run, no interval. "
-        f"{_which(tally, condition, typical=typical)} {say_origin(described, paths, problem)}"
+        f"Condition {condition}, run {run.replicate}: the {len(paths)} individuals of highest coverage among all "
+        f"{rows.height} of the run, best first, coverage counted {tally.counted}; of those that visit the same "
+        f"cells in the same order only the first is shown. {run.label}, n = 1 run, no interval. "
+        f"{_which(run)} {origin}"
     )
     alt = (
-        f"Paths of the {len(paths)} best individuals of run {replicate} of {condition}. Coverage: "
+        f"Paths of the {len(paths)} best individuals of run {run.replicate} of {condition}. Coverage: "
         + ", ".join(
             f"generation {path.generation} individual {path.individual} {path.coverage:.3f}" for path in paths
         )
     )
-    arena, body, label = resolved.placed_arena, resolved.on.body, label_of(described)
 
     def draw(width: float) -> Sheet:
-        sheet, panels, key = arena_panels(width, len(paths), arena)
+        sheet, panels, key = arena_panels(width, len(paths), run.arena)
         for path, axes in zip(paths, panels, strict=True):
-            draw_path(axes, path, arena, body)
+            draw_path(axes, path, run)
             if sheet.is_wide:
                 title = f"generation {path.generation}, individual {path.individual}"
-                head(axes, title, f"{shorten(label, 12)}, coverage {path.coverage:.3f}", below=True)
+                head(axes, title, f"{shorten(run.label, 12)}, coverage {path.coverage:.3f}", below=True)
             else:
                 title = f"gen {path.generation}, ind {path.individual}"
                 head(axes, title, f"{path.coverage:.3f}", below=True)
@@ -166,9 +138,8 @@ def draw_better(
 # drawing
 
 
-def _draw_generations(
-    panels: list[list[TracedPath]], arena: Arena, body: Body, label: str, width: float
-) -> Sheet:
+def _draw_generations(run: ChosenRun, panels: list[list[TracedPath]], width: float) -> Sheet:
+    arena = run.arena
     sheet, places, key = arena_panels(width, len(panels), arena)
     small = not sheet.is_wide
     for panel, axes in zip(panels, places, strict=True):
@@ -176,27 +147,27 @@ def _draw_generations(
         note = (
             f"best {best.coverage:.3f}"
             if small
-            else f"{shorten(label, 12)}, best: {best.individual}, coverage {best.coverage:.3f}"
+            else f"{shorten(run.label, 12)}, best: {best.individual}, coverage {best.coverage:.3f}"
         )
         head(axes, f"generation {best.generation}", note, below=True)
     n_pens = max((path.individual for panel in panels for path in panel), default=0) + 1
     _draw_pen_key(key, n_pens, small=small)
     sheet.settle()  # so that panels have the size in which numbers are moved apart
     for panel, axes in zip(panels, places, strict=True):
-        _draw_pens(axes, panel, arena, body, small=small)
+        _draw_pens(axes, panel, run, small=small)
     return sheet
 
 
-def _draw_pens(axes: Axes, paths: list[TracedPath], arena: Arena, body: Body, *, small: bool) -> None:
+def _draw_pens(axes: Axes, paths: list[TracedPath], run: ChosenRun, *, small: bool) -> None:
+    arena = run.arena
     draw_cells(axes, sorted({cell for path in paths for cell in path.cells}), arena)
-    draw_start(axes, arena, body)
-    drawn = [path for path in paths if path.poses is not None]
+    draw_start(axes, arena, run.condition.on.body)
     for path in paths:
         for poses, _ in path.tracks:
             draw_line(axes, poses[:, 0], poses[:, 1], **_pen(path.individual, small=small))
-        if path.poses is None:
+        if not path.tracks:
             _dot_cells(axes, path, arena, small=small)
-    if drawn:
+    if drawn := [path for path in paths if path.tracks]:
         _number_ends(axes, drawn, arena, small=small)
 
 
@@ -232,7 +203,7 @@ def _number_ends(axes: Axes, paths: list[TracedPath], arena: Arena, *, small: bo
     radius = 3.5 if small else 4.6
     (left, right), (bottom, top) = arena_extent(arena)
     points = axes.bbox.width * 72 / axes.figure.dpi / (right - left)
-    ends = np.array([path.poses[-1, :2] for path in paths if path.poses is not None])
+    ends = np.array([path.end for path in paths])
     places = _moved_apart(ends, 2 * radius / points + 0.4 / points)
     places[:, 0] = places[:, 0].clip(left + radius / points, right - radius / points)
     places[:, 1] = places[:, 1].clip(bottom + radius / points, top - radius / points)
@@ -283,17 +254,9 @@ def _draw_pen_key(axes: Axes, n_pens: int, *, small: bool) -> None:
 
 
 def _individuals_caption(
-    tally: Tally,
-    described: DescribedCondition,
-    replicate: int,
-    panels: list[list[TracedPath]],
-    sizes: tuple[int, int],
-    which: str,
-    problem: str,
+    run: ChosenRun, panels: list[list[TracedPath]], sizes: tuple[int, int], origin: str
 ) -> str:
-    name = described["name"]
-    origin = say_origin(described, [path for panel in panels for path in panel], problem)
-    if any(path.poses is None for panel in panels for path in panel) and not problem:
+    if run.condition.is_physical and not all(path.tracks for panel in panels for path in panel):
         origin += " A dot in the color of its pen stands in each cell that an individual visits."
     n_generations, population = sizes
     n_drawn = max(len(panel) for panel in panels)
@@ -308,20 +271,16 @@ def _individuals_caption(
         else f"{len(panels)} of {n_generations} generations"
     )
     return (
-        f"Condition {name}, run {replicate}: the paths of {who} of {when}, each with a pen of its own, its number at "
-        f"its end; ends that coincide are fanned out. Coverage is counted {_counted(tally)}. "
-        f"{label_of(described)}, n = 1 run, no interval. {which} {origin}"
+        f"Condition {run.name}, run {run.replicate}: the paths of {who} of {when}, each with a pen of its own, its "
+        f"number at its end; ends that coincide are fanned out. Coverage is counted {run.tally.counted}. "
+        f"{run.label}, n = 1 run, no interval. {_which(run)} {origin}"
     )
 
 
-def _counted(tally: Tally) -> str:
-    return "along the line driven" if tally.measure == "line" else "at the ends of steps"
-
-
-def _which(tally: Tally, condition: str, *, typical: bool) -> str:
-    n = len(tally.replicates(condition))
+def _which(run: ChosenRun) -> str:
+    n = len(run.tally.replicates(run.name))
     if n == 1:
         return "It is the only run."
-    if not typical:
+    if not run.is_typical:
         return "The run was chosen by number."
     return f"This is the typical run: its best coverage is the median of the {n:,} runs."

@@ -22,7 +22,6 @@ from realitygap.records import (
     refuse_results,
 )
 from realitygap.report._driven import driven_paths, refuse_replay
-from realitygap.report._path_figure import typical_replicate
 from realitygap.report._tally import Results, Tally, read_tally
 from realitygap.report._trial_figure import ChosenTrial, choose_trial
 from realitygap.robots import Robot
@@ -149,8 +148,7 @@ def _several(
             robot for trial in trials for robot in _moving(tally, trial, trial.row["condition"])
         ][:_MOST]
     name = tally.name_of(condition)
-    tally.condition(name)
-    replicate = typical_replicate(tally, name) if replicate is None else replicate
+    replicate = tally.typical_replicate(name) if replicate is None else replicate
     rows = tally.rows_of(name, replicate)
     if each == "individual":
         first = choose_trial(tally, name, replicate, generation)

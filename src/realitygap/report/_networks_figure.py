@@ -13,7 +13,7 @@ from realitygap.drawing import Picture
 from realitygap.errors import RealityGapError
 from realitygap.evolution import network_picture
 from realitygap.report._structures import Structures, count_structures
-from realitygap.report._tally import Results, Tally, label_of, read_tally, settings_of
+from realitygap.report._tally import Results, Tally, label_of, read_tally
 from realitygap.report.charts.house import Drawing, draw_wide
 from realitygap.report.charts.lines import head
 from realitygap.report.charts.shapes import draw_picture
@@ -52,7 +52,7 @@ def draw_networks(
     pictures: list[tuple[str, str, Picture]] = [
         (
             f"run {replicate}, generation {first['generation']}",
-            f"individual {first['individual']}, {first[f'coverage_{tally.measure}']:.3f}",
+            f"individual {first['individual']}, {first[tally.coverage_column]:.3f}",
             _picture(tally, first),
         )
     ]
@@ -85,10 +85,7 @@ def draw_network(condition: Condition, row: Mapping[str, Any], measure: str) -> 
 
 def _first_objective(tally: Tally) -> str:
     """Return the condition with runs that selects by coverage at the least noise; otherwise the first with runs."""
-    with_runs = set(tally.runs["condition"])
-    candidates = [each for each in tally.conditions if each["name"] in with_runs]
-    objective = [each for each in candidates if settings_of(each).get("selection") == "coverage"]
-    return str((objective or candidates)[0]["name"])
+    return str((tally.selecting_by("coverage") or tally.with_runs)[0]["name"])
 
 
 def _best_of_last(tally: Tally, condition: str, replicate: int) -> Mapping[str, Any]:
@@ -104,9 +101,7 @@ def _row_of(tally: Tally, individual: Mapping[str, Any]) -> Mapping[str, Any]:
 
 
 def _picture(tally: Tally, row: Mapping[str, Any]) -> Picture:
-    settings = dict(settings_of(tally.condition(row["condition"])))
-    condition = Condition.from_settings(row["condition"], settings)
-    return picture_of(condition, row)
+    return picture_of(tally.resolved(row["condition"]), row)
 
 
 def picture_of(condition: Condition, row: Mapping[str, Any]) -> Picture:

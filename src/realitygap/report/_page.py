@@ -42,10 +42,9 @@ from realitygap.report._placed import FigureOnPage, hover_content, number_figure
 from realitygap.report._replay import ReplayOnPage
 from realitygap.report._replay import content as replay_content
 from realitygap.report._statistics_section import Statistics, statistics_content
-from realitygap.report._structures import selection_of
 from realitygap.report._summary import summarize, summarize_tasks
 from realitygap.report._table import Cell, Column, Part, Row, TableOnPage, numbered
-from realitygap.report._tally import Tally, label_of, read_tally, score_text, settings_of
+from realitygap.report._tally import Tally, label_of, read_tally, score_text, selection_of, settings_of
 from realitygap.report._template import render_page
 from realitygap.report.charts.house import house_style
 from realitygap.stats import CONFIDENCE, MEDIAN_SMALLEST_N, interval_ranks
@@ -334,14 +333,9 @@ def _path_figures(tally: Tally) -> list[FigureOnPage | str]:
 
 
 def _conditions_with_paths(tally: Tally) -> list[str]:
-    with_runs = set(tally.runs["condition"])
-    described = [condition for condition in tally.conditions if condition["name"] in with_runs]
-    by_selection = {
-        selection: [each["name"] for each in described if settings_of(each).get("selection") == selection]
-        for selection in ("coverage", "novelty")
-    }
-    names = [found[0] for found in by_selection.values() if found]
-    return names or [described[0]["name"]]
+    by_selection = (tally.selecting_by(selection) for selection in ("coverage", "novelty"))
+    first = [conditions[0] for conditions in by_selection if conditions] or tally.with_runs[:1]
+    return [condition["name"] for condition in first]
 
 
 def _choices_figure(tally: Tally) -> FigureOnPage | None:

@@ -7,15 +7,14 @@ import hashlib
 import json
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+from markupsafe import Markup
 
 from realitygap._foreign_text import script_text
 from realitygap.report._template import packed, template_text
 from realitygap.report.charts.house import NARROW, Drawing, inline
 from realitygap.report.charts.marks import marks_content
-
-if TYPE_CHECKING:
-    from markupsafe import Markup
 
 
 @dataclass
@@ -38,8 +37,6 @@ class FigureOnPage:
     marks: dict[str, Any] | None = field(init=False)
 
     def __post_init__(self) -> None:
-        from markupsafe import Markup
-
         narrow = self.drawing.in_width(NARROW)
         self.wide, self.narrow = Markup(inline(self.drawing.svg)), Markup(inline(narrow.svg))
         self.marks = marks_content(self.drawing, narrow) if self.drawing.marks else None
@@ -58,8 +55,6 @@ class FigureOnPage:
 
 def hover_content(content: Mapping[str, Any]) -> dict[str, Any]:
     """Return what a page needs to show the values of its figures: `marks`, `hover`, and `hover_hash`."""
-    from markupsafe import Markup
-
     script = packed(template_text("hover.js")) + template_text("tables.js")
     marks = {each.anchor: each.marks for each in figures_in(content) if each.marks}
     return {"marks": as_json(marks), "hover": Markup(script), "hover_hash": hash_of(script)}
@@ -72,8 +67,6 @@ def hash_of(script: str) -> str:
 
 def as_json(values: Mapping[str, Any]) -> Markup:
     """JSON for a script element: nothing in it ends the element, whatever the names are."""
-    from markupsafe import Markup
-
     text = script_text(json.dumps(values, separators=(",", ":"), allow_nan=False))
     for letter in "<>&":
         text = text.replace(letter, f"\\u{ord(letter):04x}")

@@ -86,8 +86,7 @@ class Spread:
 
 def spreads(tally: Tally) -> list[Spread]:
     """The spread of each condition with runs, against its baseline or the first of its selection."""
-    with_runs = [each for each in tally.conditions if len(tally.replicates(each["name"]))]
-    return [_spread(tally, each["name"], _reference(each, with_runs)) for each in with_runs]
+    return [_spread(tally, each["name"], _reference(each, tally.with_runs)) for each in tally.with_runs]
 
 
 def _reference(condition: DescribedCondition, others: Sequence[DescribedCondition]) -> str:
@@ -173,8 +172,7 @@ def measure_variety(folder: Results) -> list[Variety]:
     Source: the distance of sorted cells, Rosenzweig & Remy, section 2.4 (by x, then y); Jaccard (1912).
     """
     tally = read_tally(folder)
-    with_runs = [each for each in tally.conditions if len(tally.replicates(each["name"]))]
-    return [_variety(tally, each) for each in with_runs]
+    return [_variety(tally, each) for each in tally.with_runs]
 
 
 def _variety(tally: Tally, condition: DescribedCondition) -> Variety:
@@ -322,9 +320,8 @@ def chances(tally: Tally, n_runs: int = 3) -> list[Chance]:
 
     Each group of three or more conditions that differ in noise alone gives one result.
     """
-    with_runs = [each for each in tally.conditions if len(tally.replicates(each["name"]))]
     chances_of = []
-    for group in same_but_for("noise", with_runs):
+    for group in same_but_for("noise", tally.with_runs):
         if len(group) < 3:
             continue
         names = tuple(str(each["name"]) for each in group)

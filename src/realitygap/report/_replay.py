@@ -11,25 +11,22 @@ import base64
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from urllib.parse import quote
 
 import numpy as np
 import numpy.typing as npt
 import polars as pl
+from markupsafe import Markup
 
 from realitygap.errors import RealityGapError
 from realitygap.playback import RobotShape, first_visits, pack_pen, pack_scene, pack_shape
-from realitygap.report._path_figure import typical_replicate
 from realitygap.report._placed import as_json, hash_of
-from realitygap.report._tally import DescribedCondition, Tally, label_of, score_text, settings_of, task_of
+from realitygap.report._tally import DescribedCondition, Tally, label_of, score_text, task_of
 from realitygap.report._template import template_text
 from realitygap.report.charts.arena import arena_extent
 from realitygap.runs import Condition, replay
 from realitygap.trials import Trajectory
-
-if TYPE_CHECKING:
-    from markupsafe import Markup
 
 UNITS = {"length": 1e-4, "angle": 1e-3, "output": 1e-3}
 """Units to which numbers are rounded: positions and readings [m], headings [rad], inputs and outputs of networks."""
@@ -124,10 +121,7 @@ def content(tally: Tally, lead: str) -> ReplayOnPage:
         lead: Name of the condition whose best embedded trial the first screen plays. If it has none, the first
             condition that has some takes its place.
     """
-    from markupsafe import Markup
-
-    with_runs = set(tally.runs["condition"])
-    candidates = [condition for condition in tally.conditions if condition["name"] in with_runs]
+    candidates = tally.with_runs
     room = MOST_STEPS // max(len(candidates), 1)
     runs = [_pack_run(tally, condition, room) for condition in candidates]
     with_trials = [run for run in runs if run.data is not None]
@@ -175,7 +169,7 @@ def _lead_of(tally: Tally, runs: Sequence[_Run], lead: str) -> tuple[int, int, L
     row = tally.rows_of(name, run).row(
         by_predicate=(pl.col("generation") == generation) & (pl.col("individual") == individual), named=True
     )
-    condition = Condition.from_settings(name, dict(settings_of(tally.condition(name))))
+    condition = tally.resolved(name)
     label, task = label_of(tally.condition(name)), task_of(tally.condition(name))
     value = float(row[tally.score_column(name)])
     worth = f"coverage {value:.3f}" if task == "coverage" else f"score of {task} {score_text(value)}"
@@ -188,8 +182,6 @@ def _lead_of(tally: Tally, runs: Sequence[_Run], lead: str) -> tuple[int, int, L
 
 def _picture(condition: Condition, trajectory: Trajectory, text: str) -> Markup:
     """The arena with the whole path of each robot [mm], in the classes of the style sheet."""
-    from markupsafe import Markup
-
     arena = condition.placed_arena
     (left, right), (bottom, top) = arena_extent(arena)
     grid = arena.grid
@@ -213,10 +205,10 @@ def _picture(condition: Condition, trajectory: Trajectory, text: str) -> Markup:
 
 def _pack_run(tally: Tally, described: DescribedCondition, room: int) -> _Run:
     name = described["name"]
-    replicate = typical_replicate(tally, name)
+    replicate = tally.typical_replicate(name)
     rows = tally.rows_of(name, replicate)
     try:
-        condition = Condition.from_settings(name, dict(settings_of(described)))
+        condition = tally.resolved(name)
         if condition.is_physical:
             note = "its trials were driven by a robot, and cannot be computed again to be played."
             return _Run(name, replicate, None, 0, rows.height, note)

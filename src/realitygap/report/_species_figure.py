@@ -12,8 +12,7 @@ import polars as pl
 
 from realitygap._wording import counted
 from realitygap.drawing import Ink
-from realitygap.report._structures import selection_of
-from realitygap.report._tally import Results, Tally, label_of, read_tally
+from realitygap.report._tally import Results, Tally, label_of, read_tally, selection_of
 from realitygap.report.charts.house import Drawing, draw_wide, shorten
 from realitygap.report.charts.lines import Dash, LineStyle, TextStyle, draw_line, head, spread, write
 from realitygap.report.charts.marks import MOST_MARKS, Panel, Series

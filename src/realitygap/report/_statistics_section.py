@@ -148,7 +148,7 @@ def statistics_content(
         fresh: Comparisons of these networks, from `compare_champions`.
     """
     basis = basis_of(champions)
-    with_runs = [each for each in tally.conditions if len(tally.replicates(each["name"]))]
+    with_runs = tally.with_runs
     labels = ", ".join(sorted({label_of(each) for each in with_runs}))
     return Statistics(
         comparisons=comparisons_content(

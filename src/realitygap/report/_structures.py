@@ -10,7 +10,7 @@ from typing import Any
 
 import polars as pl
 
-from realitygap.report._tally import DescribedCondition, Names, Tally, declared, settings_of
+from realitygap.report._tally import Names, Tally, declared, selection_of, settings_of
 
 _MOST_ORDERED = 6
 """Hidden nodes up to which all orders are compared; larger networks are ordered by their links alone."""
@@ -86,11 +86,6 @@ class Structures:
         return self.found[:_MOST_LISTED]
 
 
-def selection_of(condition: DescribedCondition) -> str:
-    """Return the selection method of a condition, as named in its settings."""
-    return str(settings_of(condition).get("selection", "unknown")).encode("utf-8", "replace").decode()
-
-
 def count_structures(tally: Tally) -> list[Structures]:
     """Count how often each structure occurs among the networks of each run's last generation, by selection."""
     genes = _count_genes(tally)
@@ -116,7 +111,7 @@ def _count_genes(tally: Tally) -> dict[str, pl.DataFrame]:
     coverage, the first of several alike, `coverage`, `replicate`, `generation` and `individual`, which order
     the rows.
     """
-    measure = f"coverage_{tally.measure}"
+    measure = tally.coverage_column
     parts: dict[str, list[pl.DataFrame]] = {}
     best = pl.col("coverage").arg_max()
     for frame in tally.folder.frames(columns=["condition", *_ROW, measure, "genome"]):

@@ -16,6 +16,7 @@ from realitygap._numbers import significant
 from realitygap.errors import RecordError, did_you_mean
 from realitygap.records import ResultsFolder
 from realitygap.report._driven import Driven, read_driven
+from realitygap.runs import Condition
 
 Measure = Literal["line", "ends"]
 """Kind of counted cells: those that the driven line crosses, or those in which steps end."""
@@ -89,9 +90,32 @@ class Tally:
             raise ValueError(f"Unknown condition {name!r}. {did_you_mean(name, names)}")
         return self.conditions[names.index(name)]
 
+    def resolved(self, name: str) -> Condition:
+        """Return one condition by name with its settings as this version reads them.
+
+        Raises:
+            ValueError: there is none of that name.
+            RecordVersionError: its settings are not those of this version.
+        """
+        return Condition.from_settings(name, dict(settings_of(self.condition(name))))
+
+    @property
+    def with_runs(self) -> list[DescribedCondition]:
+        """The conditions that have runs."""
+        names = set(self.runs["condition"])
+        return [condition for condition in self.conditions if condition["name"] in names]
+
+    def selecting_by(self, selection: str) -> list[DescribedCondition]:
+        """Return the conditions that have runs and this selection."""
+        return [condition for condition in self.with_runs if selection_of(condition) == selection]
+
     def name_of(self, condition: str | None) -> str:
-        """The name of a condition; that of the first with runs when none is given."""
-        return str(self.runs["condition"][0]) if condition is None else condition
+        """The name of a condition; that of the first with runs when none is given.
+
+        Raises:
+            ValueError: there is none of that name.
+        """
+        return str(self.runs["condition"][0]) if condition is None else self.condition(condition)["name"]
 
     @cached_property
     def runs(self) -> pl.DataFrame:
@@ -106,6 +130,16 @@ class Tally:
         cells = [settings_of(condition).get("task", {}).get("cells") for condition in self.conditions]
         return "ends" if set(cells) == {"ends"} else "line"
 
+    @property
+    def coverage_column(self) -> str:
+        """The column of rows with the coverage that figures show."""
+        return f"coverage_{self.measure}"
+
+    @property
+    def counted(self) -> str:
+        """The way in which the cells are counted that figures show, in words."""
+        return "along the line driven" if self.measure == "line" else "at the ends of steps"
+
     def run_bests(self, condition: str, measure: Measure) -> npt.NDArray[np.float64]:
         """Return the best coverage of each run of a condition, in the order of replicates, (n,) [0..1]."""
         return self.runs.filter(pl.col("condition") == condition)[measure].to_numpy()
@@ -113,7 +147,7 @@ class Tally:
     def score_column(self, condition: str) -> str:
         """The column of rows that says which trial of a condition is the best: its coverage, or its task's score."""
         is_coverage = task_of(self.condition(condition)) == "coverage"
-        return f"coverage_{self.measure}" if is_coverage else "task_fitness"
+        return self.coverage_column if is_coverage else "task_fitness"
 
     def run_scores(self, condition: str) -> npt.NDArray[np.float64]:
         """Return the best score of each run of a condition by its task, in the order of replicates, (n,)."""
@@ -125,6 +159,18 @@ class Tally:
     def replicates(self, condition: str) -> npt.NDArray[np.uint32]:
         """Return the replicates of a condition, in order, (n,)."""
         return self.runs.filter(pl.col("condition") == condition)["replicate"].to_numpy()
+
+    def typical_replicate(self, condition: str) -> int:
+        """The run whose best trial by the task is the median: the lower middle one, and the first of several alike.
+
+        Raises:
+            ValueError: the condition has no runs.
+        """
+        bests = self.run_scores(condition)
+        if len(bests) == 0:
+            raise ValueError(f"Condition {condition!r} has no runs yet.")
+        middle = np.sort(bests)[(len(bests) - 1) // 2]
+        return int(self.replicates(condition)[np.argmax(bests == middle)])
 
     def generation_bests(self, condition: str, measure: Measure) -> npt.NDArray[np.float64]:
         """Return the best coverage in each generation of each run, (n, g) [0..1]; NaN after a run's last generation."""
@@ -246,6 +292,11 @@ def settings_of(condition: DescribedCondition) -> Mapping[str, Any]:
     """Return the resolved settings of a condition; empty if the description has none."""
     settings = condition.get("settings")
     return settings if isinstance(settings, dict) else {}
+
+
+def selection_of(condition: DescribedCondition) -> str:
+    """Return the selection method of a condition, as named in its settings."""
+    return str(settings_of(condition).get("selection", "unknown")).encode("utf-8", "replace").decode()
 
 
 def bests_of(folder: ResultsFolder, condition: str) -> npt.NDArray[np.float64]:

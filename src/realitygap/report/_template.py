@@ -7,11 +7,12 @@ from collections.abc import Callable, Mapping
 from importlib import resources
 from typing import TYPE_CHECKING, Any
 
+from markupsafe import Markup, escape
+
 from realitygap._foreign_text import page_text
 
 if TYPE_CHECKING:
     from jinja2 import Environment
-    from markupsafe import Markup
 
 
 def render_page(name: str, content: Mapping[str, Any], **filters: Callable[..., str]) -> str:
@@ -44,8 +45,6 @@ def page_environment(**filters: Callable[..., str]) -> Environment:
 
 def _formula(text: str) -> Markup:
     """Return a text of ours with the index of the effect size A12 set low."""
-    from markupsafe import Markup, escape
-
     return escape(text).replace("A12", Markup("A<sub>12</sub>"))
 
 

@@ -13,8 +13,7 @@ import polars as pl
 from realitygap.drawing import Ink
 from realitygap.errors import whole_number
 from realitygap.report._driven import refuse_replay
-from realitygap.report._path_figure import typical_replicate
-from realitygap.report._tally import Results, Tally, label_of, read_tally, settings_of
+from realitygap.report._tally import Results, Tally, label_of, read_tally
 from realitygap.report.charts.arena import draw_arena, draw_cells, draw_start, draw_tracks
 from realitygap.report.charts.house import Drawing, draw_wide, shorten
 from realitygap.report.charts.lines import Dash, head
@@ -83,11 +82,10 @@ def choose_trial(
         ValueError: there is none such; the message says which there are.
     """
     name = tally.name_of(condition)
-    described = tally.condition(name)
     for what, number in (("generation", generation), ("individual", individual)):
         if number is not None:
             whole_number(what, number)
-    replicate = typical_replicate(tally, name) if replicate is None else replicate
+    replicate = tally.typical_replicate(name) if replicate is None else replicate
     rows = tally.rows_of(name, replicate)
     if individual is not None and generation is None:
         raise ValueError(f"Individual {individual} of which generation? Name it too.")
@@ -106,10 +104,8 @@ def choose_trial(
                 f"Generation {generation} has no individual {individual}: its individuals are 0 to {rows.height - 1}."
             )
         rows = rows.filter(pl.col("individual") == individual)
-    measure = f"coverage_{tally.measure}"
     row = rows.row(int(rows[tally.score_column(name)].arg_max() or 0), named=True)
-    resolved = Condition.from_settings(name, dict(settings_of(described)))
-    return ChosenTrial(resolved, label_of(described), row, measure)
+    return ChosenTrial(tally.resolved(name), label_of(tally.condition(name)), row, tally.coverage_column)
 
 
 def draw_trial(
@@ -133,16 +129,16 @@ def draw_trial(
             otherwise than recorded.
         ValueError: there is no such trial.
     """
-    trial = choose_trial(read_tally(folder), condition, replicate, generation, individual)
+    tally = read_tally(folder)
+    trial = choose_trial(tally, condition, replicate, generation, individual)
     trajectory = _replayed(trial)
     coverage = trial.row[trial.measure]
-    counted = "along the line driven" if trial.measure == "coverage_line" else "at the ends of steps"
     n_steps, n_stalls = len(trajectory.commands), int(trajectory.stalled.sum())
     several = "Each color is a robot. Readings, commands and blocked steps are of the first, dark blue. "
     caption = (
         f"{trial.title}: {n_steps} steps of {trajectory.step_s:g} s, {n_stalls} of them blocked (×; gray stripes), "
-        f"coverage {coverage:.3f} {counted}. Dot: start; circle: end; shaded: cells visited. Readings are distances "
-        "without noise; obstacle is what the network saw, 1 being nearest, with noise. "
+        f"coverage {coverage:.3f} {tally.counted}. Dot: start; circle: end; shaded: cells visited. Readings are "
+        "distances without noise; obstacle is what the network saw, 1 being nearest, with noise. "
         f"{several if trajectory.others else ''}{trial.label}, n = 1 trial, no interval. Recomputed from the records."
     )
     alt = f"Path, readings and commands of one trial. {caption}"

@@ -5,7 +5,7 @@ The terminal, the lab, and the reports use these functions, so that one result r
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -63,6 +63,18 @@ def highest(values: Mapping[str, float]) -> list[str]:
 def counted(n: int, noun: str) -> str:
     """Return a number with its noun, such as `1 run` or `2,000 runs`."""
     return f"{n:,} {noun}{'' if n == 1 else 's'}"
+
+
+def count_range(counts: Iterable[int]) -> str:
+    """Return the smallest and the largest of several numbers, such as `3 to 10`; one number if all are the same."""
+    known = list(counts)
+    return " to ".join(f"{n:,}" for n in dict.fromkeys((min(known), max(known))))
+
+
+def counted_range(counts: Iterable[int], noun: str) -> str:
+    """Return the smallest and the largest of several numbers with their noun, such as `3 to 10 runs`."""
+    known = list(counts)
+    return f"{count_range(known)} {noun}{'' if max(known) == 1 else 's'}"
 
 
 def values_between(values: Sequence[float], digits: int = 3) -> str:
@@ -131,6 +143,12 @@ def p_equation(p: float, *, bound: bool = False) -> str:
     return f"p {'≤' if bound else '='} {p_in_words(p)}"
 
 
+def difference_clause(difference: Estimate, p: float, *, bound: bool = False) -> str:
+    """Return a difference with its interval and its corrected p, which is the largest of several if `bound`."""
+    equation = p_equation(p, bound=bound).replace(" ", "\N{NO-BREAK SPACE}")
+    return f"{with_interval(difference, signs=True)}, {equation}"
+
+
 # verdicts
 
 
@@ -178,6 +196,45 @@ def undecided_highest(score: str, values: Sequence[float], about: str, needed: i
     )
 
 
+def higher_than_others(leader: str, n_lower: int, n: int, nearest: str, difference: str) -> str:
+    """Return how many of the conditions that were compared with one are lower, as sentences.
+
+    Args:
+        leader: The condition.
+        n_lower: Number of conditions that it covers more than.
+        n: Number of conditions that were compared with it.
+        nearest: The highest of those that are lower.
+        difference: Difference to that one, in words.
+    """
+    if not n_lower:
+        return f"No comparison shows that {leader} covers more than another."
+    n_others = n - n_lower
+    others = (
+        f"; no difference to the other {n_others if n_others > 1 else 'one'} is supported" if n_others else ""
+    )
+    return (
+        f"{leader} covers more than {n_lower} of the {counted(n, 'condition')} compared with it{others}. "
+        f"The nearest of them is {nearest}: {difference}."
+    )
+
+
+def higher_searches(one: str, other: str, n_above: int, n_below: int, n: int) -> str:
+    """Return at how many of n noise levels one kind of search is above another, without a period."""
+    if not n_above and not n_below:
+        return f"{one} and {other} are not shown to differ"
+    levels = at_levels(n_above or n_below, n)
+    if n_above and n_below:
+        return f"{one} covers more than {other}{levels} and less at {n_below}"
+    return f"{one} covers {'more' if n_above else 'less'} than {other}{levels}"
+
+
+def at_levels(k: int, n: int) -> str:
+    """Return at how many of n noise levels something is shown, as the end of a clause; empty for a single level."""
+    if n == 1:
+        return ""
+    return f" at all {n} noise levels" if k == n else f" at {k} of {n} noise levels"
+
+
 def no_difference(runs: str) -> str:
     """Return that these runs support no difference between conditions, without a period."""
     return f"no difference in coverage between conditions is supported by {runs} each"
@@ -207,6 +264,11 @@ def effect_of_noise(span: str, score: str, searches: str, raises: bool | None, *
     if raises is None:
         return f"more noise{span} raises the {score} in some conditions and lowers it in others"
     return f"more noise{span} {'raises' if raises else 'lowers'} the {score}{searches}"
+
+
+def runs_for_claims(needed: int) -> str:
+    """Return how many runs claims need, as a sentence."""
+    return f"A claim needs at least {counted(needed, 'run')} of each condition."
 
 
 def few_runs_verdict(needed: int, detail: str = "") -> str:

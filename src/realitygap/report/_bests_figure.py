@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from realitygap._wording import count_range
 from realitygap.drawing import Ink
 from realitygap.report._tally import DescribedCondition, Results, Tally, label_of, read_tally
 from realitygap.report.charts.house import Drawing, draw_wide, shorten
@@ -160,9 +161,9 @@ def _draw(rows: Sequence[_Row], positions: Sequence[npt.NDArray[np.float64]], wi
 def _caption(tally: Tally, rows: Sequence[_Row]) -> str:
     labels = " and ".join(sorted({row.label for row in rows}))
     counts = sorted({len(row.values) for row in rows if len(row.values)})
-    n = f"n = {counts[0]:,}" if len(counts) == 1 else f"n = {counts[0]:,} to {counts[-1]:,}"
     parts = [
-        f"Best coverage of each run by condition, counted {tally.counted}. {labels}, {n} runs per condition."
+        f"Best coverage of each run by condition, counted {tally.counted}. {labels}, "
+        f"n = {count_range(counts)} runs per condition."
     ]
     if any(row.n_drawn < len(row.values) for row in rows):
         most = max(row.n_drawn for row in rows)

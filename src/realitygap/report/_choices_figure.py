@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from realitygap._wording import counted
+from realitygap._wording import count_range, counted_range
 from realitygap.drawing import Ink
 from realitygap.report._tally import DescribedCondition, Results, Tally, label_of, read_tally, settings_of
 from realitygap.report.charts.house import Drawing, draw_wide, shorten, wrap
@@ -257,10 +257,9 @@ def _draw_group(axes: Axes, group: _Group) -> None:
             words: TextStyle = {"va": "top", "linespacing": 1.15, "weight": "normal" if k else "bold"}
             write(axes, group.words[k], (0, start + 0.06), (0, 0), 8, units=_BESIDE, **words)
     counts = sorted({choice.n for choice in group.choices})
-    n = f"n = {counts[0]}" if len(counts) == 1 else f"n = {counts[0]} to {counts[-1]}"
     labels = ", ".join(sorted({choice.label for choice in group.choices}))
     title = f"Changes to “{shorten(group.choices[0].condition, 30)}”"
-    head(axes, title, f"{labels}, {n}" + (" runs each" if group.is_wide else ""))
+    head(axes, title, f"{labels}, n = {count_range(counts)}" + (" runs each" if group.is_wide else ""))
 
 
 def _draw_rules(axes: Axes, group: _Group) -> None:
@@ -341,10 +340,10 @@ def _caption(tally: Tally, groups: list[list[Choice]]) -> str:
     choices = [choice for group in groups for choice in group]
     labels = " and ".join(sorted({choice.label for choice in choices}))
     counts = sorted({choice.n for choice in choices})
-    n = counted(counts[-1], "run") if len(counts) == 1 else f"{counts[0]} to {counted(counts[-1], 'run')}"
     parts = [
         "Each row changes one choice and leaves all others as in the baseline. Dot: the median over runs of "
-        f"the best coverage of a run, counted {tally.counted}. {labels}, n = {n} for each condition.",
+        f"the best coverage of a run, counted {tally.counted}. {labels}, "
+        f"n = {counted_range(counts, 'run')} for each condition.",
         "Bar: its exact 95 % interval from order statistics. Band: the baseline’s. "
         if min(counts) >= MEDIAN_SMALLEST_N
         else f"No interval below {MEDIAN_SMALLEST_N} runs. ",

@@ -329,6 +329,28 @@ def same_but_for(key: str, conditions: Sequence[DescribedCondition]) -> list[lis
     return [members for _, members in groups if len(members) > 1]
 
 
+def noise_extremes(
+    conditions: Sequence[DescribedCondition],
+) -> list[tuple[DescribedCondition, DescribedCondition]]:
+    """Return those with the least and the most noise of each group of conditions that differ in noise alone."""
+    extremes = []
+    for group in same_but_for("noise", conditions):
+        usable = [each for each in group if isinstance(noise_of(each), int | float)]
+        if len(usable) > 1:
+            extremes.append((min(usable, key=noise_of), max(usable, key=noise_of)))
+    return extremes
+
+
+def noise_of(condition: DescribedCondition) -> Any:
+    """Return the noise level of a condition, a number in all studies of this version."""
+    return settings_of(condition).get("noise")
+
+
+def comparison_of(comparisons: Sequence[Comparison], one: str, other: str) -> Comparison | None:
+    """Return the comparison of two conditions, seen from the first; None if they were not compared."""
+    return next((each.seen_from(one) for each in comparisons if {each.one, each.other} == {one, other}), None)
+
+
 def _pairs(tally: Tally) -> Iterator[tuple[DescribedCondition, DescribedCondition, Reason]]:
     """Yield the pairs of conditions to compare, each pair once."""
     seen: set[frozenset[str]] = set()

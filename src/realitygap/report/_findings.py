@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,21 +11,26 @@ import numpy.typing as npt
 
 from realitygap._wording import (
     Basis,
+    at_levels,
     changes_supported,
     counted,
+    counted_range,
+    difference_clause,
     effect_of_noise,
+    higher_searches,
+    higher_than_others,
     highest,
     highest_mean,
     highest_median,
     no_difference,
-    p_equation,
+    runs_for_claims,
     undecided_highest,
     values_between,
     with_interval,
 )
 from realitygap.report._champions import Champions
-from realitygap.report._comparisons import Comparison, same_but_for
-from realitygap.report._tally import DescribedCondition, Tally, label_of, score_text, settings_of, task_of
+from realitygap.report._comparisons import Comparison, comparison_of, noise_extremes, noise_of
+from realitygap.report._tally import DescribedCondition, Tally, label_of, score_text, selection_of, task_of
 from realitygap.stats import median_interval, quartiles, runs_for_a_claim
 
 MOST_FINDINGS = 3
@@ -186,7 +191,7 @@ def _undecided(
     study: _Study, bests: Mapping[str, npt.NDArray[np.float64]], champions: Sequence[Champions], needed: int
 ) -> Finding:
     """Return the range of coverage over conditions that have too few runs to name the highest."""
-    about = f"{_runs(len(values) for values in bests.values())} each"
+    about = f"{counted_range(map(len, bests.values()), 'run')} each"
     medians = [quartiles(values).median for values in bests.values()]
     if not study.basis.is_fresh:
         claim = undecided_highest("median best coverage", medians, about, needed)
@@ -203,17 +208,8 @@ def _rank(study: _Study, leader: str) -> str:
     if not rivals:
         return ""
     lower = [each for each in rivals if each.is_shown and each.size > 0]
-    if not lower:
-        return f"No comparison shows that {leader} covers more than another."
-    nearest = min(lower, key=lambda each: each.size)
-    n_others = len(rivals) - len(lower)
-    others = (
-        f"; no difference to the other {n_others if n_others > 1 else 'one'} is supported" if n_others else ""
-    )
-    return (
-        f"{leader} covers more than {len(lower)} of the {counted(len(rivals), 'condition')} compared with it{others}. "
-        f"The nearest of them is {nearest.other}: {_difference([nearest])}."
-    )
+    nearest = min(lower or rivals, key=lambda each: each.size)
+    return higher_than_others(leader, len(lower), len(rivals), nearest.other, _difference([nearest]))
 
 
 def _best_scores(tasks: Sequence[Mapping[str, Any]]) -> list[Finding]:
@@ -233,7 +229,7 @@ def _best_scores(tasks: Sequence[Mapping[str, Any]]) -> list[Finding]:
             claim = highest_median(leaders, medians, f"score of {task}", n_conditions=len(rows))
         else:
             values = [float(row["median"]) for row in rows.values()]
-            about = f"{_runs(int(row['n']) for row in rows.values())} each"
+            about = f"{counted_range((int(row['n']) for row in rows.values()), 'run')} each"
             claim = undecided_highest(f"median score of {task}", values, about, needed)
         basis = Basis(f"the report tries no network again for its score of {task}")
         findings.append(Finding(basis, claim, "", ("scores",)))
@@ -242,13 +238,12 @@ def _best_scores(tasks: Sequence[Mapping[str, Any]]) -> list[Finding]:
 
 def _nothing(study: _Study) -> Finding:
     compared = study.compared
-    claim = no_difference(_runs(each.n for each in compared))
+    claim = no_difference(counted_range((each.n for each in compared), "run"))
     if any(each.can_claim for each in compared):
         largest = max(compared, key=lambda each: abs(each.size))
         evidence = f"The largest is between {largest.one} and {largest.other}: {_difference([largest])}."
     else:
-        needed = max(each.runs_for_a_claim for each in compared)
-        evidence = f"A claim needs at least {counted(needed, 'run')} of each condition."
+        evidence = runs_for_claims(max(each.runs_for_a_claim for each in compared))
     return study.find(claim, evidence)
 
 
@@ -274,7 +269,7 @@ def _of_search(study: _Study) -> Finding | None:
     evolved = [pairs.get((each, "random"), []) for each in ("coverage", "novelty")]
     if all(evolved) and all(_is_above(each) for matching in evolved for each in matching):
         both = [each for matching in evolved for each in matching]
-        levels = _at_levels(len(evolved[0]), len(evolved[0]))
+        levels = at_levels(len(evolved[0]), len(evolved[0]))
         random = f"objective and novelty search cover more than random networks{levels}", _difference(both)
         sentences = [*sentences[: ("novelty", "coverage") in pairs], random]
     (claim, numbers), *others = sentences
@@ -282,28 +277,16 @@ def _of_search(study: _Study) -> Finding | None:
     return study.find(claim, f"{'. '.join(evidence)}.")
 
 
-def _selection(tally: Tally, name: str) -> Any:
-    return settings_of(tally.condition(name)).get("selection")
+def _selection(tally: Tally, name: str) -> str:
+    return selection_of(tally.condition(name))
 
 
-def _search_sentences(first: str, second: str, found: Sequence[Comparison]) -> tuple[str, str]:
+def _search_sentences(first: str, second: str, comparisons: Sequence[Comparison]) -> tuple[str, str]:
     """Return a claim on two kinds of search, and its numbers."""
-    words, n = (_SEARCHES[first], _SEARCHES[second]), len(found)
-    above = [each for each in found if _is_above(each)]
-    below = [each for each in found if each.is_shown and each.size < 0]
-    if above and below:
-        levels = f"{_at_levels(len(above), n)} and less at {len(below)}"
-        return f"{words[0]} covers more than {words[1]}{levels}", _difference(above)
-    if above or below:
-        shown, word = (above, "more") if above else (below, "less")
-        return f"{words[0]} covers {word} than {words[1]}{_at_levels(len(shown), n)}", _difference(shown)
-    return f"{words[0]} and {words[1]} are not shown to differ", _difference(found)
-
-
-def _at_levels(k: int, n: int) -> str:
-    if n == 1:
-        return ""
-    return f" at all {n} noise levels" if k == n else f" at {k} of {n} noise levels"
+    above = [each for each in comparisons if _is_above(each)]
+    below = [each for each in comparisons if each.is_shown and each.size < 0]
+    claim = higher_searches(_SEARCHES[first], _SEARCHES[second], len(above), len(below), len(comparisons))
+    return claim, _difference(above or below or comparisons)
 
 
 # noise
@@ -312,38 +295,35 @@ def _at_levels(k: int, n: int) -> str:
 def _of_noise(study: _Study) -> Finding | None:
     """Return the effect of the highest noise against the lowest, and the recorded one."""
     tally = study.tally
-    by_names = {frozenset((each.one, each.other)): each for each in study.compared if each.reason == "noise"}
-    extremes = []
-    for group in same_but_for("noise", tally.conditions):
-        usable = [each for each in group if isinstance(settings_of(each).get("noise"), int | float)]
-        usable.sort(key=lambda each: float(settings_of(each)["noise"]))
-        ends = [str(each["name"]) for each in (usable[0], usable[-1])] if len(usable) > 1 else []
-        if ends and frozenset(ends) in by_names:
-            extremes.append((by_names[frozenset(ends)].seen_from(ends[1]), usable))
+    by_noise = [each for each in study.compared if each.reason == "noise"]
+    pairs = [
+        (comparison, low, high)
+        for low, high in noise_extremes(tally.conditions)
+        if (comparison := comparison_of(by_noise, high["name"], low["name"]))
+    ]
     # random networks are a control: they count only where nothing evolves
-    evolved = [each for each in extremes if _selection(tally, each[0].one) in ("coverage", "novelty")]
-    extremes = evolved or extremes
-    if not extremes:
+    evolved = [pair for pair in pairs if _selection(tally, pair[0].one) in ("coverage", "novelty")]
+    pairs = evolved or pairs
+    if not pairs:
         return None
-    levels = {tuple(float(settings_of(each)["noise"]) for each in (use[0], use[-1])) for _, use in extremes}
+    levels = {(float(noise_of(low)), float(noise_of(high))) for _, low, high in pairs}
     span = ""
     if len(levels) == 1:
         ((low, high),) = levels
         span = f" from {100 * low:g} % to {100 * high:g} %"
-    shown = [each for each, _ in extremes if each.is_shown]
-    quoted = max(shown or [each for each, _ in extremes], key=lambda each: abs(each.size))
+    compared = [each for each, _, _ in pairs]
+    shown = [each for each in compared if each.is_shown]
+    quoted = max(shown or compared, key=lambda each: abs(each.size))
     score = "coverage" if study.basis.is_fresh else "best coverage"
-    searches = _with_searches(tally, shown or [each for each, _ in extremes])
+    searches = _with_searches(tally, shown or compared)
     directions = {each.size > 0 for each in shown}
     raises = directions.pop() if len(directions) == 1 else None
     claim = effect_of_noise(span, score, searches, raises, is_shown=bool(shown))
     evidence = f"{quoted.one} less {quoted.other}: {_difference([quoted])}."
     if not study.basis.is_fresh:
         return study.find(claim, evidence)
-    pair = frozenset((quoted.one, quoted.other))
-    recorded = next(each for each in study.recorded if frozenset((each.one, each.other)) == pair)
-    recorded = recorded.seen_from(quoted.one)
-    value = with_interval(recorded.difference, signs=True)
+    recorded = comparison_of(study.recorded, quoted.one, quoted.other)
+    value = "–" if recorded is None else with_interval(recorded.difference, signs=True)
     return study.find(
         claim, f"{evidence} As recorded, luck included: {value}.", (*study.tables, "comparisons")
     )
@@ -374,7 +354,7 @@ def _of_changes(study: _Study) -> Finding | None:
 
 def _limits(study: _Study, conditions: Sequence[DescribedCondition], caveats: Sequence[str]) -> str:
     origins = sorted({_ORIGINS.get(label_of(each), label_of(each)) for each in conditions})
-    runs = _runs(len(study.tally.replicates(each["name"])) for each in conditions)
+    runs = counted_range((len(study.tally.replicates(each["name"])) for each in conditions), "run")
     parts = [" and ".join(origins), f"{runs} per condition"]
     if study.compared:
         n_open = sum(not each.is_shown and not each.is_equivalent for each in study.compared)
@@ -395,25 +375,13 @@ def _is_above(comparison: Comparison) -> bool:
 def _difference(comparisons: Sequence[Comparison]) -> str:
     """Return the difference with its interval and corrected p; of several, the smallest and the largest p."""
     if len(comparisons) == 1:
-        (each,) = comparisons
-        value = with_interval(each.difference, signs=True)
-        return f"{value}, {_p(each.p_holm)}"
+        return difference_clause(comparisons[0].difference, comparisons[0].p_holm)
     if all(each.is_shown for each in comparisons):
         nearest = min(comparisons, key=lambda each: abs(each.size))
-        value = with_interval(nearest.difference, signs=True)
-        return f"smallest difference {value}, {_p(max(each.p_holm for each in comparisons), bound=True)}"
+        most = max(each.p_holm for each in comparisons)
+        return f"smallest difference {difference_clause(nearest.difference, most, bound=True)}"
     largest = max(comparisons, key=lambda each: abs(each.size))
-    value = with_interval(largest.difference, signs=True)
-    return f"largest difference {value}, {_p(largest.p_holm)}"
-
-
-def _p(p: float, *, bound: bool = False) -> str:
-    return p_equation(p, bound=bound).replace(" ", "\N{NO-BREAK SPACE}")
-
-
-def _runs(counts: Iterable[int]) -> str:
-    known = sorted(set(counts))
-    return counted(known[0], "run") if len(known) == 1 else f"{known[0]:,} to {counted(known[-1], 'run')}"
+    return f"largest difference {difference_clause(largest.difference, largest.p_holm)}"
 
 
 def _capital(text: str) -> str:

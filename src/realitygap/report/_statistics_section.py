@@ -11,7 +11,7 @@ import numpy.typing as npt
 import polars as pl
 
 from realitygap._numbers import fixed
-from realitygap._wording import Basis, apart_clause, signed, span, undecided_clause
+from realitygap._wording import Basis, apart_clause, count_range, signed, span, undecided_clause
 from realitygap.platforms import is_physical
 from realitygap.report._champions import FRESH_TRIALS, MOST_RUNS, Champions
 from realitygap.report._comparisons import (
@@ -19,7 +19,9 @@ from realitygap.report._comparisons import (
     MARGIN,
     Comparison,
     ComparisonsOnPage,
+    comparison_of,
     comparisons_content,
+    noise_extremes,
     same_but_for,
 )
 from realitygap.report._findings import basis_of
@@ -264,10 +266,7 @@ def _is_driven(condition: DescribedCondition) -> bool:
 
 def _apart(comparisons: Sequence[Comparison], names: Mapping[str, str], one: str, other: str) -> str:
     words = _SELECTIONS[one], _SELECTIONS[other]
-    pair = names[one], names[other]
-    comparison = next(
-        (each.seen_from(pair[0]) for each in comparisons if {each.one, each.other} == set(pair)), None
-    )
+    comparison = comparison_of(comparisons, names[one], names[other])
     if comparison is None:
         return f"{words[0]} and {words[1]} not compared"
     within = _within(comparison.difference)
@@ -345,12 +344,8 @@ def _noise_sentences(
 ) -> list[str]:
     """Describe the recorded effect of the highest noise against the lowest, and the effect on fresh noise."""
     sentences = []
-    for group in same_but_for("noise", conditions):
-        usable = [each for each in group if isinstance(settings_of(each).get("noise"), int | float)]
-        ends = sorted(usable, key=lambda each: float(settings_of(each)["noise"]))
-        if len(ends) < 2:
-            continue
-        high, low = str(ends[-1]["name"]), str(ends[0]["name"])
+    for least, most in noise_extremes(conditions):
+        low, high = least["name"], most["name"]
         changes = [_difference_between(each, high, low) for each in (recorded, fresh)]
         if "–" not in changes:
             sentences.append(f"{high} less {low}: {changes[0]} as recorded, {changes[1]} on fresh noise.")
@@ -359,16 +354,12 @@ def _noise_sentences(
 
 def _difference_between(comparisons: Sequence[Comparison], one: str, other: str) -> str:
     """Return the difference of two conditions that were compared, with its interval; a dash otherwise."""
-    for each in comparisons:
-        if {each.one, each.other} == {one, other}:
-            turned = each.seen_from(one)
-            return f"{signed(turned.size)}{_within(turned.difference)}"
-    return "–"
+    comparison = comparison_of(comparisons, one, other)
+    return "–" if comparison is None else f"{signed(comparison.size)}{_within(comparison.difference)}"
 
 
 def _trials_a_run(tally: Tally) -> str:
-    counts = sorted(set(tally.best.group_by("condition", "replicate").agg(pl.col("trials").sum())["trials"]))
-    return f"{counts[0]:,}" if len(counts) == 1 else f"{counts[0]:,} to {counts[-1]:,}"
+    return count_range(tally.best.group_by("condition", "replicate").agg(pl.col("trials").sum())["trials"])
 
 
 def _references(key: str, conditions: Sequence[DescribedCondition]) -> dict[str, str]:

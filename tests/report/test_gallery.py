@@ -222,7 +222,7 @@ def test_structure_does_not_depend_on_the_numbers_of_hidden_nodes():
 
 
 def test_numbers_of_species_are_those_of_the_rows(tiny_study):
-    counts = count_species(read_tally(tiny_study)).counts
+    counts = count_species(read_tally(tiny_study))
     rows = tiny_study.read("turn", [4])
     for generation in range(3):
         expected = rows.filter(pl.col("generation") == generation)["species"].n_unique()

@@ -17,7 +17,7 @@ from realitygap.report._tally import Results, Tally, read_tally, settings_of
 from realitygap.report.charts.arena import draw_arena, draw_start
 from realitygap.report.charts.cells import draw_shares
 from realitygap.report.charts.house import Drawing, draw_wide, shorten
-from realitygap.report.charts.lines import draw_line, head, pen_style
+from realitygap.report.charts.lines import draw_line, generation_axis, head, pen_style
 from realitygap.report.charts.sheet import IS_WIDE, Sheet
 
 if TYPE_CHECKING:
@@ -161,16 +161,12 @@ def _draw_field(axes: Axes, paths: Sequence[TracedPath], run: ChosenRun) -> None
 
 
 def _draw_curves(axes: Axes, novelty: Mapping[str, npt.NDArray[np.float64]], unit: str) -> None:
-    from matplotlib.ticker import MaxNLocator
-
     n = max(len(values) for values in novelty.values())
     for k, (name, values) in enumerate(novelty.items()):
         axes.plot(np.arange(len(values)), values, label=shorten(name, 24), **pen_style(k, 1.4))
     axes.set_ylim(0, None)
     axes.set_xlim(-0.2, max(n - 1, 1) + 0.2)
     axes.grid(axis="y", color=Ink.RULE, linewidth=0.5)
-    axes.xaxis.set_major_locator(MaxNLocator(8, integer=True))
-    axes.set_xlabel("generation", labelpad=2)
-    axes.set_ylabel(f"mean novelty [{unit}]")
+    generation_axis(axes, f"mean novelty [{unit}]")
     axes.legend(frameon=False, fontsize=7.5, loc="lower right")
     head(axes, "all runs")

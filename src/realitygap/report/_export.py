@@ -16,7 +16,6 @@ from realitygap.records import write_whole
 from realitygap.report._comparisons import comparisons_frame
 from realitygap.report._formats import drawing_bytes
 from realitygap.report._placed import figures_in
-from realitygap.report._species_figure import SpeciesCounts
 from realitygap.report._structures import structures_frame
 from realitygap.report._table import latex_table
 from realitygap.report._tally import Tally
@@ -113,11 +112,10 @@ def _frames(tally: Tally, content: Mapping[str, Any]) -> Iterator[tuple[str, str
     gallery = content["gallery"]
     structures = structures_frame(gallery["structure_groups"])
     yield "data-structures", "All structures of the networks in the last generations.", structures
-    species: SpeciesCounts = gallery["species_counts"]
     yield (
         "data-species",
         "The number of species in each generation of each run.",
-        species.counts,
+        gallery["species_counts"],
     )
 
 

@@ -22,6 +22,7 @@ from realitygap.report.charts.lines import (
     draw_dots,
     draw_line,
     draw_rings,
+    generation_axis,
     head,
     write,
 )
@@ -335,7 +336,5 @@ def _draw_coverage(axes: Axes, trial: ChosenTrial, rows: pl.DataFrame, ancestors
         draw_dots(axes, xs, ys, 4.0, color=color, clip_on=False)
     axes.set_ylim(0, None)
     axes.grid(axis="y", color=Ink.RULE, linewidth=0.5)
-    axes.xaxis.set_major_locator(MaxNLocator(12, integer=True))
+    generation_axis(axes, "coverage", 12)
     axes.yaxis.set_major_locator(MaxNLocator(3))
-    axes.set_xlabel("generation", labelpad=2)
-    axes.set_ylabel("coverage")

@@ -38,8 +38,6 @@ _SURPLUS: dict[Each, tuple[str, ...]] = {
 }
 """Numbers that are meaningless if several trials are shown."""
 
-_MIXED = "Results and trials are given together, expected the ones or the others."
-
 _MOST = 8
 """Trials shown together."""
 
@@ -85,15 +83,20 @@ def write_movie(
     """
     path = Path(path)
     refuse_results(path)
-    many = _listed(results)
-    ready = [one for one in many if isinstance(one, MovingTrial)]
-    if ready and len(ready) < len(many):
-        raise TypeError(_MIXED)
-    if ready:
-        return save_movie(ready, path, speed=speed, title=title, width=width)
-    folders = [one for one in many if not isinstance(one, MovingTrial)]
-    named, trials = choose_moving(folders, each, condition, replicate, generation, individual)
+    named, trials = _trials_of(results, each, condition, replicate, generation, individual)
     return save_movie(trials, path, speed=speed, title=title or named, width=width)
+
+
+def _trials_of(
+    what: Results | MovingTrial | Iterable[Results | MovingTrial], each: Each | None, *numbers: Any
+) -> tuple[str, list[MovingTrial]]:
+    """Trials that are given, or those of results by their numbers, and what to call them together."""
+    many = [what] if isinstance(what, Tally | ResultsFolder | str | Path | MovingTrial) else list(what)
+    ready = [one for one in many if isinstance(one, MovingTrial)]
+    folders = [one for one in many if not isinstance(one, MovingTrial)]
+    if ready and folders:
+        raise TypeError("Results and trials are given together, expected the ones or the others.")
+    return ("", ready) if ready else choose_moving(folders, each, *numbers)
 
 
 def choose_moving(
@@ -248,16 +251,5 @@ def watch(
     """
     if isinstance(what, Robot):
         return WatchedRobot(what, speed=speed)
-    many = _listed(what)
-    ready = [one for one in many if isinstance(one, MovingTrial)]
-    if ready and len(ready) < len(many):
-        raise TypeError(_MIXED)
-    if ready:
-        return play(ready, speed=speed)
-    folders = [one for one in many if not isinstance(one, MovingTrial)]
-    title, trials = choose_moving(folders, each, condition, replicate, generation, individual)
+    title, trials = _trials_of(what, each, condition, replicate, generation, individual)
     return play(trials, title=title, speed=speed)
-
-
-def _listed(what: Results | MovingTrial | Iterable[Results | MovingTrial]) -> list[Results | MovingTrial]:
-    return [what] if isinstance(what, Tally | ResultsFolder | str | Path | MovingTrial) else list(what)

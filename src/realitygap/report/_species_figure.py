@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,7 +13,16 @@ from realitygap._wording import counted
 from realitygap.drawing import Ink
 from realitygap.report._tally import Results, Tally, label_of, read_tally, selection_of
 from realitygap.report.charts.house import Drawing, draw_wide, shorten
-from realitygap.report.charts.lines import Dash, LineStyle, TextStyle, draw_line, head, spread, write
+from realitygap.report.charts.lines import (
+    Dash,
+    LineStyle,
+    TextStyle,
+    draw_line,
+    generation_axis,
+    head,
+    spread,
+    write,
+)
 from realitygap.report.charts.marks import MOST_MARKS, Panel, Series
 from realitygap.report.charts.sheet import IS_WIDE, Sheet
 
@@ -42,45 +50,35 @@ _NUMBER_WIDTH, _NUMBER_HEIGHT = 22.0, 9.0
 """Room that a number of four digits takes [pt]."""
 
 
-@dataclass(frozen=True)
-class SpeciesCounts:
-    """The number of species in each generation.
-
-    Attributes:
-        counts: (rows) condition, replicate, generation, species: how many there were.
-    """
-
-    counts: pl.DataFrame
-
-    def mean_by_selection(self, tally: Tally) -> dict[str, npt.NDArray[np.float64]]:
-        """Return the mean number of species in each generation, over all runs with a selection, (g,)."""
-        selections = pl.DataFrame(
-            {
-                "condition": [each["name"] for each in tally.conditions],
-                "selection": [selection_of(each) for each in tally.conditions],
-            }
-        )
-        means = (
-            self.counts.join(selections, on="condition")
-            .group_by("selection", "generation")
-            .agg(pl.col("species").mean())
-            .sort("selection", "generation")
-        )
-        return {
-            str(key[0]): frame["species"].to_numpy()
-            for key, frame in means.group_by("selection", maintain_order=True)
-        }
-
-
-def count_species(tally: Tally) -> SpeciesCounts:
-    """The number of species in each generation of each run."""
+def count_species(tally: Tally) -> pl.DataFrame:
+    """Return the number of species in each generation: condition, replicate, generation, species."""
     parts = [
         frame.group_by("condition", "replicate", "generation", maintain_order=True).agg(
             pl.col("species").n_unique()
         )
         for frame in tally.folder.frames(columns=["condition", "replicate", "generation", "species"])
     ]
-    return SpeciesCounts(pl.concat(parts))
+    return pl.concat(parts)
+
+
+def _mean_by_selection(tally: Tally, counts: pl.DataFrame) -> dict[str, npt.NDArray[np.float64]]:
+    """Return the mean number of species in each generation, over all runs with a selection, (g,)."""
+    selections = pl.DataFrame(
+        {
+            "condition": [each["name"] for each in tally.conditions],
+            "selection": [selection_of(each) for each in tally.conditions],
+        }
+    )
+    means = (
+        counts.join(selections, on="condition")
+        .group_by("selection", "generation")
+        .agg(pl.col("species").mean())
+        .sort("selection", "generation")
+    )
+    return {
+        str(key[0]): frame["species"].to_numpy()
+        for key, frame in means.group_by("selection", maintain_order=True)
+    }
 
 
 def draw_species(
@@ -88,7 +86,7 @@ def draw_species(
     condition: str | None = None,
     replicate: int | None = None,
     *,
-    species: SpeciesCounts | None = None,
+    species: pl.DataFrame | None = None,
     name: str = "species",
 ) -> Drawing:
     """The shares of the species in a run over its generations, and how many species all runs have.
@@ -108,7 +106,7 @@ def draw_species(
     species = count_species(tally) if species is None else species
     condition = tally.name_of(condition)
     described = tally.condition(condition)
-    of_runs = species.counts.filter(pl.col("condition") == condition)
+    of_runs = species.filter(pl.col("condition") == condition)
     is_chosen = replicate is None
     if replicate is None:
         most = of_runs.group_by("replicate", maintain_order=True).agg(pl.col("species").sum())
@@ -117,7 +115,7 @@ def draw_species(
         replicate = int(most["replicate"][int(most["species"].arg_max() or 0)])
     rows = tally.rows_of(condition, replicate, ["generation", "species"])
     shares = _shares(rows)
-    means = species.mean_by_selection(tally)
+    means = _mean_by_selection(tally, species)
     n_runs = tally.runs.height
     why = (
         "chosen because it has the most species (the first of several alike)"
@@ -154,8 +152,8 @@ def draw_species(
         for key, axes in sheet.panels.items():
             axes.set_gid(key)
         left, right = sheet.panels["shares"], sheet.panels["means"]
-        _label(left, "share of the population")
-        _label(right, "mean number of species")
+        generation_axis(left, "share of the population")
+        generation_axis(right, "mean number of species")
         head(left, f"{shorten(condition, 28)}, run {replicate}", f"{label_of(described)}, n = 1")
         head(right, "all runs", f"{labels}, n = {counted(n_runs, 'run')}")
         _draw_means(right, means)
@@ -274,11 +272,3 @@ def _draw_means(axes: Axes, means: Mapping[str, npt.NDArray[np.float64]]) -> Non
             axes, shorten(selection, 12), (1.03, place), (0, 0), 8, units=("axes fraction", "data"), **beside
         )
     axes.grid(axis="y", color=Ink.RULE, linewidth=0.5)
-
-
-def _label(axes: Axes, unit: str) -> None:
-    from matplotlib.ticker import MaxNLocator
-
-    axes.xaxis.set_major_locator(MaxNLocator(8, integer=True))
-    axes.set_xlabel("generation", labelpad=2)
-    axes.set_ylabel(unit)

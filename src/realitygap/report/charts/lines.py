@@ -179,6 +179,15 @@ def head(
         write(axes, note, (0.0 if stacked else 1.0, y), (1 if stacked else -1, up), 7.5, **muted)
 
 
+def generation_axis(axes: Axes, unit: str, most: int = 8) -> None:
+    """Number generations from left to right, with `most` numbers at most, and name the unit of the values."""
+    from matplotlib.ticker import MaxNLocator
+
+    axes.xaxis.set_major_locator(MaxNLocator(most, integer=True))
+    axes.set_xlabel("generation", labelpad=2)
+    axes.set_ylabel(unit)
+
+
 def spread(values: Sequence[float], apart: float) -> list[float]:
     """The values moved apart to at least a distance, in their order, so that labels at them do not overlap."""
     places = list(values)

@@ -30,10 +30,7 @@ def draw_robot(
     grid = arena.grid
     shapes: list[Shape] = [*floor_shapes(arena.floor)]
     for cell in cells.tolist():
-        row, column = divmod(cell, grid.columns)
-        x, y = grid.x + column * grid.cell, grid.y + row * grid.cell
-        corners = ((x, y), (x + grid.cell, y), (x + grid.cell, y + grid.cell), (x, y + grid.cell))
-        shapes.append(Line(corners, None, closed=True, fill=Ink.VISITED))
+        shapes.append(Line(grid.corners(cell), None, closed=True, fill=Ink.VISITED))
     shapes += things_in(arena)
     shapes += [Line(((x1, y1), (x2, y2)), Ink.TEXT, 2.4) for x1, y1, x2, y2 in arena.walls]
     shapes.append(Line(tuple(map(tuple, path[:, :2].tolist())), Ink.OURS, 1.4))
@@ -58,7 +55,7 @@ def _placed(points: Points, pose: Pose) -> Points:
 def _extent(arena: Arena) -> tuple[float, float, float, float]:
     """Return left, bottom, right and top of what a picture shows [m]."""
     grid = arena.grid
-    points = [(grid.x, grid.y), (grid.x + grid.columns * grid.cell, grid.y + grid.rows * grid.cell)]
+    points = [(grid.x, grid.y), (grid.right, grid.top)]
     points += [(x, y) for x1, y1, x2, y2 in arena.walls for x, y in ((x1, y1), (x2, y2))]
     points += [(light.x, light.y) for light in arena.lights]
     xs, ys = np.array(points).T

@@ -17,11 +17,7 @@ def trial_picture(trial: MovingTrial) -> Picture:
     """Return the arena with the path of the trial, the cells on it, and the places where the robot was blocked."""
     arena = picture_of(trial.arena)
     grid = trial.arena.grid
-    cells: list[Shape] = []
-    for cell in trial.cells:
-        x, y = grid.x + grid.cell * (cell % grid.columns), grid.y + grid.cell * (cell // grid.columns)
-        corners = ((x, y), (x + grid.cell, y), (x + grid.cell, y + grid.cell), (x, y + grid.cell))
-        cells.append(Line(corners, None, closed=True, fill=Ink.BAND))
+    cells = [Line(grid.corners(cell), None, closed=True, fill=Ink.BAND) for cell in trial.cells]
     points = [(float(x), float(y)) for x, y, _ in trial.poses]
     path: list[Shape] = [Line(tuple(points), Ink.OURS, 1.4)] if len(points) > 1 else []
     blocked = {point for point, stall in zip(points, trial.stalled, strict=True) if stall}

@@ -166,8 +166,7 @@ class Screen:
         grid, gap = arena.grid, 0.035 * arena.grid.cell
         tiles = []
         for cell in range(grid.n_cells):
-            row, column = divmod(cell, grid.columns)
-            x, y = grid.x + column * grid.cell, grid.y + row * grid.cell
+            x, y = grid.corners(cell)[0]
             tiles.append([(x + dx, y + dy) for dx in (gap, grid.cell - gap) for dy in (gap, grid.cell - gap)])
         corners = np.array(tiles)[:, [0, 1, 3, 2]]
         self._tiles = PolyCollection(list(corners), linewidths=0, zorder=0.1)

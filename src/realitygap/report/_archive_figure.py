@@ -14,8 +14,7 @@ from realitygap.drawing import Ink
 from realitygap.evolution import DISTANCES, Member, NoveltySettings, archive_members
 from realitygap.report._chosen_run import ChosenRun, TracedPath, choose_run
 from realitygap.report._tally import Results, Tally, read_tally, settings_of
-from realitygap.report.charts.arena import draw_arena, draw_start
-from realitygap.report.charts.cells import draw_shares
+from realitygap.report.charts.arena import draw_arena, draw_shares, draw_start
 from realitygap.report.charts.house import Drawing, draw_wide, shorten
 from realitygap.report.charts.lines import draw_line, generation_axis, head, pen_style
 from realitygap.report.charts.sheet import IS_WIDE, Sheet

@@ -11,7 +11,7 @@ import numpy as np
 from realitygap.drawing import Ink
 from realitygap.report._distance_audit import Confound, DistanceAudit, distance_notes, in_words
 from realitygap.report._formats import captioned, save_drawing
-from realitygap.report.charts.cells import draw_shares
+from realitygap.report.charts.arena import draw_shares
 from realitygap.report.charts.house import WIDE, Drawing, draw_wide, shorten
 from realitygap.report.charts.lines import TextStyle, draw_band, draw_dots, draw_line, head, write
 from realitygap.report.charts.rows import Row, draw_row

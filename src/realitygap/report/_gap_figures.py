@@ -11,8 +11,7 @@ import numpy.typing as npt
 from realitygap._wording import p_equation
 from realitygap.drawing import Ink
 from realitygap.gap import GapSide, Why
-from realitygap.report.charts.arena import draw_arena
-from realitygap.report.charts.cells import draw_shares
+from realitygap.report.charts.arena import draw_arena, draw_shares
 from realitygap.report.charts.house import Drawing, draw_wide, shorten
 from realitygap.report.charts.lines import Dash, draw_band, draw_dots, draw_line, head, mark_key
 from realitygap.report.charts.marks import Panel, Series, decimals_for

@@ -133,11 +133,12 @@ class SheetLayout:
     def grid_lines(self) -> list[GridLine]:
         """Return lines of the grid: which coordinate stays, its value, and between which values the other goes [m]."""
         grid = self.grid
-        right, upper = grid.x + grid.columns * grid.cell, grid.y + grid.rows * grid.cell
         upright: list[GridLine] = [
-            ("x", grid.x + k * grid.cell, grid.y, upper) for k in range(grid.columns + 1)
+            ("x", grid.x + k * grid.cell, grid.y, grid.top) for k in range(grid.columns + 1)
         ]
-        level: list[GridLine] = [("y", grid.y + k * grid.cell, grid.x, right) for k in range(grid.rows + 1)]
+        level: list[GridLine] = [
+            ("y", grid.y + k * grid.cell, grid.x, grid.right) for k in range(grid.rows + 1)
+        ]
         return [*upright, *level]
 
     def thin_marks(self) -> list[Mark]:

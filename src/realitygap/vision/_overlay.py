@@ -70,8 +70,7 @@ def _show_trace(axes: Axes, score: SheetScore, trace: TraceScore) -> None:
     grid = score.sheet.layout.grid
     crossed, doubtful = set(trace.cells), set(trace.doubtful)
     for cell in sorted(crossed | doubtful):
-        row, column = divmod(cell, grid.columns)
-        corner = grid.x + column * grid.cell, grid.y + row * grid.cell
+        corner = grid.corners(cell)[0]
         if cell in crossed:
             axes.add_patch(
                 Rectangle(corner, grid.cell, grid.cell, facecolor=CROSSED, alpha=0.25, linewidth=0)

@@ -140,8 +140,7 @@ def separate_pens(
 
 def _around_cells(layout: SheetLayout) -> Box:
     grid, out = layout.grid, AROUND
-    right, upper = grid.x + grid.columns * grid.cell, grid.y + grid.rows * grid.cell
-    return grid.x - out, grid.y - out, right + out, upper + out
+    return grid.x - out, grid.y - out, grid.right + out, grid.top + out
 
 
 def _part(picture: Floats, whole: Box, box: Box, px_per_m: float) -> Floats:

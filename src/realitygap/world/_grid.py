@@ -40,6 +40,22 @@ class Grid:
         """Number of cells."""
         return self.columns * self.rows
 
+    @property
+    def right(self) -> float:
+        """Right end [m]."""
+        return self.x + self.columns * self.cell
+
+    @property
+    def top(self) -> float:
+        """Upper end [m]."""
+        return self.y + self.rows * self.cell
+
+    def corners(self, cell: int) -> tuple[tuple[float, float], ...]:
+        """Return the four corners of a cell [m], from the lower left one, counter-clockwise."""
+        row, column = divmod(cell, self.columns)
+        x, y = self.x + column * self.cell, self.y + row * self.cell
+        return (x, y), (x + self.cell, y), (x + self.cell, y + self.cell), (x, y + self.cell)
+
     def cell_at(self, x: float, y: float) -> int | None:
         """Return the number of the cell that a point [m] lies in, columns * row + column; None outside of the grid."""
         column, row = int((x - self.x) // self.cell), int((y - self.y) // self.cell)

@@ -145,10 +145,8 @@ def to_svg(simulation: Watched) -> str:
     left, bottom, right, top = _bounds(simulation)
     cell = grid.cell
     shapes: list[Shape] = [
-        Line(_rectangle(grid.x + cell * (k % grid.columns), grid.y + cell * (k // grid.columns), cell),
-             None, closed=True, fill=Ink.VISITED)
-        for k in simulation.cells()
-    ]  # fmt: skip
+        Line(grid.corners(k), None, closed=True, fill=Ink.VISITED) for k in simulation.cells()
+    ]
     shapes += [
         Line(((grid.x + k * cell, grid.y), (grid.x + k * cell, grid.y + grid.rows * cell)), Ink.MUTED, 0.4)
         for k in range(grid.columns + 1)
@@ -212,7 +210,3 @@ def _bounds(simulation: Watched) -> tuple[float, float, float, float]:
     xs = [x for wall in simulation.arena.walls for x in wall[::2]]
     ys = [y for wall in simulation.arena.walls for y in wall[1::2]]
     return min(xs) - _MARGIN, min(ys) - _MARGIN, max(xs) + _MARGIN, max(ys) + _MARGIN
-
-
-def _rectangle(x: float, y: float, size: float) -> tuple[tuple[float, float], ...]:
-    return ((x, y), (x + size, y), (x + size, y + size), (x, y + size))

@@ -45,14 +45,8 @@ class CellGrid(Element, component="cell_grid.js"):
     ) -> None:
         super().__init__()
         self._grid = grid = arena.grid
-        xs = [x for wall in arena.walls for x in (wall[0], wall[2])] or [
-            grid.x,
-            grid.x + grid.columns * grid.cell,
-        ]
-        ys = [y for wall in arena.walls for y in (wall[1], wall[3])] or [
-            grid.y,
-            grid.y + grid.rows * grid.cell,
-        ]
+        xs = [x for wall in arena.walls for x in (wall[0], wall[2])] or [grid.x, grid.right]
+        ys = [y for wall in arena.walls for y in (wall[1], wall[3])] or [grid.y, grid.top]
         low, high = self._in_cells((min(xs), min(ys))), self._in_cells((max(xs), max(ys)))
         self._props |= {
             "columns": grid.columns,

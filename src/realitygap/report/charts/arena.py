@@ -1,4 +1,4 @@
-"""An arena from above: its walls and cells, and the paths of robots."""
+"""An arena from above: its walls and cells, the share of each cell, and the paths of robots."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from realitygap.report.charts.lines import (
     mark_key,
 )
 from realitygap.report.charts.sheet import IS_WIDE, Sheet, grid
-from realitygap.world import Arena, Body
+from realitygap.world import Arena, Body, Grid
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -29,6 +29,10 @@ if TYPE_CHECKING:
 
 Track = tuple[npt.NDArray[np.float64], npt.NDArray[np.bool_]]
 """Poses (t + 1, 3), and whether each step was blocked (t + 1,)."""
+
+
+_FAINTEST = 0.02
+"""Shares below are left white."""
 
 
 def arena_extent(arena: Arena) -> tuple[tuple[float, float], tuple[float, float]]:
@@ -61,7 +65,7 @@ def draw_arena(axes: Axes, arena: Arena) -> None:
     axes.set_axis_off()
     _show(axes, arena)
     cells = arena.grid
-    right, top = cells.x + cells.columns * cells.cell, cells.y + cells.rows * cells.cell
+    right, top = cells.right, cells.top
     xs = cells.x + cells.cell * np.arange(1, cells.columns)
     ys = cells.y + cells.cell * np.arange(1, cells.rows)
     lines = [[x, cells.y, x, top] for x in xs] + [[cells.x, y, right, y] for y in ys]
@@ -95,6 +99,35 @@ def draw_cells(axes: Axes, cells: Iterable[int], arena: Arena) -> None:
     vertices = np.array([arena.grid.x, arena.grid.y]) + arena.grid.cell * places.reshape(-1, 2)
     codes = np.tile([Path.MOVETO, *[Path.LINETO] * 3, Path.CLOSEPOLY], len(rows))
     axes.add_artist(PathPatch(Path(vertices, codes), linewidth=0, zorder=0, facecolor=Ink.VISITED))
+
+
+def draw_shares(
+    axes: Axes, grid: Grid, shares: npt.NDArray[np.float64], color: str = Ink.OURS, rim: float = 0.0
+) -> None:
+    """Shade each cell by its share.
+
+    Args:
+        axes: Axes in the unit of the grid.
+        grid: Cells.
+        shares: (cells,) share of the full color, -1 to 1; negative ones are orange. NaN for a cell without any.
+        color: Color of positive shares.
+        rim: Width of the space between cells [points].
+    """
+    from matplotlib.patches import Rectangle
+
+    for cell in np.flatnonzero(np.abs(shares) >= _FAINTEST):
+        axes.add_artist(
+            Rectangle(
+                grid.corners(int(cell))[0],
+                grid.cell,
+                grid.cell,
+                facecolor=color if shares[cell] > 0 else Ink.PUBLISHED,
+                alpha=round(float(min(abs(shares[cell]), 1.0)), 3),
+                linewidth=rim,
+                edgecolor=Ink.GROUND,
+                zorder=0,
+            )
+        )
 
 
 def draw_start(axes: Axes, arena: Arena, body: Body) -> None:

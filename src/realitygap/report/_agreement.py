@@ -95,9 +95,9 @@ def _table(one: set[int], other: set[int], n_cells: int) -> tuple[int, int, int,
     return len(one & other), len(one - other), len(other - one), n_cells - len(one | other)
 
 
-def _kappa(both: Any, one: Any, other: Any, neither: Any, axis: int = -1) -> npt.NDArray[np.float64]:
-    """Kappa of the tables added up along an axis."""
-    a, b, c, d = (np.asarray(part, np.float64).sum(axis=axis) for part in (both, one, other, neither))
+def _kappa(*table: npt.ArrayLike, axis: int = -1) -> npt.NDArray[np.float64]:
+    """Return kappa of tables of cells that both, only the one, only the other, and neither mark, added up."""
+    a, b, c, d = (np.asarray(part, np.float64).sum(axis=axis) for part in table)
     n = a + b + c + d
     observed = (a + d) / n
     expected = ((a + b) * (a + c) + (d + b) * (d + c)) / (n * n)

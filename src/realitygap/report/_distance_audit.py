@@ -231,7 +231,9 @@ def random_walk(rng: np.random.Generator, columns: int, rows: int, straight: flo
     return cells
 
 
-def _as_behavior(distance: BehaviorDistance, walk: Sequence[int], columns: int) -> Any:
+def _as_behavior(
+    distance: BehaviorDistance, walk: Sequence[int], columns: int
+) -> Sequence[int] | tuple[float, float]:
     """Return the part of a walk that a distance compares: its cells, or the middle of the last one [m]."""
     if distance.compares == "cells":
         return walk

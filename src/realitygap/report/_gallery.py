@@ -26,7 +26,9 @@ def content(tally: Tally) -> dict[str, Any]:
         tally: Tally of the study.
     """
 
-    def draw(what: str, condition: str, figure: Callable[..., Drawing], counterpart: str = "") -> Any:
+    def draw(
+        what: str, condition: str, figure: Callable[..., Drawing], counterpart: str = ""
+    ) -> FigureOnPage | str:
         anchor = f"figure-{what}"
         try:
             return FigureOnPage(anchor, figure(tally, condition, name=anchor), counterpart)

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +16,7 @@ from realitygap.errors import RealityGapError
 from realitygap.records import ResultsFolder
 from realitygap.report._tally import (
     DescribedCondition,
+    DescribedStudy,
     Results,
     Tally,
     bests_of,
@@ -183,7 +184,7 @@ def _draw_score(
     return draw_wide(lambda width: _draw_panels(panels, width, axis), name, caption, alt, marks=marks)
 
 
-def _points_of(description: Mapping[str, Any]) -> Points:
+def _points_of(description: DescribedStudy) -> Points:
     points = (description.get("report") or {}).get("points")
     return "best-so-far" if points == "best-so-far" else "best-of-generation"
 

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import polars as pl
 
@@ -44,7 +44,15 @@ from realitygap.report._replay import content as replay_content
 from realitygap.report._statistics_section import Statistics, statistics_content
 from realitygap.report._summary import summarize, summarize_tasks
 from realitygap.report._table import Cell, Column, Part, Row, TableOnPage, numbered
-from realitygap.report._tally import Tally, label_of, read_tally, score_text, selection_of, settings_of
+from realitygap.report._tally import (
+    DescribedStudy,
+    Tally,
+    label_of,
+    read_tally,
+    score_text,
+    selection_of,
+    settings_of,
+)
 from realitygap.report._template import render_page
 from realitygap.report.charts.house import house_style
 from realitygap.stats import CONFIDENCE, MEDIAN_SMALLEST_N, interval_ranks
@@ -162,7 +170,7 @@ def _statistics(
     return statistics_content(tally, comparisons, champions, fresh), comparisons, champions, fresh
 
 
-def _sections(content: Mapping[str, Any]) -> list[tuple[str, str, list[Any]]]:
+def _sections(content: Mapping[str, Any]) -> list[tuple[str, str, list[FigureOnPage | str | None]]]:
     """Anchor, title, and figures of each section in the order of the page; the first screen has no title."""
     gallery = content["gallery"]
     sections = [
@@ -480,8 +488,15 @@ def _interval_notes(summary: pl.DataFrame) -> list[str]:
     return notes
 
 
-def _command(tally: Tally) -> dict[str, Any]:
-    """Return the command that runs the study again: its words, and whether the study comes with realitygap."""
+class _Command(NamedTuple):
+    """The command that runs a study again, also in Python, and whether the study comes with realitygap."""
+
+    built_in: bool
+    run: str
+    python: str
+
+
+def _command(tally: Tally) -> _Command:
     description = tally.description
     name = str(description.get("name") or "")
     built_in = _is_built_in(description)
@@ -490,14 +505,14 @@ def _command(tally: Tally) -> dict[str, Any]:
     command, function, port = "realitygap run", "run_study", ""
     if all(is_physical(settings_of(condition)) for condition in description["conditions"]):
         command, function, port = "realitygap drive", "drive_study", "PORT"
-    return {
-        "built_in": built_in,
-        "run": f"{command} {study}{port and f' --port {port}'} --seed {seed} --replicates {replicates} --out DIR",
-        "python": f"{function}({study!r}, {port and f'{port!r}, '}'DIR', seed={seed}, replicates={replicates})",
-    }
+    return _Command(
+        built_in,
+        f"{command} {study}{port and f' --port {port}'} --seed {seed} --replicates {replicates} --out DIR",
+        f"{function}({study!r}, {port and f'{port!r}, '}'DIR', seed={seed}, replicates={replicates})",
+    )
 
 
-def _is_built_in(description: Mapping[str, Any]) -> bool:
+def _is_built_in(description: DescribedStudy) -> bool:
     """Return whether the conditions equal, by hash, those of the built-in study of this name."""
     name = description.get("name")
     if name not in named_studies():

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -283,6 +283,6 @@ def _spread_sentences(tally: Tally) -> list[str]:
     ]
 
 
-def _range(values: Any, form: str) -> str:
+def _range(values: Collection[float], form: str) -> str:
     low, high = (form.format(end).replace("%", " %") for end in (min(values), max(values)))
     return low if low == high else f"{low} to {high}"

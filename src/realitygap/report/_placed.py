@@ -73,7 +73,7 @@ def as_json(values: Mapping[str, Any]) -> Markup:
     return Markup(text)
 
 
-def number_figures(figures: Iterable[Any]) -> None:
+def number_figures(figures: Iterable[FigureOnPage | str | None]) -> None:
     """Number figures in the order given; reasons why one is missing (text) and None have no number."""
     placed = [each for each in figures if isinstance(each, FigureOnPage)]
     for number, figure in enumerate(placed, 1):

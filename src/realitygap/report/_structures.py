@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import itertools
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import NamedTuple
 
 import polars as pl
 
@@ -22,6 +22,15 @@ Links = tuple[tuple[str, str], ...]
 """Enabled links from name to name, hidden nodes being named h1, h2, ..."""
 
 
+class Individual(NamedTuple):
+    """The numbers of an individual."""
+
+    condition: str
+    replicate: int
+    generation: int
+    individual: int
+
+
 @dataclass(frozen=True)
 class Structure:
     """Networks that have the same enabled links, whatever their weights and node numbers.
@@ -32,7 +41,7 @@ class Structure:
         links: Enabled links, in order.
         n_hidden: Hidden nodes that a link reaches.
         by_condition: Number of networks of the last generation with it, by condition.
-        example: Network of highest coverage with it: condition, replicate, generation, individual.
+        example: Network of highest coverage with it.
     """
 
     inputs: tuple[str, ...]
@@ -40,7 +49,7 @@ class Structure:
     links: Links
     n_hidden: int
     by_condition: Mapping[str, int]
-    example: Mapping[str, Any]
+    example: Individual
 
     @property
     def n(self) -> int:
@@ -135,7 +144,7 @@ def _count(
     inputs, outputs = declaration
     names = dict(enumerate([*inputs, *outputs]))
     counts: dict[Links, Counter[str]] = {}
-    examples: dict[Links, dict[str, Any]] = {}
+    examples: dict[Links, tuple[Individual, float]] = {}
     known: dict[tuple[tuple[int, int], ...], Links] = {}
     for condition, kinds in genes.items():
         for kind in kinds.iter_rows(named=True):
@@ -145,12 +154,12 @@ def _count(
             if links is None:
                 links = known.setdefault(key, _canonical(key, names))
             counts.setdefault(links, Counter())[condition] += kind["n"]
-            if links not in examples or kind["coverage"] > examples[links]["coverage"]:
-                examples[links] = {"condition": condition, **kind}
+            if links not in examples or kind["coverage"] > examples[links][1]:
+                examples[links] = Individual(condition, *(kind[key] for key in _ROW)), kind["coverage"]
     structures = []
     for links, by_condition in counts.items():
         n_hidden = len({name for link in links for name in link if name not in names.values()})
-        example = {key: examples[links][key] for key in ("condition", *_ROW)}
+        example, _ = examples[links]
         structures.append(Structure(inputs, outputs, links, n_hidden, dict(by_condition), example))
     structures.sort(key=lambda structure: (-structure.n, structure.n_hidden, structure.links))
     n_networks = sum(structure.n for structure in structures)
@@ -160,7 +169,9 @@ def _count(
 def _canonical(links: tuple[tuple[int, int], ...], names: Mapping[int, str]) -> Links:
     """The links by name, the same for networks that differ only in how their hidden nodes are numbered."""
     hidden = sorted({node for link in links for node in link} - set(names))
-    orders: Any = itertools.permutations(hidden) if len(hidden) <= _MOST_ORDERED else [hidden]
+    orders: Iterable[Sequence[int]] = [hidden]
+    if len(hidden) <= _MOST_ORDERED:
+        orders = itertools.permutations(hidden)
     forms = []
     for order in orders:
         named = {**names, **{node: f"h{k + 1}" for k, node in enumerate(order)}}

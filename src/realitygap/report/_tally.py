@@ -54,6 +54,29 @@ class DescribedCondition(TypedDict, total=False):
     published_source: str | None
 
 
+class DescribedStudy(TypedDict, total=False):
+    """The description of a study, as its folder has it.
+
+    Attributes:
+        name, title, note, software: Texts, empty or missing if the study has none.
+        seed: Seed of the study.
+        replicates: Planned number of runs of each condition.
+        pair: True if all conditions draw the same random numbers.
+        report: Choices for the report, such as `points`.
+        conditions: The conditions.
+    """
+
+    name: str
+    title: str
+    note: str
+    software: str
+    seed: int
+    replicates: int
+    pair: bool
+    report: Mapping[str, str] | None
+    conditions: Required[list[DescribedCondition]]
+
+
 @dataclass(frozen=True)
 class Tally:
     """A study's description and the best of each of its generations.
@@ -68,7 +91,7 @@ class Tally:
     """
 
     folder: ResultsFolder
-    description: Mapping[str, Any]
+    description: DescribedStudy
     best: pl.DataFrame
     driven: Mapping[str, Driven] = field(default_factory=dict)
     uncounted: tuple[str, ...] = ()
@@ -77,7 +100,7 @@ class Tally:
     @property
     def conditions(self) -> list[DescribedCondition]:
         """The conditions as the description has them."""
-        return list(self.description["conditions"])
+        return self.description["conditions"]
 
     def condition(self, name: str) -> DescribedCondition:
         """Return one condition by name.
@@ -248,7 +271,7 @@ def read_tally(folder: Results, *, with_uncounted: bool = False) -> Tally:
             "scores of the task are printed at the end of a study; in Python: "
             "realitygap.report.summarize_tasks(FOLDER)."
         )
-    description = folder.description
+    description: Any = folder.description
     description["conditions"] = [
         _labeled(each, driven) for each in conditions_of(description) if each["name"] not in uncounted
     ]

@@ -20,7 +20,6 @@ from realitygap.drawing import Picture
 from realitygap.robots.twin import FAMILIES, TwinModel, family_rows, sample_twin, twin_picture
 from realitygap.settings import is_hidden
 from realitygap.world import (
-    SENSORS,
     Arena,
     ArenaFile,
     Distribution,
@@ -217,7 +216,7 @@ def robot_row(robot: RobotModel) -> str:
     size = f"{1000 * across:.0f} mm across" if turns else f"{1000 * across:.0f} × {1000 * up:.0f} mm"
     track = f"{1000 * drive.track:.0f} mm" if drive.mixing == "wheels" else f"{drive.turn_rate:g} rad/s"
     kinds = "/".join(dict.fromkeys(sensor.response for sensor in robot.range))
-    others = [(len(getattr(robot, kind)), kind) for kind in SENSORS if kind != "range"]
+    others = [(len(sensors), kind) for kind, sensors in robot.sensors.items() if kind != "range"]
     more = ", ".join(f"{n} {what}" for n, what in others if n) + (", encoders" if robot.encoder else "")
     return (
         f"| `{robot.name}` | {size} | {drive.speed:g} m/s | {track} | {robot.step_s:g} s "

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import ast
+import tomllib
 from collections.abc import Iterator
+from itertools import chain
 from pathlib import Path
 
 import realitygap
@@ -106,3 +108,18 @@ def test_modules_of_a_package_do_not_import_each_other():
 def test_cycles_are_detected():
     graph = {"a": {"b"}, "b": {"c"}, "c": {"a", "d"}, "d": set(), "e": {"a"}}
     assert cycles_of(graph) == {"a b c"}
+
+
+def test_the_architecture_page_draws_the_layers_that_are_checked():
+    """Each package is in a layer, and the picture has the same order."""
+    root = SOURCES.parent.parent
+    contracts = tomllib.loads((root / "pyproject.toml").read_text("utf-8"))["tool"]["importlinter"][
+        "contracts"
+    ]
+    layers = [
+        [name.removeprefix("realitygap.") for name in line.split(" | ")] for line in contracts[0]["layers"]
+    ]
+    page = (root / "docs" / "explanations" / "architecture.md").read_text("utf-8")
+    picture = page.partition("```text\n")[2].partition("```")[0].splitlines()
+    assert [line[:32].strip().split(" | ") for line in picture] == layers
+    assert set(chain.from_iterable(layers)) >= PACKAGES

@@ -174,16 +174,26 @@ def ports_in_words() -> str:
 
 
 def port_platforms() -> str:
-    """Return how users name robots on ports, for help texts, such as NAME:PORT."""
-    return ", ".join(family.named("PORT") for family in _own())
+    """Return how users name the platforms of families, for help texts: NAME:PORT, or a name without a port.
+
+    Other packages are not imported: their entry points have the names.
+    """
+    own = [
+        family.named("PORT") if name == family.name else name
+        for family in _own()
+        for name in family.platforms
+    ]
+    return ", ".join([*own, *(f"{name}:PORT" for name in _names_of_others())])
 
 
 def ports_by_family() -> str:
-    """Return a sentence for each of our families with examples of its ports, for help texts."""
+    """Return a sentence for each of our families with examples of its ports, and one for others, for help texts."""
     sentences = []
     for family in _own():
         ports = [family.as_typed(port) for port in (*family.ports, family.emulated) if port]
         sentences.append(f"Port of a {family.noun}: {', '.join(ports[:-1])} or {ports[-1]}.")
+    if others := _names_of_others():
+        sentences.append(f"Port of another robot: {', '.join(f'{name}:PORT' for name in others)}.")
     return " ".join(sentences)
 
 
@@ -209,6 +219,11 @@ def points_in(group: str) -> EntryPoints:
 def _points_on(path: tuple[str, ...]) -> EntryPoints:
     """Return all entry points on a path of modules, cached, because a search reads the names of all packages."""
     return cast("EntryPoints", entry_points())  # Python 3.11 has another class with the same methods
+
+
+def _names_of_others() -> list[str]:
+    """Return the names of families that other packages add, none of which is imported."""
+    return sorted({point.name for point in points_in(GROUP)} - {family.name for family in _own()})
 
 
 @functools.lru_cache(maxsize=4)

@@ -13,7 +13,7 @@ from realitygap.errors import RobotError
 from realitygap.lab._files import refuse_port
 from realitygap.lab.pages._robot import _emulated_families
 from realitygap.platforms import emulated_robots, open_target, platform_names, platform_of
-from realitygap.robot_families import find_family
+from realitygap.robot_families import find_family, port_platforms, ports_by_family
 from realitygap.robots import list_ports, open_on, split_port
 from realitygap.study import calibrate, gap_between, parse_study
 from realitygap.testing import check_robot
@@ -69,6 +69,8 @@ def test_commands_of_robots_know_the_family() -> None:
     assert "rover:/dev/ttyUSB7" in run("robot", "list")
     assert "Rover" in run("robot", "info", QUICK)
     assert "rover" in run("platforms")
+    assert "rover:PORT" in port_platforms()
+    assert "rover:PORT" in ports_by_family()
 
 
 def test_emulate_has_a_command_of_the_family(monkeypatch: pytest.MonkeyPatch) -> None:

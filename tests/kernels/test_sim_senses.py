@@ -14,7 +14,8 @@ from realitygap.kernels.math.elementary import normal
 from realitygap.kernels.math.lanes import LANES
 from realitygap.kernels.sim import senses
 from realitygap.kernels.sim.lanes import SimRules, make_sim_room
-from realitygap.kernels.sim.shape import make_sim_shape, sim_rows, sim_table
+from realitygap.kernels.sim.shape import INPUT_KINDS, SENSOR_NUMBERS, make_sim_shape, sim_rows, sim_table
+from realitygap.kernels.sim.trial import observe
 from tests.kernels.genome_arrays import rules_of, settings
 from tests.kernels.sim_rows import poses
 from tests.reference import senses as reference
@@ -41,8 +42,7 @@ SHAPE = make_sim_shape(
     range_rays=[rays for _, rays in FIRST_RAYS.values()],
     range_table=[0, 0, TABLE, 0, 0, 0],
     range_pulses=[0, 0, 0, 10, 0, 0],
-    n_light=2,
-    n_line=2,
+    sensors={"light": 2, "line": 2},
     line_levels=[False, True],
     n_lamps=2,
     tapes=[TAPE],
@@ -302,3 +302,26 @@ def test_every_number_has_a_row_of_its_own() -> None:
     rows = sim_rows(SHAPE)
     assert sorted(rows.values()) == list(range(SHAPE.n_rows))
     assert rows["range.3.burst"] == rows["range.3.x"] + senses.BURST
+
+
+def test_each_kind_of_sensor_has_a_reading_and_each_kind_of_input_a_value() -> None:
+    """Two of each kind: a stage that `answer` or `observe` does not call leaves what was there before."""
+    shape = make_sim_shape(
+        parts=[1],
+        range_response=["linear", "linear"],
+        sensors=dict.fromkeys(SENSOR_NUMBERS, 2),
+        n_lamps=1,
+        goal=True,
+        n_walls=1,
+        inputs=[(kind, k) for kind in (*SENSOR_NUMBERS, *INPUT_KINDS) for k in range(2)],
+    )
+    block = Block({"range.0.reach": 1.0, "range.1.reach": 0.5, "arena.goal.x": 1.0}, shape=shape)
+    block.lanes.readings[:] = np.nan
+    block.lanes.values[:] = np.nan
+    readings = block.readings((0.1, 0.2, 0.3), np.full((2, LANES), 0.2), 1)
+    assert np.isfinite(readings).all()
+    observe(shape, block.rules, block.lanes, np.int64(1))
+    values = block.lanes.values[: len(shape.inputs)]
+    assert np.isfinite(values).all()
+    assert (values[: shape.n_readings] == readings).all()
+    assert shape.n_readings == 2 * len(SENSOR_NUMBERS)

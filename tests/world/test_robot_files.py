@@ -8,10 +8,11 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from realitygap.drawing import picture_of
 from realitygap.errors import DescriptionError
-from realitygap.kernels.sim.shape import make_sim_shape, sim_rows
+from realitygap.kernels.sim.shape import SENSOR_NUMBERS, make_sim_shape, sim_rows
 from realitygap.platforms import JyroPlatform
-from realitygap.world import Distribution, RobotModel, load_robot, robot_names
+from realitygap.world import SENSORS, Distribution, RobotModel, load_robot, robot_names
 
 from .outcomes import made_or_told
 
@@ -104,12 +105,16 @@ def test_cardboard_holds_the_robot(name):
 
 
 def test_names_of_numbers_are_those_of_the_kernels():
-    robot = load_robot("scribbler-s2-fluke2")
+    """So a name of a kind of sensor is the same in `RobotModel`, `SENSORS`, and the kernels, and each is drawn."""
+    assert tuple(SENSORS) == tuple(SENSOR_NUMBERS)
+    kinds = {kind: [dict.fromkeys(numbers, 0.02)] for kind, numbers in SENSOR_NUMBERS.items()}
+    robot = RobotModel.from_dict({**load_robot("e-puck").to_dict(), **kinds, "encoder": {}})
+    assert all(f"1 {kind} sensor" in picture_of(robot).to_svg() for kind in SENSORS)
     shape = make_sim_shape(
         parts=[len(part.corner) for part in robot.body],
         range_response=[sensor.response for sensor in robot.range],
-        n_light=len(robot.light),
-        n_line=len(robot.line),
+        sensors={kind: len(sensors) for kind, sensors in robot.sensors.items()},
+        encoders=True,
     )
     theirs = {name for name in sim_rows(shape) if not name.startswith("arena.")}
     assert theirs == set(robot.numbers())

@@ -7,6 +7,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from realitygap.errors import TaskError
 from realitygap.kernels.tasks.scores import avoid_scores, wall_scores
 from realitygap.platforms import Array, Fleet
 from realitygap.tasks import WALL_SIDES, AvoidTask, CoverageTask, GoalTask, LightTask, WallTask, wall_outlines
@@ -203,7 +204,7 @@ def reward_of(task: Any, fleet: Fleet) -> Reward:
     """Return the rewards of a task.
 
     Raises:
-        TaskError: The arena lacks what the task needs.
+        TaskError: The arena lacks what the task needs, or the task has no rewards of single steps.
     """
     if isinstance(task, CoverageTask):
         return CoverageReward(task)
@@ -213,4 +214,6 @@ def reward_of(task: Any, fleet: Fleet) -> Reward:
         return WallReward(task, fleet)
     if isinstance(task, LightTask):
         return LightReward(task, fleet)
-    return GoalReward(task, fleet)
+    if isinstance(task, GoalTask):
+        return GoalReward(task, fleet)
+    raise TaskError(f"Task {task.name!r} scores whole trials, expected one with a reward of each step.")

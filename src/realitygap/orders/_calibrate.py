@@ -62,7 +62,7 @@ class CalibrateOrder(Order):
     what: str = argument("WHAT", help="Part of the robot: path, sensors, motion, contact or all.")
     robot: str | None = option(
         None,
-        help=f"Robot to measure: {port_platforms()}, enki, twin:FILE, sim or sim:FILE.",
+        help=f"Robot to measure: {port_platforms()}, twin:FILE, sim or sim:FILE.",
         metavar="PLATFORM",
         label="Robot",
         refers="platform",

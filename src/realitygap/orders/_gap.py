@@ -38,7 +38,7 @@ class GapOrder(Order):
     sim: str = argument("SIM", help="Simulator: sim, sim:FILE or jyro.", label="Simulator", refers="platform")
     target: str = argument(
         "TARGET",
-        help=f"Target: twin:FILE, {port_platforms()}, enki, recorded:FILE, sim, sim:FILE or jyro.",
+        help=f"Target: twin:FILE, {port_platforms()}, recorded:FILE, sim, sim:FILE or jyro.",
         label="Target",
         refers="platform",
     )

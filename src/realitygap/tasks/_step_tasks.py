@@ -240,3 +240,12 @@ class GoalTask(StepTask):
         scores = np.empty(len(trajectories))
         goal_scores(trajectories.arrays.poses, goals, radii, scores)
         return scores
+
+
+STEP_TASKS: dict[str, type[StepTask]] = {
+    "avoid": AvoidTask,
+    "light": LightTask,
+    "wall": WallTask,
+    "goal": GoalTask,
+}
+"""The tasks of this file by their kind."""

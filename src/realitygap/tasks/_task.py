@@ -15,7 +15,7 @@ from realitygap.world import Arena
 
 from ._coverage import CoverageTask
 from ._python import PYTHON, PythonTask
-from ._step_tasks import AvoidTask, GoalTask, LightTask, WallTask
+from ._step_tasks import STEP_TASKS
 from ._trajectories import Trajectories
 
 
@@ -63,13 +63,7 @@ class Task(Protocol):
         ...
 
 
-TASKS: dict[str, type[Settings]] = {
-    "coverage": CoverageTask,
-    "avoid": AvoidTask,
-    "light": LightTask,
-    "wall": WallTask,
-    "goal": GoalTask,
-}
+TASKS: dict[str, type[Settings]] = {"coverage": CoverageTask, **STEP_TASKS}
 """Kinds of `[task] kind`, except python:FILE.py:function. Each is a `Settings` and, except coverage, a `Task`."""
 
 

@@ -129,11 +129,16 @@ class Sample(Settings):
     reading: Share = Field(description="Reading, 0 (nothing) to 1 (full).")
 
 
-class RangeSensor(Settings):
-    """A sensor that answers to what is near: 0 for nothing, 1 for very near."""
+class PointSensor(Settings):
+    """A sensor at a place of the body."""
 
     x: Number = Field(description="Position of the sensor ahead of the body's origin [m].")
     y: Number = Field(description="Position of the sensor to the left of the body's origin [m].")
+
+
+class RangeSensor(PointSensor):
+    """A sensor that answers to what is near: 0 for nothing, 1 for very near."""
+
     direction: Number = Field(0.0, description="Direction of the sensor, positive to the left [rad].")
     cone: HalfAngle = Field(0.0, description="Half of the viewing angle [rad].")
     reach: Positive = Field(description="Range of the sensor [m].")
@@ -232,11 +237,9 @@ class RangeSensor(Settings):
         return _without(handler(self), lorentz | {"keeps_edge": False, "compression": 0.0})
 
 
-class LightSensor(Settings):
+class LightSensor(PointSensor):
     """A sensor that answers to lights: a cosine lobe in its direction."""
 
-    x: Number = Field(description="Position of the sensor ahead of the body's origin [m].")
-    y: Number = Field(description="Position of the sensor to the left of the body's origin [m].")
     direction: Number = Field(0.0, description="Direction of the sensor, positive to the left [rad].")
     width: Annotated[Positive, Field(le=math.pi)] = Field(
         math.pi / 2, description="Half of the angle of its lobe, beyond which the reading is 0 [rad]."
@@ -245,11 +248,9 @@ class LightSensor(Settings):
     noise: NotNegative = Field(0.0, description="Standard deviation by which a reading is multiplied.")
 
 
-class LineSensor(Settings):
+class LineSensor(PointSensor):
     """A sensor under the robot that tells dark floor from light floor."""
 
-    x: Number = Field(description="Position of the sensor ahead of the body's origin [m].")
-    y: Number = Field(description="Position of the sensor to the left of the body's origin [m].")
     threshold: Share = Field(
         0.5, description="Brightness below which the reading is 1: 0 is black, 1 is white."
     )
@@ -259,11 +260,9 @@ class LineSensor(Settings):
     )
 
 
-class BumpSensor(Settings):
+class BumpSensor(PointSensor):
     """A switch that is closed while the body is touched near it."""
 
-    x: Number = Field(description="Position of the sensor ahead of the body's origin [m].")
-    y: Number = Field(description="Position of the sensor to the left of the body's origin [m].")
     reach: Positive = Field(description="Largest distance of a touch [m].")
 
 
@@ -285,7 +284,8 @@ SENSORS = {
     "line": SensorKind(Ink.PEN3),
     "bump": SensorKind(Ink.PEN4),
 }
-"""Kinds of sensors that have their own tables in a robot file, in the order of their readings."""
+"""Kinds of sensors with a place on the body. A kind has one name everywhere: its field of `RobotModel`, its inputs, and
+its numbers in `kernels.sim.shape.SENSOR_NUMBERS`, which have the same order."""
 
 
 class Encoders(Settings):
@@ -367,6 +367,11 @@ class RobotModel(Described):
 
     def _repr_svg_(self) -> str:
         return picture_of(self).to_svg()
+
+    @property
+    def sensors(self) -> dict[str, tuple[PointSensor, ...]]:
+        """Sensors with a place on the body, by their kind in `SENSORS`."""
+        return {kind: getattr(self, kind) for kind in SENSORS}
 
     @property
     def mounts(self) -> tuple[tuple[float, float, float], ...]:

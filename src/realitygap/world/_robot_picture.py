@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Sequence
 
 from realitygap.drawing import Disc, Ink, Line, Picture, Point, Shape, Text, picture_of
 
 from ._pictures import dimension_line, length_text
-from ._robot_model import SENSORS, BumpSensor, LightSensor, LineSensor, RangeSensor, RobotModel
+from ._robot_model import SENSORS, LightSensor, RangeSensor, RobotModel
 
 WIDTH = 480.0  # of the picture when its texts have their sizes [pt]
 LETTERS = 104  # in a line of small text at that width
@@ -98,8 +97,8 @@ def _legend(model: RobotModel) -> list[tuple[str, str, str]]:
         shorter = ", drawn shorter" if first.reach > FARTHEST * _size(model) else ""
         how = f"{kinds}, reach {length_text(first.reach)}{shorter}{cone}"
         rows.append((f"{_count(len(model.range), 'range sensor')}{where}: {how}", Ink.TEXT, Ink.PUBLISHED))
-    for kind, sensors in _point_sensors(model):
-        if sensors:
+    for kind, sensors in model.sensors.items():
+        if sensors and kind != "range":
             rows.append((_count(len(sensors), f"{kind} sensor"), Ink.TEXT, SENSORS[kind].ink))
     drive = model.drive
     if drive.mixing == "wheels":
@@ -195,16 +194,12 @@ def _marks(model: RobotModel) -> list[Shape]:
     if model.looks.pen is not None:
         shapes.append(Disc(*model.looks.pen, 4.6, color=Ink.OURS, fill=SHELL))
         shapes.append(Disc(*model.looks.pen, 1.6, color=None, fill=Ink.OURS))
-    for kind, sensors in _point_sensors(model):
-        ink = SENSORS[kind].ink
-        shapes += [Disc(sensor.x, sensor.y, 2.6, color=Ink.GROUND, fill=ink, width=0.6) for sensor in sensors]
+    for kind, sensors in model.sensors.items():
+        if kind != "range":
+            ink = SENSORS[kind].ink
+            shapes += [Disc(s.x, s.y, 2.6, color=Ink.GROUND, fill=ink, width=0.6) for s in sensors]
     shapes += [Disc(s.x, s.y, 2.0, color=Ink.GROUND, fill=Ink.PUBLISHED, width=0.5) for s in model.range]
     return shapes
-
-
-def _point_sensors(model: RobotModel) -> list[tuple[str, Sequence[LightSensor | LineSensor | BumpSensor]]]:
-    """Return sensors other than range sensors, by kind."""
-    return [(kind, getattr(model, kind)) for kind in SENSORS if kind != "range"]
 
 
 def _around(shapes: list[Shape]) -> tuple[float, float, float, float]:

@@ -37,14 +37,18 @@ from .ranges import (
     widening_of,
 )
 from .shape import (
+    BUMP,
     HALF_SHADOWS,
     IDLER,
     IR,
+    LIGHT,
+    LINE,
     LINEAR,
     LORENTZ,
     LORENTZ_EDGES,
     NO_SHADOWS,
     PULSES,
+    RANGE,
     RANGE_NUMBERS,
     TABLE,
 )
@@ -128,7 +132,7 @@ def make_senses(shape, dtype):
     pulses = int(shape.range_pulses.max(initial=0))
     words = max(
         4 * blocks_of(n)
-        for n in (mixture_words(s), shape.row_light.size, shape.row_line.size, 2, pulse_words(pulses))
+        for n in (mixture_words(s), *np.diff(shape.first_reading)[RANGE + 1 :], 2, pulse_words(pulses))
     )
 
     def rows(n):
@@ -141,7 +145,7 @@ def make_senses(shape, dtype):
         compressed=np.zeros(1, np.int32),
         near=rows(s),
         dim=rows(s),
-        lobes=rows(4 * shape.row_light.size),
+        lobes=rows(4 * (shape.first_reading[LIGHT + 1] - shape.first_reading[LIGHT])),
         words=zeros((words, LANES), np.uint32),
         value=zeros(LANES, np.uint32),
         spare=rows(6),
@@ -193,8 +197,9 @@ def start_senses(shape, rules, lanes):
     real = lanes.low.dtype.type
     p, senses = lanes.p, lanes.senses
     _start_range(shape, p, senses)
-    for k in range(shape.row_light.size):
-        row, lobe = shape.row_light[k], 4 * k
+    first = shape.first_reading[LIGHT]
+    for k in range(shape.first_reading[LIGHT + 1] - first):
+        row, lobe = shape.row_sensor[first + k], 4 * k
         lobes = senses.lobes
         prepare_light(p[row + 2], p[row + 3], lobes[lobe], lobes[lobe + 1], lobes[lobe + 2], lobes[lobe + 3])
     prepare_stall(p[shape.row_stall + 2], rules.step_s, senses.idled[2])
@@ -308,12 +313,12 @@ def _sense_range(shape, rules, key, lanes, senses, step):
 
 
 @stage
-def _sense_light(shape, key, lanes, senses, step, first):
+def _sense_light(shape, key, lanes, senses, step, first, n):
     real = lanes.low.dtype.type
-    p, spare, lobes, n = lanes.p, senses.spare, senses.lobes, shape.row_light.size
+    p, spare, lobes = lanes.p, senses.spare, senses.lobes
     draw_words_of(PURPOSE_LIGHT, step, n, lanes.counters, key, senses.words)
     for k in range(n):
-        row, lobe, reading = shape.row_light[k], 4 * k, lanes.readings[first + k]
+        row, lobe, reading = shape.row_sensor[first + k], 4 * k, lanes.readings[first + k]
         fill(reading, real(0.0))
         for lamp in range(shape.n_lights):
             light = shape.row_lamp + 3 * lamp
@@ -332,11 +337,11 @@ def _sense_light(shape, key, lanes, senses, step, first):
 
 
 @stage
-def _sense_floor(shape, key, lanes, senses, step, first):
-    p, spare, n = lanes.p, senses.spare, shape.row_line.size
+def _sense_floor(shape, key, lanes, senses, step, first, n):
+    p, spare = lanes.p, senses.spare
     draw_words_of(PURPOSE_LINE, step, n, lanes.counters, key, senses.words)
     for k in range(n):
-        row = shape.row_line[k]
+        row = shape.row_sensor[first + k]
         place_point(p[row], p[row + 1], lanes.pose, spare[0], spare[1])
         sample_image(shape.floor, shape.floor_grid, spare[0], spare[1], spare[2])
         lay_tape(shape.tapes, spare[0], spare[1], spare[2])
@@ -346,10 +351,10 @@ def _sense_floor(shape, key, lanes, senses, step, first):
 
 
 @stage
-def _sense_bumps(shape, lanes, senses, first):
+def _sense_bumps(shape, lanes, senses, first, n):
     p, spare = lanes.p, senses.spare
-    for k in range(shape.row_bump.size):
-        row = shape.row_bump[k]
+    for k in range(n):
+        row = shape.row_sensor[first + k]
         place_point(p[row], p[row + 1], lanes.pose, spare[0], spare[1])
         gap_of_point(shape, p, spare[0], spare[1], spare[2], spare[3], spare[4])
         answer_bump(spare[4], p[row + 2], lanes.readings[first + k])
@@ -357,23 +362,26 @@ def _sense_bumps(shape, lanes, senses, first):
 
 @stage
 def answer(shape, rules, key, lanes, step):
-    """Write the readings into `lanes.readings`: range, light, line and bump sensors in turn.
+    """Write the readings of all sensors into `lanes.readings`.
 
     Args:
         shape, rules, key: Structure, rules of the trials, and key of the random numbers.
         lanes: Block; `distances` along the rays, poses, and the numbers of each trial are read.
         step: Number of the reading: 0 at the start, k after k commands.
     """
-    senses = lanes.senses
-    n_range, n_light, n_line = shape.row_range.size, shape.row_light.size, shape.row_line.size
-    if n_range > 0:
-        _sense_range(shape, rules, key, lanes, senses, step)
-    if n_light > 0:
-        _sense_light(shape, key, lanes, senses, step, n_range)
-    if n_line > 0:
-        _sense_floor(shape, key, lanes, senses, step, n_range + n_light)
-    if shape.row_bump.size > 0:
-        _sense_bumps(shape, lanes, senses, n_range + n_light + n_line)
+    senses, first = lanes.senses, shape.first_reading
+    for kind in range(first.size - 1):
+        here, n = first[kind], first[kind + 1] - first[kind]
+        if n == 0:
+            continue
+        if kind == RANGE:
+            _sense_range(shape, rules, key, lanes, senses, step)
+        elif kind == LIGHT:
+            _sense_light(shape, key, lanes, senses, step, here, n)
+        elif kind == LINE:
+            _sense_floor(shape, key, lanes, senses, step, here, n)
+        elif kind == BUMP:
+            _sense_bumps(shape, lanes, senses, here, n)
 
 
 @stage

@@ -41,18 +41,13 @@ STALLS = {"blocked": BLOCKED, "idler": IDLER}
 NO_SHADOWS, HALF_SHADOWS, DARK_SHADOWS = 0, 1, 2
 SHADOWS = {"none": NO_SHADOWS, "half": HALF_SHADOWS, "dark": DARK_SHADOWS}
 
-# What a network sees: kind and index of each input.
-OBSTACLE, STALL, TIME, BIAS, RANGE, LIGHT, LINE, BUMP = 0, 1, 2, 3, 4, 5, 6, 7
-GOAL_SECTOR, GOAL_DISTANCE, ENCODER, LAST_MOVE, LAST_TURN = 8, 9, 10, 11, 12
+# What a network sees: kind and index of each input. Of a sensor, the index is the place among all readings.
+READING, OBSTACLE, STALL, TIME, BIAS, GOAL_SECTOR, GOAL_DISTANCE, ENCODER, LAST_MOVE, LAST_TURN = range(10)
 INPUT_KINDS = {
     "obstacle": OBSTACLE,
     "stall": STALL,
     "time": TIME,
     "bias": BIAS,
-    "range": RANGE,
-    "light": LIGHT,
-    "line": LINE,
-    "bump": BUMP,
     "goal_sector": GOAL_SECTOR,
     "goal_distance": GOAL_DISTANCE,
     "encoder": ENCODER,
@@ -107,9 +102,14 @@ RANGE_NUMBERS = (
     "peak",
     "compression",
 )  # then distance and reading of each entry of its table
-LIGHT_NUMBERS = ("x", "y", "direction", "width", "gain", "noise")
-LINE_NUMBERS = ("x", "y", "threshold", "noise")
-BUMP_NUMBERS = ("x", "y", "reach")
+# The kinds of sensors with a place on the body, in the order of rows and readings, and the numbers of each sensor.
+SENSOR_NUMBERS = {
+    "range": RANGE_NUMBERS,
+    "light": ("x", "y", "direction", "width", "gain", "noise"),
+    "line": ("x", "y", "threshold", "noise"),
+    "bump": ("x", "y", "reach"),
+}
+RANGE, LIGHT, LINE, BUMP = range(len(SENSOR_NUMBERS))
 STALL_NUMBERS = ("idler", "share", "window")
 ENCODER_NUMBERS = ("gain_left", "gain_right", "noise_per_m", "drift_per_m")
 
@@ -155,16 +155,15 @@ class SimShape(NamedTuple):
     encoders: bool  # whether wheel encoders are read
     row_encoder: int
     row_stall: int
-    row_range: NDArray[np.int32]  # (s,) first row of each range sensor
+    first_reading: NDArray[np.int32]  # (kinds + 1,) the readings of each kind of `SENSOR_NUMBERS` among all
+    row_sensor: NDArray[np.int32]  # (r,) first row of each sensor, in the order of the readings
+    row_range: NDArray[np.int32]  # (s,) those of the range sensors
     range_response: NDArray[np.int32]  # (s,) LINEAR, IR, TABLE, PULSES or LORENTZ
     range_rays: NDArray[np.int32]  # (s,) how many rays each has
     range_table: NDArray[np.int32]  # (s,) entries of its table
     range_pulses: NDArray[np.int32]  # (s,)
     first_ray: NDArray[np.int32]  # (s + 1,) the rays of each sensor among all
-    row_light: NDArray[np.int32]
-    row_line: NDArray[np.int32]
     line_levels: NDArray[np.bool_]  # whether each line sensor answers how dark it is, and not whether
-    row_bump: NDArray[np.int32]
     row_start: int  # x, y, heading
     n_walls: int
     row_wall: int  # x1, y1, x2, y2 of each
@@ -175,7 +174,7 @@ class SimShape(NamedTuple):
     row_lamp: int  # x, y, strength of each light
     row_goal: int  # x, y, radius; -1: no goal
     n_rows: int  # of the table
-    n_readings: int  # of range, light, line and bump sensors, in this order
+    n_readings: int  # of all sensors
     inputs: NDArray[np.int32]  # (i, 2) what networks see: kind and index
     floor: NDArray[np.float32]  # (h, w) brightness of the floor, 0..1; (0, 0): no image
     floor_grid: NDArray[np.float64]  # (3,) x, y of its lower left corner [m], pixels per meter
@@ -192,29 +191,42 @@ class SimShape(NamedTuple):
     n_all_rows: int
 
 
-def _names(shape: Mapping[str, object]) -> list[str]:
+class _Counts(NamedTuple):
+    """Counts that decide the numbers of the table."""
+
+    parts: Sequence[int]
+    sensors: Sequence[int]  # of each kind of `SENSOR_NUMBERS`
+    range_table: Sequence[int]
+    walls: int
+    obstacles: Sequence[int]
+    lamps: int
+    goal: bool
+
+
+def _names(counts: _Counts) -> list[str]:
     """The numbers of the table, in the order of rows."""
     names: list[str] = []
-    for k, corners in enumerate(shape["parts"]):
+    for k, corners in enumerate(counts.parts):
         names += [f"body.{k}.corner.{j}.{axis}" for j in range(corners) for axis in "xy"]
         names.append(f"body.{k}.radius")
     names += [f"contact.{name}" for name in CONTACT_NUMBERS]
     names += [f"drive.{name}" for name in DRIVE_NUMBERS]
     names += [f"encoder.{name}" for name in ENCODER_NUMBERS]
     names += [f"stall.{name}" for name in STALL_NUMBERS]
-    for k, entries in enumerate(shape["range_table"]):
-        names += [f"range.{k}.{name}" for name in RANGE_NUMBERS]
-        names += [f"range.{k}.table.{j}.{name}" for j in range(entries) for name in ("distance", "reading")]
-    names += [f"light.{k}.{name}" for k in range(shape["lights"]) for name in LIGHT_NUMBERS]
-    names += [f"line.{k}.{name}" for k in range(shape["lines"]) for name in LINE_NUMBERS]
-    names += [f"bump.{k}.{name}" for k in range(shape["bumps"]) for name in BUMP_NUMBERS]
+    for (kind, numbers), n in zip(SENSOR_NUMBERS.items(), counts.sensors, strict=True):
+        for k in range(n):
+            names += [f"{kind}.{k}.{name}" for name in numbers]
+            entries = counts.range_table[k] if kind == "range" else 0
+            names += [
+                f"{kind}.{k}.table.{j}.{name}" for j in range(entries) for name in ("distance", "reading")
+            ]
     names += [f"arena.start.{name}" for name in ("x", "y", "heading")]
-    names += [f"arena.wall.{k}.{name}" for k in range(shape["walls"]) for name in ("x1", "y1", "x2", "y2")]
-    for k, corners in enumerate(shape["obstacles"]):
+    names += [f"arena.wall.{k}.{name}" for k in range(counts.walls) for name in ("x1", "y1", "x2", "y2")]
+    for k, corners in enumerate(counts.obstacles):
         names += [f"arena.obstacle.{k}.{name}" for name in ("x", "y", "heading", "radius")]
         names += [f"arena.obstacle.{k}.corner.{j}.{axis}" for j in range(corners) for axis in "xy"]
-    names += [f"arena.light.{k}.{name}" for k in range(shape["lamps"]) for name in ("x", "y", "strength")]
-    if shape["goal"]:
+    names += [f"arena.light.{k}.{name}" for k in range(counts.lamps) for name in ("x", "y", "strength")]
+    if counts.goal:
         names += [f"arena.goal.{name}" for name in ("x", "y", "radius")]
     return names
 
@@ -238,11 +250,9 @@ def make_sim_shape(
     range_table: Sequence[int] | None = None,
     range_pulses: Sequence[int] | None = None,
     encoders: bool = False,
-    n_light: int = 0,
+    sensors: Mapping[str, int] | None = None,
     light_shadows: str = "none",
-    n_line: int = 0,
     line_levels: Sequence[bool] | None = None,
-    n_bump: int = 0,
     n_walls: int = 0,
     enclosed: bool = False,
     obstacles: Sequence[int] = (),
@@ -272,7 +282,7 @@ def make_sim_shape(
         range_response: A key of `RESPONSES` for each range sensor.
         range_rays, range_table, range_pulses: Rays (1 or odd), entries of the table, and pulses of each.
         encoders: Whether wheel encoders are read; they are where networks see them.
-        n_light, n_line, n_bump: Other sensors.
+        sensors: Number of the other sensors, by kind.
         light_shadows: "none", "half" or "dark".
         line_levels: Whether each line sensor answers how dark the floor is, and not whether it is.
         n_walls, enclosed: Walls, and whether they close a convex room (`encloses`).
@@ -280,7 +290,7 @@ def make_sim_shape(
         obstacle_round: Whether the radius of each may be other than 0; discs' may.
         n_lamps, goal: Lights, and whether there is a goal.
         columns, rows: Of the grid of cells.
-        inputs: What networks see: a key of `INPUT_KINDS` and an index each.
+        inputs: What networks see: a key of `SENSOR_NUMBERS` or `INPUT_KINDS`, and an index each.
         floor, floor_grid: Image of the floor (h, w), row 0 lowest in y, and where it lies: x, y of its lower left
             corner [m from the origin of the table], pixels per meter.
         tapes: Both ends [m from the origin], width [m] and brightness of each line on the floor.
@@ -291,19 +301,18 @@ def make_sim_shape(
     pulses = np.zeros(s, np.int32) if range_pulses is None else np.array(range_pulses, np.int32)
     if obstacle_round is None:
         obstacle_round = [corners == 0 for corners in obstacles]
-    counts = {
-        "parts": parts,
-        "range_table": table,
-        "lights": n_light,
-        "lines": n_line,
-        "bumps": n_bump,
-        "walls": n_walls,
-        "obstacles": obstacles,
-        "lamps": n_lamps,
-        "goal": goal,
-    }
-    names = _names(counts)
+    n_sensors = {**dict.fromkeys(SENSOR_NUMBERS, 0), **(sensors or {}), "range": s}
+    first = np.concatenate([[0], np.cumsum(list(n_sensors.values()))]).astype(np.int32)
+    names = _names(
+        _Counts(parts, list(n_sensors.values()), table.tolist(), n_walls, obstacles, n_lamps, goal)
+    )
     row = {name: k for k, name in enumerate(names)}
+    row_sensor = np.array([row[f"{kind}.{k}.x"] for kind, n in n_sensors.items() for k in range(n)], np.int32)
+    first_of_kind = dict(zip(n_sensors, first.tolist(), strict=False))
+    seen = [
+        (READING, first_of_kind[kind] + index) if kind in first_of_kind else (INPUT_KINDS[kind], index)
+        for kind, index in inputs
+    ]
     first_ray = np.concatenate([[0], np.cumsum(rays)]).astype(np.int32)
     polygons = [max(corners, 1) for corners in obstacles] + ([] if enclosed else [2] * n_walls)
     end = len(names)
@@ -336,16 +345,15 @@ def make_sim_shape(
         encoders=encoders or any(kind == "encoder" for kind, _ in inputs),
         row_encoder=row["encoder.gain_left"],
         row_stall=row["stall.idler"],
-        row_range=_firsts(row, "range.{}.x", s),
+        first_reading=first,
+        row_sensor=row_sensor,
+        row_range=row_sensor[:s],
         range_response=np.array([RESPONSES[name] for name in range_response], np.int32),
         range_rays=rays,
         range_table=table,
         range_pulses=pulses,
         first_ray=first_ray,
-        row_light=_firsts(row, "light.{}.x", n_light),
-        row_line=_firsts(row, "line.{}.x", n_line),
-        line_levels=np.zeros(n_line, np.bool_) if line_levels is None else np.array(line_levels, np.bool_),
-        row_bump=_firsts(row, "bump.{}.x", n_bump),
+        line_levels=np.array([False] * n_sensors["line"] if line_levels is None else line_levels, np.bool_),
         row_start=row["arena.start.x"],
         n_walls=n_walls,
         row_wall=row.get("arena.wall.0.x1", -1),
@@ -356,8 +364,8 @@ def make_sim_shape(
         row_lamp=row.get("arena.light.0.x", -1),
         row_goal=row.get("arena.goal.x", -1),
         n_rows=len(names),
-        n_readings=s + n_light + n_line + n_bump,
-        inputs=np.array([(INPUT_KINDS[kind], index) for kind, index in inputs], np.int32).reshape(-1, 2),
+        n_readings=len(row_sensor),
+        inputs=np.array(seen, np.int32).reshape(-1, 2),
         floor=np.zeros((0, 0), np.float32) if floor is None else np.ascontiguousarray(floor, np.float32),
         floor_grid=np.array(floor_grid, np.float64),
         tapes=np.array(tapes, np.float64).reshape(-1, 6),
@@ -384,17 +392,15 @@ def _stack(sizes: Sequence[int], first: int) -> tuple[NDArray[np.int32], int]:
 
 def sim_rows(shape: SimShape) -> dict[str, int]:
     """The row of the table in which each number is, by its dotted name."""
-    counts = {
-        "parts": shape.part_corners.tolist(),
-        "range_table": shape.range_table.tolist(),
-        "lights": shape.row_light.size,
-        "lines": shape.row_line.size,
-        "bumps": shape.row_bump.size,
-        "walls": shape.n_walls,
-        "obstacles": shape.obstacle_corners.tolist(),
-        "lamps": shape.n_lights,
-        "goal": shape.row_goal >= 0,
-    }
+    counts = _Counts(
+        parts=shape.part_corners.tolist(),
+        sensors=np.diff(shape.first_reading).tolist(),
+        range_table=shape.range_table.tolist(),
+        walls=shape.n_walls,
+        obstacles=shape.obstacle_corners.tolist(),
+        lamps=shape.n_lights,
+        goal=shape.row_goal >= 0,
+    )
     return {name: k for k, name in enumerate(_names(counts))}
 
 

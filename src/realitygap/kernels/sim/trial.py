@@ -31,16 +31,13 @@ from .rays import cast_rays
 from .senses import answer, feel_motion
 from .shape import (
     BIAS,
-    BUMP,
     ENCODER,
     GOAL_DISTANCE,
     GOAL_SECTOR,
     LAST_MOVE,
     LAST_TURN,
-    LIGHT,
-    LINE,
     OBSTACLE,
-    RANGE,
+    READING,
     STALL,
     TIME,
 )
@@ -65,13 +62,12 @@ def _larger(reading, value):
 def observe(shape, rules, lanes, step):
     """Write what the networks see before a step to the first of `lanes.values`."""
     real = lanes.low.dtype.type
-    n_range, n_light, n_line = shape.row_range.size, shape.row_light.size, shape.row_line.size
     goal, start = shape.row_goal, shape.row_start
     for i in range(shape.inputs.shape[0]):
         kind, index, value = shape.inputs[i, 0], shape.inputs[i, 1], lanes.values[i]
         if kind == OBSTACLE:
             fill(value, real(-np.inf))
-            for s in range(n_range):
+            for s in range(shape.row_range.size):
                 _larger(lanes.readings[s], value)
         elif kind == TIME:
             fill(value, real(step) / real(rules.n_steps))
@@ -79,14 +75,8 @@ def observe(shape, rules, lanes, step):
             fill(value, real(rules.bias_value))
         elif kind == STALL:
             copy_row(lanes.stalled, value)
-        elif kind == RANGE:
+        elif kind == READING:
             copy_row(lanes.readings[index], value)
-        elif kind == LIGHT:
-            copy_row(lanes.readings[n_range + index], value)
-        elif kind == LINE:
-            copy_row(lanes.readings[n_range + n_light + index], value)
-        elif kind == BUMP:
-            copy_row(lanes.readings[n_range + n_light + n_line + index], value)
         elif kind == ENCODER:
             as_input(lanes.senses.counted_step[index], lanes.p[shape.row_drive], rules.step_s, value)
         elif kind == GOAL_SECTOR:

@@ -22,7 +22,7 @@ from realitygap.kernels.sim.shape import (
     substeps_for,
 )
 from realitygap.trials import REAL
-from realitygap.world import SENSORS, Arena, Distribution, FloorImage, Obstacle, RobotModel
+from realitygap.world import Arena, Distribution, FloorImage, Obstacle, RobotModel
 
 from ._settings import ARENA, SimSettings
 
@@ -265,7 +265,7 @@ def _sensors(robot: RobotModel) -> dict[str, Any]:
         "range_table": [len(sensor.table) for sensor in robot.range],
         "range_pulses": [sensor.pulses for sensor in robot.range],
         "encoders": robot.encoder is not None,
-        **{f"n_{kind}": len(getattr(robot, kind)) for kind in SENSORS if kind != "range"},
+        "sensors": {kind: len(sensors) for kind, sensors in robot.sensors.items() if kind != "range"},
         "light_shadows": robot.shadows,
         "stall": robot.stall.kind,
         "line_levels": [sensor.level for sensor in robot.line],
@@ -323,7 +323,7 @@ def _floor_image(image: FloorImage | None) -> tuple[NDArray[np.float32] | None, 
 
 def sim_inputs(robot: RobotModel, arena: Arena) -> tuple[str, ...]:
     """Return names of all that networks can see of a robot in an arena, the constant input included."""
-    counts = {kind: len(getattr(robot, kind)) for kind in SENSORS}
+    counts = {kind: len(sensors) for kind, sensors in robot.sensors.items()}
     counts["encoder"] = 0 if robot.encoder is None else 2
     counts["goal_sector"] = 0 if arena.goal is None else N_SECTORS
     names = ["stall", "time", "bias", "last_move", "last_turn"]

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from realitygap.kernels.neat.genome import NeatRules
 from realitygap.kernels.neat.network import Networks
 from realitygap.kernels.sim.lanes import SimRules, SimTrace, make_sim_room, make_sim_trace
-from realitygap.kernels.sim.shape import SimShape
+from realitygap.kernels.sim.shape import SENSOR_NUMBERS, SimShape
 from realitygap.kernels.sim.trial import run_sim_trials
 from realitygap.tasks import TraceArrays
 from realitygap.trials import REAL, Draws, ResultsRoom, Tried
-from realitygap.world import SENSORS, Arena
+from realitygap.world import Arena
 
 from ..jyro._trials import SNAP
 from ._scene import SimScene, sim_scene
@@ -134,7 +134,8 @@ def sim_rules(scene: SimScene, bias_value: float) -> SimRules:
 
 def sensor_names(shape: SimShape) -> tuple[str, ...]:
     """Return names of the readings in a trace, in order."""
-    return tuple(f"{kind}.{k}" for kind in SENSORS for k in range(getattr(shape, f"row_{kind}").size))
+    counts = zip(SENSOR_NUMBERS, np.diff(shape.first_reading).tolist(), strict=True)
+    return tuple(f"{kind}.{k}" for kind, n in counts for k in range(n))
 
 
 def _as_arrays(trace: SimTrace) -> TraceArrays:

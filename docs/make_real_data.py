@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from realitygap._numbers import significant
+from realitygap._wording import significant
 
 DATA = Path(__file__).parent / "data" / "real-data.json"
 LABEL = "REAL (others' robots)"

@@ -15,7 +15,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from realitygap._numbers import significant
+from realitygap._wording import significant
 
 HERE = Path(__file__).parent
 DATA = HERE / "data" / "speed.json"

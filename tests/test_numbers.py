@@ -2,7 +2,7 @@
 
 import pytest
 
-from realitygap._numbers import fixed, significant
+from realitygap._wording import fixed, significant
 from realitygap.cli._robot import _row
 from realitygap.world import length_text
 

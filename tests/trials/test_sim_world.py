@@ -11,7 +11,6 @@ import pytest
 from realitygap.errors import RobotError
 from realitygap.evolution import NeatSettings, Population
 from realitygap.platforms import SimPlatform, SimWorld, trace_genomes
-from realitygap.platforms.sim._overlap import overlaps
 from realitygap.robots import Robot
 from realitygap.testing import check_robot
 from realitygap.trials import NoiseKey
@@ -207,8 +206,8 @@ def box(x: float, y: float, heading: float = 0.0, radius: float = 0.0) -> Obstac
     ],
 )
 def test_outlines_overlap_or_not(one: Obstacle, other: Obstacle, expected: bool) -> None:
-    assert overlaps(one, other) is expected
-    assert overlaps(other, one) is expected
+    assert one.overlaps(other) is expected
+    assert other.overlaps(one) is expected
 
 
 def test_mistakes_are_named() -> None:

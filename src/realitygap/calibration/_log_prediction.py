@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from realitygap._numbers import fixed
+from realitygap._wording import fixed
 
 from ._log_model import MotionLog
 from ._simulate import Floats, Ints

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from realitygap._numbers import fixed
+from realitygap._wording import fixed
 from realitygap.errors import finite_numbers
 from realitygap.world import Fitted, RobotModel
 

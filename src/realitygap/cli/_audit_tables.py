@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING
 
 from rich.table import Table
 
-from realitygap._numbers import significant
-from realitygap._wording import bracketed
+from realitygap._wording import bracketed, significant
 
 from ._tables import table_of
 

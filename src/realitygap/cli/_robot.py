@@ -10,8 +10,8 @@ from typing import Annotated, Any
 import typer
 
 import realitygap
-from realitygap._numbers import fixed
 from realitygap._terminal import echo
+from realitygap._wording import fixed
 from realitygap.errors import RobotError
 from realitygap.robot_families import default_family, own_families, ports_by_family, robot_families
 

@@ -8,8 +8,7 @@ from rich import box
 from rich.table import Table
 
 from realitygap._console import PlainConsole
-from realitygap._numbers import fixed
-from realitygap._wording import FEW_RUNS
+from realitygap._wording import FEW_RUNS, fixed
 
 if TYPE_CHECKING:
     import polars as pl

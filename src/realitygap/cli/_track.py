@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 import realitygap
-from realitygap._numbers import fixed
 from realitygap._terminal import echo
+from realitygap._wording import fixed
 from realitygap.errors import StudyError
 
 from ._json import print_json

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from realitygap._numbers import fixed
+from realitygap._wording import fixed
 
 from ._source import Floats
 

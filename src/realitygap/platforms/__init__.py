@@ -38,8 +38,7 @@ from .sim._trials import SimTrials
 from .sim._world import SimWorld, SimWorldRobot
 from .twin._open import SimTwin, open_twin
 from .twin._platform import TwinPlatform
-from .twin._target import TwinTarget
-from .twin._trials import close_twins, release_twins
+from .twin._pooled import TwinTarget, close_twins, release_twins
 
 __all__ = [
     "ARENA",

@@ -6,9 +6,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from realitygap._numbers import fixed
 from realitygap._version import __version__
-from realitygap._wording import GOAL_VERDICTS
+from realitygap._wording import GOAL_VERDICTS, fixed
 from realitygap.records import write_whole
 from realitygap.report._closing_figures import draw_closing, words_of
 from realitygap.report._placed import FigureOnPage, hover_content, number_figures

@@ -10,8 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import polars as pl
 
-from realitygap._numbers import fixed
-from realitygap._wording import Basis, apart_clause, count_range, signed, span, undecided_clause
+from realitygap._wording import Basis, apart_clause, count_range, fixed, signed, span, undecided_clause
 from realitygap.platforms import is_physical
 from realitygap.report._champions import FRESH_TRIALS, MOST_RUNS, Champions
 from realitygap.report._comparisons import (

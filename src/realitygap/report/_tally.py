@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 import polars as pl
 
-from realitygap._numbers import significant
+from realitygap._wording import significant
 from realitygap.errors import RecordError, did_you_mean
 from realitygap.records import ResultsFolder
 from realitygap.report._driven import Driven, read_driven

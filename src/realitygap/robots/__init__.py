@@ -13,8 +13,7 @@ from ._contract import (
     check_observation,
     select_channels,
 )
-from ._exits import EXITS
-from ._guardian import Guardian, descriptor_of
+from ._guardian import EXITS, Guardian, descriptor_of
 from ._guardian_process import GIVE_UP_S, SILENT_S
 from ._ports import (
     PortGuess,

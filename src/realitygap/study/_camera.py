@@ -12,7 +12,7 @@ from urllib.parse import parse_qsl
 import numpy as np
 from numpy.typing import NDArray
 
-from realitygap._numbers import fixed
+from realitygap._wording import fixed
 from realitygap.errors import RobotError, StudyError, VisionError, did_you_mean
 from realitygap.records import EndReason, Observe, Score, TrialRecord
 from realitygap.robots import Clock, Robot

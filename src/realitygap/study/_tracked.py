@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from realitygap._numbers import fixed
+from realitygap._wording import fixed
 from realitygap.errors import StudyError
 from realitygap.records import (
     LEDGER_NAME,

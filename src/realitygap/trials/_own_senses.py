@@ -1,13 +1,15 @@
-"""A robot's own report of its battery and its encoders, if it has any."""
+"""A robot's own report of its time, its battery, and its encoders, if it has any."""
 
 from __future__ import annotations
 
 import math
 from typing import Any
 
+from realitygap.robots import Clock, Robot
+
 
 class OwnSenses:
-    """Battery and encoders of the robot that was met.
+    """Clock, battery, and encoders of the robot that was met.
 
     A robot with encoders has `has_encoders` and `wheels`, the distance of both wheels [m]; with `is_turned`, as seen by
     the end that is behind. One that measures the voltage of its battery has `volts`.
@@ -27,6 +29,11 @@ class OwnSenses:
     def _met(self, robot: Any) -> None:
         self._robot = robot
         self._is_turned = self.has_encoders and bool(getattr(robot, "is_turned", False))
+
+    def clock(self, robot: Robot) -> Clock:
+        """Return the clock of the robot that was met."""
+        clock: Clock = self._robot.clock
+        return clock
 
     def begin(self) -> None:
         """A trial begins: wheels count from here on."""

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realitygap.records import EndReason, Observe, Score, TrialRecord
-from realitygap.robots import Clock, Robot
+from realitygap.robots import Robot
 from realitygap.world import Arena
 
 from ._own_senses import OwnSenses
@@ -55,11 +55,6 @@ class SheetObserver(OwnSenses):
 
     def ready(self) -> None:
         """Do nothing, because a person has put it there."""
-
-    def clock(self, robot: Robot) -> Clock:
-        """Return the robot's own clock."""
-        clock: Clock = robot.clock  # type: ignore[attr-defined]  # of a robot on a port
-        return clock
 
     def place(self, plan: TrialPlan, arena: Arena, observe: Observe) -> None:
         """Have it put there."""

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import TracebackType
-from typing import Protocol, Self
+from typing import Any, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +39,27 @@ class TrialPlan:
     number: int = 0
     purpose: str = "controller"
     sees_end: bool = False
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the plan as JSON knows it, to be sent to another process."""
+        return {
+            **vars(self),
+            "start": None if self.start is None else list(self.start),
+            "genome": None if self.genome is None else self.genome.to_json(),
+            "commands": np.asarray(self.commands, np.float64).tolist(),
+        }
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> Self:
+        """Return the plan that `to_dict` described."""
+        return cls(
+            **{
+                **values,
+                "start": None if values["start"] is None else Pose(*values["start"]),
+                "genome": None if values["genome"] is None else Genome.from_json(values["genome"]),
+                "commands": np.array(values["commands"], np.float64).reshape(-1, 2),
+            }
+        )
 
 
 TellTrial = Callable[[int, TrialRecord], None]

@@ -82,7 +82,7 @@ class WitnessObserver(OwnSenses):
 
     def clock(self, robot: Robot) -> Clock:
         """Return the robot's own clock. That of an emulator in another program is held from now on, if possible."""
-        clock: Clock = robot.clock  # type: ignore[attr-defined]  # of a robot on a port
+        clock = super().clock(robot)
         speed = None if self._is_own else self.witness.hold()  # type: ignore[attr-defined]  # those that are served can
         return clock if speed is None else WitnessClock(self.witness, clock, speed)
 

@@ -63,6 +63,24 @@ class Obstacle:
         nearest = min(distance_to_segment(x, y, (*first, *last)) for first, last in ends)
         return (-nearest if inside else nearest) - self.radius
 
+    def overlaps(self, other: Obstacle) -> bool:
+        """Return whether both share an area, or more than a point if one is a line."""
+        if not (self._is_beside(other) or other._is_beside(self)):
+            return True
+        gaps = [other.distance(x, y) - self.radius for x, y in self.placed]
+        gaps += [self.distance(x, y) - other.radius for x, y in other.placed]
+        return min(gaps) < 0
+
+    def _is_beside(self, other: Obstacle) -> bool:
+        """Return whether all corners of another are in front of one side; True for a single corner."""
+        corners, others = self.placed, other.placed
+        if len(corners) == 1:
+            return len(others) == 1
+        return any(
+            all((y2 - y1) * (x - x1) - (x2 - x1) * (y - y1) >= 0 for x, y in others)
+            for (x1, y1), (x2, y2) in zip(corners, (*corners[1:], corners[0]), strict=True)
+        )
+
     def _at(self, x: float, y: float) -> tuple[float, float]:
         sine, cosine = math.sin(self.heading), math.cos(self.heading)
         return self.x + x * cosine - y * sine, self.y + x * sine + y * cosine

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from itertools import pairwise
 
-from realitygap._numbers import fixed
+from realitygap._wording import fixed
 from realitygap.drawing import Disc, Ink, Line, Picture, Shape, Text, picture_of
 
 from ._arena import Arena, Pose

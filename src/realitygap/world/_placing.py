@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from realitygap._numbers import fixed
+from realitygap._wording import fixed
 
 from ._arena import Arena, Pose
 from ._obstacle import distance_to_segment

@@ -19,7 +19,6 @@ from realitygap.tasks import TraceArrays
 from realitygap.trials import REAL, Draws, ResultsRoom, Tried, counters_of_robot
 from realitygap.world import MOST_ROBOTS, Arena, Obstacle, check_drawn_starts
 
-from ._overlap import overlaps
 from ._scene import SimScene, sim_scene
 from ._settings import ARENA, SimSettings
 from ._trials import sensor_names, sim_rules
@@ -142,7 +141,7 @@ def team_scenes(platform: SimSettings, arena: Arena, inputs: Sequence[str], nois
         tuple(Obstacle(*start, part.corners, part.radius) for part in platform.model.body) for start in starts
     ]
     for (first, one), (second, other) in itertools.combinations(enumerate(outlines), 2):
-        if any(overlaps(part, met) for part in one for met in other):
+        if any(part.overlaps(met) for part in one for met in other):
             raise ValueError(
                 f"robots {first} and {second} overlap at their starts ({starts[first].x:.3f}, {starts[first].y:.3f}) "
                 f"and ({starts[second].x:.3f}, {starts[second].y:.3f}). Lower arena.robots, or set arena.other_starts"

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from realitygap._numbers import fixed
+from realitygap._wording import fixed
 from realitygap.drawing import Line, Picture, Point, Shape, hex_of
 from realitygap.errors import RobotError, real_number
 from realitygap.evolution import NeatSettings
@@ -21,7 +21,6 @@ from realitygap.robots import Command, Label, Observation, ProgramRobot, check_c
 from realitygap.trials import REAL, Draws, NoiseKey, counters_of
 from realitygap.world import Arena, Obstacle, Pose, RobotModel, arena_picture, paper_arena
 
-from ._overlap import as_obstacles, overlaps
 from ._platform import SimPlatform
 from ._scene import sim_scene
 from ._settings import DEFAULT_ROBOT
@@ -181,10 +180,11 @@ class SimWorld:
     def _prepare(self) -> None:
         if self._is_ready:
             return
-        standing = as_obstacles(self.arena)
+        walls = [Obstacle(0.0, 0.0, 0.0, ((x1, y1), (x2, y2))) for x1, y1, x2, y2 in self.arena.walls]
+        standing = [*self.arena.obstacles, *walls]
         for robot in self.robots:
             parts = robot._parts()
-            if any(overlaps(part, other) for part in parts for other in standing):
+            if any(part.overlaps(other) for part in parts for other in standing):
                 raise RobotError(
                     f"{robot.name} starts in a wall, an obstacle or another robot at ({fixed(robot.start.x, 3)}, "
                     f"{fixed(robot.start.y, 3)}). Start it elsewhere."

@@ -19,9 +19,7 @@ from realitygap.world import Arena
 from .._fleet import Fleet
 from .._platform import Opening, Platform
 from .._stepwise import StepwiseFleet
-from ._robots import TwinRobots
-from ._target import TwinTarget
-from ._trials import TwinTrials, shared_pool
+from ._pooled import TwinRobots, TwinTarget, TwinTrials, shared_pool
 
 if TYPE_CHECKING:
     from realitygap.kernels.neat.genome import NeatRules

@@ -11,27 +11,25 @@ import json
 import os
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO
+from typing import Any, BinaryIO
 
 from realitygap._limits import MOST_TOML_BYTES, read_file
 from realitygap.errors import DescriptionError, RealityGapError, RobotError
+from realitygap.evolution import ControllerInterface, Network
+from realitygap.records import Observe, trial_to_dict
+from realitygap.robots import Command
+from realitygap.robots.twin import TwinRobot, load_twin
+from realitygap.trials import RobotObserver, TrialPlan, carry_out_on_robot
+from realitygap.world import Arena
 
-if TYPE_CHECKING:
-    from realitygap.robots.twin import TwinRobot
-    from realitygap.world import Arena
-
-    from ._open import SimTwin
+from .._stepwise import seen_of, trial_of
+from ._open import SimTwin, open_twin
 
 
 class _Twin:
     """A twin in an arena, and what can be asked of it."""
 
     def __init__(self, file: str, arena: dict[str, Any]) -> None:
-        from realitygap.robots.twin import load_twin
-        from realitygap.world import Arena
-
-        from ._open import open_twin
-
         try:
             self._hash = hashlib.sha256(read_file(Path(file), MOST_TOML_BYTES, plain=True)).hexdigest()
         except OSError:
@@ -52,24 +50,14 @@ class _Twin:
             "sha256": self._hash,
         }
 
-    def carry_out(self, plan: dict[str, Any], observe: str) -> dict[str, Any]:
+    def carry_out(self, plan: dict[str, Any], observe: Observe) -> dict[str, Any]:
         """Return a trial, as far as it is to be observed."""
-        from realitygap.records import trial_to_dict
-        from realitygap.trials import RobotObserver, carry_out_on_robot
-
-        from ._plan_file import plan_from_dict
-
-        made = plan_from_dict(plan)
+        made = TrialPlan.from_dict(plan)
         self._robot.number = made.number
         start = made.start or self._arena.start
-        trial = carry_out_on_robot(
-            self._robot,
-            made,
-            observe,  # type: ignore[arg-type]  # checked by who asks
-            RobotObserver(self._robot),
-            start,
+        return trial_to_dict(
+            carry_out_on_robot(self._robot, made, observe, RobotObserver(self._robot), start)
         )
-        return trial_to_dict(trial)
 
     def evolve(
         self,
@@ -81,18 +69,12 @@ class _Twin:
         trace: bool,
     ) -> dict[str, Any]:
         """Return a trial of a network as an evolution scores it."""
-        from realitygap.evolution import ControllerInterface, Network
-
-        from .._stepwise import trial_of
-
         self._robot.number = number
         interface = ControllerInterface(tuple(inputs), tuple(outputs))
         return trial_of(self._robot, self._arena, Network.from_dict(network), interface, steps, trace=trace)
 
     def begin(self, numbers: list[int], channels: list[str]) -> list[dict[str, Any]]:
         """Begin a trial of each number, each with a separate robot; return what every robot sees."""
-        from .._stepwise import seen_of
-
         self._fleet += [self._open() for _ in numbers[len(self._fleet) :]]
         del self._fleet[len(numbers) :]
         for robot, number in zip(self._fleet, numbers, strict=True):
@@ -103,10 +85,6 @@ class _Twin:
 
     def drive(self, commands: list[list[float]]) -> list[dict[str, Any]]:
         """Drive each robot by one command; return what every robot sees then."""
-        from realitygap.robots import Command
-
-        from .._stepwise import seen_of
-
         if len(commands) != len(self._fleet):  # after a process that ended
             raise RobotError(f"{len(self._fleet)} trials are under way, got {len(commands)} commands.")
         for robot, (move, turn) in zip(self._fleet, commands, strict=True):

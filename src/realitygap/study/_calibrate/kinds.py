@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from realitygap._numbers import significant
+from realitygap._wording import significant
 from realitygap.calibration import (
     LEAST_PLACEMENTS,
     MOTION,

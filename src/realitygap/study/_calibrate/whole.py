@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from realitygap._numbers import significant
+from realitygap._wording import significant
 from realitygap.calibration import (
     CONTACT,
     LEAST_STEPS,

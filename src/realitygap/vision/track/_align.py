@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from realitygap._numbers import fixed
+from realitygap._wording import fixed
 from realitygap.errors import VisionError
 
 from ._track import Track

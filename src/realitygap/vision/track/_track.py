@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from realitygap._numbers import fixed
+from realitygap._wording import fixed
 from realitygap.errors import VisionError
 from realitygap.vision._tags import RobotTag
 from realitygap.world import Grid, cells_along

@@ -112,7 +112,7 @@ def time_steps(threads: int = 1, precision: str = "single", start_hidden: int = 
 
 
 def _steps_on_all_cores() -> dict[str, Any]:
-    from realitygap.study import usable_processors
+    from realitygap._process import usable_processors
 
     return time_steps(threads=usable_processors())
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from realitygap._process import usable_processors
 from realitygap.study import _duration, estimate_seconds, load_study, parse_study
-from realitygap.trials import usable_processors
 
 SECONDS = {"coverage-10": 1.0, "novelty-10": 3.0}
 """Time of a run on one core, by condition [s]."""

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from realitygap._foreign_text import printable
 from realitygap._interrupts import kept_interrupts
-from realitygap._stack import on_wide_stack
+from realitygap._process import on_wide_stack
 from realitygap._version import __version__
 from realitygap.errors import RealityGapError
 

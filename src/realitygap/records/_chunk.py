@@ -11,9 +11,9 @@ from pathlib import Path
 
 import polars as pl
 
-from realitygap._forked import use_polars
 from realitygap._limits import MOST_CHUNK_BYTES, read_file
 from realitygap._parquet_size import check_size
+from realitygap._process import use_polars
 from realitygap.errors import RecordError, RecordVersionError
 from realitygap.records._columns import EXTRA_SCHEMA, SCHEMA, check_part, check_rows, schema_with
 from realitygap.records._digest import RowsDigest, Stream, row_streams, rows_digest

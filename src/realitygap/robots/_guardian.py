@@ -1,4 +1,4 @@
-"""Means to stop the motors if this program ends: signals that leave its `with` blocks, and a process that outlives it."""
+"""Means to stop the motors if this program ends: signals that leave `with` blocks, and a process that outlives it."""
 
 from __future__ import annotations
 

@@ -9,7 +9,7 @@ import numpy as np
 import polars as pl
 from numpy.typing import DTypeLike, NDArray
 
-from realitygap._forked import use_polars
+from realitygap._process import use_polars
 from realitygap.errors import OutgrownError, whole_number
 from realitygap.evolution import distance_kind
 from realitygap.kernels.neat import block

@@ -1,7 +1,6 @@
 """Studies: conditions x replicates, read from a file, run, and resumed."""
 
 from realitygap.platforms import open_target
-from realitygap.trials import usable_processors
 
 from . import _cards  # noqa: F401  # what notebooks show
 from ._bench import measure_speed
@@ -122,7 +121,6 @@ __all__ = [
     "trial_of_ledger",
     "try_genome",
     "try_on",
-    "usable_processors",
     "with_ruled_end",
     "write_trials",
 ]

@@ -15,6 +15,7 @@ import numba
 import numpy as np
 import polars
 
+from realitygap._process import usable_processors
 from realitygap._version import __version__
 from realitygap.evolution import Population, decode_all
 from realitygap.kernels.jyro.trial import make_block, make_trace, run_trials
@@ -22,7 +23,7 @@ from realitygap.kernels.math.peak import peak_flops
 from realitygap.platforms import JyroPlatform, jyro_rules, jyro_scene
 from realitygap.records import ResultsFolder
 from realitygap.runs import Condition, run_replicates, run_rows
-from realitygap.trials import NoiseKey, counters_of, usable_processors
+from realitygap.trials import NoiseKey, counters_of
 
 from ._file import load_study
 from ._run import machine_facts

@@ -6,8 +6,8 @@ import statistics
 import time
 from concurrent.futures import ThreadPoolExecutor
 
+from realitygap._process import usable_processors
 from realitygap.runs import Condition, prepare_kernels, run_replicates
-from realitygap.trials import usable_processors
 
 from ._code import python_tasks
 from ._study import Study

@@ -7,11 +7,11 @@ import threading
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+from realitygap._process import usable_processors
 from realitygap.errors import StudyError, did_you_mean, whole_number
 from realitygap.evolution import NeatSettings
 from realitygap.runs import MAZE_REWARDS, MazeRun, MazeTrials, run_maze
 from realitygap.tasks import MAZE_TASKS, MazeTask
-from realitygap.trials import usable_processors
 from realitygap.world import load_arena
 
 from ._run import Progress

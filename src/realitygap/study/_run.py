@@ -10,13 +10,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from realitygap._forked import use_polars
+from realitygap._process import usable_processors, use_polars
 from realitygap.errors import OutgrownError, StudyError, whole_number
 from realitygap.platforms import built_in_platforms
 from realitygap.records import LEDGER_NAME, Ledger, ResultsFolder
 from realitygap.runs import Condition
 from realitygap.tasks import source_hash
-from realitygap.trials import Operator, usable_processors
+from realitygap.trials import Operator
 
 from ._code import AllowCode, with_code_allowed
 from ._executors import ChunkTask, Executor, Threads

@@ -8,11 +8,11 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 from typing import Any, TypeVar
 
+from realitygap._process import usable_processors
 from realitygap.errors import StudyError, did_you_mean, whole_number
 from realitygap.evolution import NAMED_SETTINGS, NeatSettings
 from realitygap.runs import TaskRun, run_task
 from realitygap.tasks import CLASSICAL_TASKS, ClassicalTask
-from realitygap.trials import usable_processors
 
 from ._problems import Problems
 from ._run import Progress

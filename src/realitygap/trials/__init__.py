@@ -25,7 +25,6 @@ from ._maze_scene import maze_exit, maze_rules, maze_scene
 from ._observer import PortObserver, RobotObserver
 from ._operator import Card, Led, Operator, Verdict, start_words
 from ._preflight import Preflight, preflight
-from ._processors import usable_processors
 from ._scene import simulate_case, simulate_file
 from ._sheet_observer import SheetObserver
 from ._target import RepeatableTarget, Target, TellTrial, TrialPlan, check_plans
@@ -79,5 +78,4 @@ __all__ = [
     "simulate_case",
     "simulate_file",
     "start_words",
-    "usable_processors",
 ]

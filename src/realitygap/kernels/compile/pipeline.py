@@ -33,7 +33,7 @@ from numba.core.untyped_passes import (
     TranslateByteCode,
 )
 
-from realitygap._stack import on_wide_stack
+from realitygap._process import on_wide_stack
 
 from .lower import (
     OPERATORS,

@@ -11,6 +11,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from realitygap._process import usable_processors
 from realitygap.errors import finite_numbers, whole_number
 from realitygap.evolution import Genome, NeatSettings, Population, decode_all
 from realitygap.kernels.math.philox import PURPOSE_NOISE
@@ -19,7 +20,7 @@ from realitygap.kernels.neat.network import Networks
 from realitygap.kernels.sim.lanes import make_sim_room
 from realitygap.kernels.sim.replay import Rehearsed, rehearse
 from realitygap.kernels.sim.shape import half_width
-from realitygap.trials import Draws, check_genomes, usable_processors
+from realitygap.trials import Draws, check_genomes
 from realitygap.world import Arena, Distribution
 
 from ._platform import SimPlatform

@@ -18,8 +18,8 @@ from queue import SimpleQueue
 from typing import Any
 
 from realitygap import errors
+from realitygap._process import usable_processors
 from realitygap.errors import RobotError, whole_number
-from realitygap.trials import usable_processors
 from realitygap.world import Arena
 
 TOLD = 2000

@@ -14,11 +14,12 @@ from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from typing import Any
 
+from realitygap._process import usable_processors
 from realitygap.errors import RealityGapError, RobotError, from_extra
 from realitygap.orders import ORDER_FILE, ClosingOrder, takes_order
 from realitygap.platforms import Opening, TwinTarget, platform_of
 from realitygap.records import write_whole
-from realitygap.trials import Target, usable_processors
+from realitygap.trials import Target
 
 from .._calibrate.whole import calibrate_all
 from .._transfer.strategies import choose_condition

@@ -2,7 +2,7 @@
 
 import resource
 
-from realitygap._stack import on_wide_stack
+from realitygap._process import on_wide_stack
 
 DEPTH = 300  # calls within each other: the frames of all of them fill more than one small piece of the stack
 N_CALLS = 2_000  # in a loop at each depth

@@ -5,10 +5,10 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, NotRequired, Protocol, TypedDict
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from realitygap.errors import RobotError
 from realitygap.evolution import OUTPUTS, WHEELS, Channels, ControllerInterface, Network, inputs_of_robot
@@ -121,9 +121,32 @@ def choose_number(robot: Any, number: int) -> None:
         robot.number = number
 
 
+class AskedTrial(TypedDict):
+    """A trial of a network to be run, as plain values for JSON."""
+
+    network: dict[str, Any]  # of `Network.to_dict`
+    number: int
+    trace: bool
+
+
+class AnsweredTrial(TypedDict):
+    """A trial of a network, as plain values for JSON: with a trace, t + 1 poses, or t commands."""
+
+    cells: list[int]  # in order of first visit
+    ends: list[int]
+    stalls: int
+    pose: Sequence[float]  # the last one
+    poses: NotRequired[list[Sequence[float]]]
+    readings: NotRequired[list[list[float]]]
+    stalled: NotRequired[list[bool]]
+    wheels: NotRequired[list[Sequence[float]]]
+    inputs: NotRequired[list[list[float]]]
+    commands: NotRequired[list[list[float]]]
+
+
 def trial_of(
     robot: Any, arena: Arena, network: Network, interface: ControllerInterface, n_steps: int, *, trace: bool
-) -> dict[str, Any]:
+) -> AnsweredTrial:
     """Run a trial of a network.
 
     Args:
@@ -134,12 +157,9 @@ def trial_of(
         n_steps: Number of commands.
         trace: True to return every step.
 
-    Returns:
-        Plain values for JSON: `cells` in order of first visit, `ends`, `stalls` and the last `pose`. With `trace` also
-        `poses`, `readings`, `stalled` and `wheels` of t + 1 rows, `inputs` and `commands` of t.
     """
-    poses: list[tuple[float, ...]] = []
-    distances: list[tuple[float, float]] = []
+    poses: list[Sequence[float]] = []
+    distances: list[Sequence[float]] = []
     observer = RobotObserver(robot)
 
     def look(step: int) -> None:
@@ -157,22 +177,17 @@ def trial_of(
         raise RobotError(driven.problem)
     ends = {arena.grid.cell_at(x, y) for x, y, _ in poses} - {None}
     stalled = [*driven.stalled.tolist(), driven.last_stalled]
-    result = {
+    result: AnsweredTrial = {
         "cells": list(robot.visited_cells),
         "ends": sorted(cell for cell in ends if cell is not None),
         "stalls": sum(stalled[1:]),
         "pose": poses[-1],
     }
-    if not trace:
-        return result
-    return result | {
-        "poses": poses,
-        "readings": [*driven.readings.tolist(), driven.last_readings.tolist()],
-        "stalled": stalled,
-        "wheels": distances,
-        "inputs": inputs,
-        "commands": driven.commands.tolist(),
-    }
+    if trace:
+        result["poses"], result["stalled"], result["wheels"] = poses, stalled, distances
+        result["readings"] = [*driven.readings.tolist(), driven.last_readings.tolist()]
+        result["inputs"], result["commands"] = inputs, driven.commands.tolist()
+    return result
 
 
 class StepwiseTrials:
@@ -208,7 +223,7 @@ class StepwiseTrials:
         self.step_s: float = robot.step_s
         self.sensors = tuple(f"range.{k}" for k in range(robot.n_sensors))
 
-    def _run(self, asked: list[dict[str, Any]]) -> Iterable[dict[str, Any]]:
+    def _run(self, asked: list[AskedTrial]) -> Iterable[AnsweredTrial]:
         for each in asked:
             choose_number(self._robot, each["number"])
             network = Network.from_dict(each["network"])
@@ -231,7 +246,7 @@ class StepwiseTrials:
             int(row): Network(networks, int(row), self._rules, self._bias_value).to_dict()
             for row in np.unique(which)
         }
-        asked = [
+        asked: list[AskedTrial] = [
             {"network": rows[int(row)], "number": trial_number(int(key), counter), "trace": trace}
             for row, counter in zip(which, counters, strict=True)
         ]
@@ -246,24 +261,26 @@ class StepwiseTrials:
         batch = TrialBatch(cells, n_line, n_ends, stalls, np.empty((n, 0)))
         return Tried(batch, end_cells if ends else end_cells[:0], ended, traced, distances)
 
-    def _trace(self, answers: list[dict[str, Any]]) -> TraceArrays:
+    def _trace(self, answers: list[AnsweredTrial]) -> TraceArrays:
         """Return every step as kernels store it: positions from the start, headings in turns."""
 
-        def stacked(name: str, width: int) -> NDArray[np.float64]:
-            found = [np.array(each[name], np.float64).reshape(-1, width) for each in answers]
-            return np.stack(found, axis=-1) if found else np.zeros((0, width, 1))
+        def stacked(trials: Iterable[ArrayLike], width: int) -> NDArray[np.float64]:
+            rows = [np.array(trial, np.float64).reshape(-1, width) for trial in trials]
+            return np.stack(rows, axis=-1) if rows else np.zeros((0, width, 1))
 
-        poses = stacked("poses", 3)
+        poses = stacked((trial["poses"] for trial in answers), 3)
         start = self.arena.start
         poses[:, :2] -= np.array([start.x, start.y])[:, None]
         poses[:, 2] /= math.tau
-        inputs = stacked("inputs", len(self._interface.sensed))
+        inputs = stacked((trial["inputs"] for trial in answers), len(self._interface.sensed))
         if self._rules.bias_input >= 0:
             constant = np.full((len(inputs), 1, inputs.shape[2]), self._bias_value)
             inputs = np.insert(inputs, [self._rules.bias_input], constant, axis=1)
-        stalled = stacked("stalled", 1)[:, 0].astype(np.bool_)
-        readings, commands = stacked("readings", len(self.sensors)), stacked("commands", 2)
-        return TraceArrays(poses, readings, inputs, commands, stalled, stacked("wheels", 2))
+        stalled = stacked((trial["stalled"] for trial in answers), 1)[:, 0].astype(np.bool_)
+        readings = stacked((trial["readings"] for trial in answers), len(self.sensors))
+        commands = stacked((trial["commands"] for trial in answers), 2)
+        wheels = stacked((trial["wheels"] for trial in answers), 2)
+        return TraceArrays(poses, readings, inputs, commands, stalled, wheels)
 
 
 def _listed(cells: list[list[int]], n_cells: int) -> tuple[NDArray[np.uint8], NDArray[np.int32]]:
@@ -280,7 +297,17 @@ def trial_number(key: int, counter: NDArray[np.uint32]) -> int:
     return int.from_bytes(hashlib.blake2b(text.encode(), digest_size=4).digest(), "little")
 
 
-def seen_of(robot: Any) -> dict[str, Any]:
+class Seen(TypedDict):
+    """The readings and the pose of a robot, as plain values for JSON."""
+
+    readings: Sequence[float]
+    stalled: bool
+    pose: Sequence[float]
+    cells: list[int]
+    channels: Channels
+
+
+def seen_of(robot: Any) -> Seen:
     """Return the readings and the pose of a robot, as plain values for JSON."""
     seen = check_observation(robot.observe())
     return {
@@ -341,7 +368,7 @@ class TakenRobots:
     cells: list[tuple[int, ...]]
     values: list[Channels]
 
-    def _take(self, seen: Sequence[dict[str, Any]]) -> None:
+    def _take(self, seen: Sequence[Seen]) -> None:
         self.readings = np.array([robot["readings"] for robot in seen], np.float64)
         self.stalled = np.array([robot["stalled"] for robot in seen], np.bool_)
         self.poses = np.array([robot["pose"] for robot in seen], np.float64)

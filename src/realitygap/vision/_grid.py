@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
@@ -156,8 +157,6 @@ def _is_outlier(offsets: Floats) -> NDArray[np.bool_]:
     """Return whether offsets differ from those around them."""
     padded = np.pad(offsets, 2, constant_values=np.nan)
     around = np.lib.stride_tricks.sliding_window_view(padded, (5, 5)).reshape(*offsets.shape, 25)
-    import warnings
-
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # nothing was seen around
         middle = np.nanmedian(around, axis=-1)

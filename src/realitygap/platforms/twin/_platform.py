@@ -13,12 +13,14 @@ from realitygap._limits import MOST_TOML_BYTES
 from realitygap.errors import require_extra
 from realitygap.evolution import ControllerInterface, inputs_of_robot
 from realitygap.robots import Robot
+from realitygap.robots.twin import load_twin
 from realitygap.trials import PlatformTrials, Target
 from realitygap.world import Arena
 
 from .._fleet import Fleet
 from .._platform import Opening, Platform
 from .._stepwise import StepwiseFleet
+from ._open import open_twin
 from ._pooled import TwinRobots, TwinTarget, TwinTrials, shared_pool
 
 if TYPE_CHECKING:
@@ -92,10 +94,6 @@ class TwinPlatform(Platform):
 
     def open_robot(self, arena: Arena, *, noise: float = 0.0) -> Robot:
         """Open the twin in this process."""
-        from realitygap.robots.twin import load_twin
-
-        from ._open import open_twin
-
         return open_twin(load_twin(self.file), arena)
 
     def open(self, arena: Arena, how: Opening) -> Target:

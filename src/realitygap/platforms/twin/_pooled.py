@@ -17,7 +17,7 @@ from realitygap.robots import Label
 from realitygap.trials import NoiseKey, RepeatableTarget, TellTrial, TrialPlan, check_plans, counters_of
 from realitygap.world import Arena
 
-from .._stepwise import StepwiseTrials, TakenRobots, trial_number
+from .._stepwise import AnsweredTrial, AskedTrial, Seen, StepwiseTrials, TakenRobots, trial_number
 from ._pool import TwinPool
 
 _pools: weakref.WeakValueDictionary[tuple[str, str, Arena], TwinPool] = weakref.WeakValueDictionary()
@@ -32,10 +32,10 @@ class TwinTrials(StepwiseTrials):
     many there are. Its robot is a `TwinPool`.
     """
 
-    def _run(self, asked: list[dict[str, Any]]) -> Iterable[dict[str, Any]]:
+    def _run(self, asked: list[AskedTrial]) -> Iterable[AnsweredTrial]:
         names = {"inputs": self._interface.inputs, "outputs": self._interface.outputs}
         more = {"do": "evolve", **names, "steps": self.n_steps}
-        answers: Iterable[dict[str, Any]] = self._robot.ask_all([{**each, **more} for each in asked])
+        answers: Iterable[AnsweredTrial] = self._robot.ask_all([{**each, **more} for each in asked])
         return answers
 
 
@@ -205,6 +205,6 @@ class TwinRobots(TakenRobots):
         """End the process; safe to call twice."""
         self._pool.close()
 
-    def _ask(self, request: dict[str, Any]) -> Sequence[dict[str, Any]]:
-        answer: Sequence[dict[str, Any]] = next(self._pool.ask_all([request]))
+    def _ask(self, request: dict[str, Any]) -> Sequence[Seen]:
+        answer: Sequence[Seen] = next(self._pool.ask_all([request]))
         return answer

@@ -22,7 +22,7 @@ from realitygap.robots.twin import TwinRobot, load_twin
 from realitygap.trials import RobotObserver, TrialPlan, carry_out_on_robot
 from realitygap.world import Arena
 
-from .._stepwise import seen_of, trial_of
+from .._stepwise import AnsweredTrial, Seen, seen_of, trial_of
 from ._open import SimTwin, open_twin
 
 
@@ -67,13 +67,13 @@ class _Twin:
         steps: int,
         number: int,
         trace: bool,
-    ) -> dict[str, Any]:
+    ) -> AnsweredTrial:
         """Return a trial of a network as an evolution scores it."""
         self._robot.number = number
         interface = ControllerInterface(tuple(inputs), tuple(outputs))
         return trial_of(self._robot, self._arena, Network.from_dict(network), interface, steps, trace=trace)
 
-    def begin(self, numbers: list[int], channels: list[str]) -> list[dict[str, Any]]:
+    def begin(self, numbers: list[int], channels: list[str]) -> list[Seen]:
         """Begin a trial of each number, each with a separate robot; return what every robot sees."""
         self._fleet += [self._open() for _ in numbers[len(self._fleet) :]]
         del self._fleet[len(numbers) :]
@@ -83,7 +83,7 @@ class _Twin:
             robot.reset()
         return [seen_of(robot) for robot in self._fleet]
 
-    def drive(self, commands: list[list[float]]) -> list[dict[str, Any]]:
+    def drive(self, commands: list[list[float]]) -> list[Seen]:
         """Drive each robot by one command; return what every robot sees then."""
         if len(commands) != len(self._fleet):  # after a process that ended
             raise RobotError(f"{len(self._fleet)} trials are under way, got {len(commands)} commands.")

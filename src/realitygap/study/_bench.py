@@ -118,7 +118,7 @@ def _rate(work: Callable[[int], int], threads: int, seconds: float) -> float:
     def go_on(thread: int) -> int:
         done = 0
         call = 1 + thread
-        while time.perf_counter() < until:
+        while not done or time.perf_counter() < until:  # a thread may begin late
             done += work(call)
             call += threads
         return done

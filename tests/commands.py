@@ -10,13 +10,21 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
-import numba  # noqa: F401  # imported once, for all that are forked
+import cv2  # noqa: F401  # imported once, for all that are forked
+import numba  # noqa: F401
 import polars  # noqa: F401
+import rich.progress  # noqa: F401
+import scipy.ndimage
+import scipy.optimize
+import scipy.stats  # noqa: F401
+import typer
 
 import realitygap.cli
 from tests.forks import fork_context
 
 PATIENCE_S = 300
+
+typer.main.get_command(realitygap.cli.app)  # imports what all commands need
 
 
 class Done(NamedTuple):

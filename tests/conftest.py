@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import gc
 import os
 import signal
@@ -13,6 +14,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+import typer.testing
 from hypothesis import settings
 
 from .browsers import Visitors, open_browser
@@ -25,6 +27,9 @@ WITH_DEVICE = "_with_device.py"
 
 PARTS = ("jyro", "sim")
 """Of `tests/warm.py`, each in a process of its own."""
+
+KEPT_MEMORY = {f"MALLOC_{name}_THRESHOLD_": str(4 << 30) for name in ("MMAP", "TRIM")}
+"""Have processes keep what they free, as a system that clears each page again takes half of a photograph's time."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -57,6 +62,8 @@ def pytest_sessionstart(session: pytest.Session) -> None:
         return
     began = time.monotonic()
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+    for name, value in KEPT_MEMORY.items():
+        os.environ.setdefault(name, value)
     command = [sys.executable, "-m", "tests.warm"]
     collect = [sys.executable, "-m", "pytest", "--collect-only", "-q", "-p", "no:cacheprovider", *config.args]
     collecting = subprocess.Popen(collect, cwd=config.invocation_params.dir, stdout=subprocess.DEVNULL)
@@ -81,6 +88,14 @@ def _no_file_is_allowed_yet(tmp_path_factory: pytest.TempPathFactory) -> Iterato
     """Keep the answers of this machine's user out of the tests, and theirs out of this machine."""
     with pytest.MonkeyPatch.context() as patched:
         patched.setenv("REALITYGAP_STATE", str(tmp_path_factory.mktemp("state")))
+        yield
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _commands_are_built_once() -> Iterator[None]:
+    """Typer's runner builds all commands, for 40 ms, each time that it runs one."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("typer.testing._get_command", functools.cache(typer.main.get_command))
         yield
 
 

@@ -5,7 +5,9 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import faulthandler
+import importlib
 import os
+import re
 import resource
 import sys
 import threading
@@ -19,7 +21,7 @@ import uvicorn  # noqa: F401  # imported once, for all that are forked
 from fastapi import FastAPI  # noqa: F401
 from nicegui import app, ui
 
-import realitygap.lab.pages  # noqa: F401
+import realitygap.lab.pages
 from realitygap.lab import _child, open_lab
 from realitygap.lab._counts import Counts
 from realitygap.lab.pages import _robot
@@ -27,6 +29,18 @@ from realitygap.robots import PortGuess
 from tests.forks import fork_context
 
 from .forked_children import FOR_CHILDREN, Forking
+
+for name in (
+    "anyio._backends._asyncio",
+    "uvicorn.lifespan.on",
+    "uvicorn.loops.auto",
+    "uvicorn.protocols.http.auto",
+    "uvicorn.protocols.websockets.auto",
+):
+    importlib.import_module(name)
+for path in Path(realitygap.lab.pages.__file__).parent.glob("*.py"):
+    for name in re.findall(r"\bui\.([a-z_]+)", path.read_text("utf-8")):
+        getattr(ui, name)  # which NiceGUI imports at its first use
 
 LOG = "lab.log"
 """What a lab says to its terminal, beside its folder."""

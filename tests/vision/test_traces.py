@@ -46,16 +46,12 @@ def test_an_ordinary_photo_is_read_nearly_as_well():
 
 
 @pytest.mark.slow
-def test_only_pens_that_drew_are_looked_for():
-    score = score_sheet(read_photo(photo(2, ORDINARY, n=2).jpeg), LAYOUT, [0, 1])
+def test_only_pens_that_drew_are_looked_for_and_others_have_next_to_no_cells():
+    image = read_photo(photo(2, ORDINARY, n=2).jpeg)
+    score = score_sheet(image, LAYOUT, [0, 1])
     assert [trace.pen for trace in score.traces] == [0, 1]
     assert min(_ious(score)) > 0.9
-
-
-@pytest.mark.slow
-def test_a_pen_that_did_not_draw_has_next_to_no_cells():
-    score = score_sheet(read_photo(photo(2, ORDINARY, n=2).jpeg), LAYOUT)
-    assert all(len(trace.cells) <= 2 for trace in score.traces[2:])
+    assert all(len(trace.cells) <= 2 for trace in score_sheet(image, LAYOUT).traces[2:])
 
 
 @pytest.mark.slow
@@ -68,9 +64,8 @@ def test_colors_of_untried_pens_come_from_names_and_that_is_reported():
 @pytest.mark.slow
 def test_a_pen_whose_name_is_no_color_must_be_tried():
     layout = SheetLayout.of(ARENA, ("mine", "red", "blue"))
-    image = read_photo(photo(4, SCAN, n=3, has_key=False).jpeg)
     with pytest.raises(VisionError, match="Pen 'mine': its box on the sheet is empty"):
-        score_sheet(image, layout)
+        score_sheet(read_photo(photo(4, SCAN, n=3, has_key=False).jpeg), layout)
 
 
 @pytest.mark.slow

@@ -173,6 +173,7 @@ def test_motors_stop_once_keys_are_let_go_or_are_another_windows(visit, emulated
     keyboard = page.keyboard
 
     def press() -> None:
+        window.send("Browser.setWindowBounds", {"windowId": number, "bounds": {"windowState": "normal"}})
         page.bring_to_front()
         page.locator(".lab-pad").focus()
         keyboard.down("ArrowLeft")
@@ -181,16 +182,26 @@ def test_motors_stop_once_keys_are_let_go_or_are_another_windows(visit, emulated
         for key in ("ArrowLeft", "Meta", "Alt"):
             keyboard.up(key)
 
-    def send(event: str, target: str) -> None:
-        page.evaluate(f"() => {{ {target}.dispatchEvent(new Event('{event}')); }}")
+    window = page.context.new_cdp_session(page)
+    window.send("Emulation.setFocusEmulationEnabled", {"enabled": False})
+    number = window.send("Browser.getWindowForTarget")["windowId"]
+    other = page.context.new_page()
+
+    def turn_to_another_window() -> None:
+        other.bring_to_front()
+        window.send("Browser.setWindowBounds", {"windowId": number, "bounds": {"windowState": "minimized"}})
+
+    def hide() -> None:
+        """In a browser without a screen no page is ever hidden, whatever is in front of it: only the event is sent."""
+        page.evaluate("() => { document.dispatchEvent(new Event('visibilitychange')); }")
 
     lost_keys = {
         "key": lambda: keyboard.up("ArrowLeft"),
         "Command": lambda: keyboard.down("Meta"),
         "Alt": lambda: keyboard.down("Alt"),
         "menu": lambda: page.locator(".lab-pad").dispatch_event("contextmenu"),
-        "dialog": lambda: send("blur", "window"),
-        "tab": lambda: send("visibilitychange", "document"),
+        "window": turn_to_another_window,
+        "tab": hide,
     }
     for name, act in lost_keys.items():
         print(name)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -16,7 +16,7 @@ from ._order import command_of
 from ._results import show_page
 
 if TYPE_CHECKING:
-    from realitygap.study import ClosingProgress
+    from realitygap.study import ClosingProgress, ClosingSummary
 
 
 @command_of(ClosingOrder)
@@ -55,7 +55,7 @@ def closing(
         show_page(page)
 
 
-def _print(summary: dict[str, Any]) -> None:
+def _print(summary: ClosingSummary) -> None:
     of, label = len(summary["twins"]), summary["label"]
     if summary["plan"]["platforms"]:
         echo(f"{of} sitting{'s' * (of != 1)} ({label}), each with its own held-out controllers")

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 from realitygap._version import __version__
 from realitygap._wording import GOAL_VERDICTS, fixed
@@ -13,6 +13,7 @@ from realitygap.report._closing_figures import draw_closing, words_of
 from realitygap.report._placed import FigureOnPage, hover_content, number_figures
 from realitygap.report._table import Column, Part, Row, TableOnPage
 from realitygap.report._template import render_page
+from realitygap.study import ClosingSummary, GoalRow
 
 _RATIOS = ("SRCC", "MMRV")
 
@@ -24,7 +25,7 @@ SELECTION_NOTE = (
 """Limit of goals whose twins a measured gap selected."""
 
 
-def write_closing_page(summary: Mapping[str, Any], out: str | Path) -> Path:
+def write_closing_page(summary: ClosingSummary, out: str | Path) -> Path:
     """Write the page: one HTML file that needs no other file and no network.
 
     Args:
@@ -57,7 +58,7 @@ def write_closing_page(summary: Mapping[str, Any], out: str | Path) -> Path:
     return path
 
 
-def goal_table(summary: Mapping[str, Any]) -> TableOnPage:
+def goal_table(summary: ClosingSummary) -> TableOnPage:
     """Return a table with one row per goal; a goal that the interval does not decide is open."""
     heads = ("goal", "wanted", "figure", "95 % interval", "twins", "verdict")
     rows = [
@@ -65,7 +66,7 @@ def goal_table(summary: Mapping[str, Any]) -> TableOnPage:
             goal["name"],
             f"{goal['sense']} {_plain(goal, goal['goal'])}",
             _plain(goal, goal["figure"]),
-            _span(goal, lambda value, goal=goal: _plain(goal, value)),
+            _span(goal["low"], goal["high"], partial(_plain, goal)),
             _counted(goal),
             GOAL_VERDICTS[goal["met"]] if goal["n"] else "–",
         )
@@ -74,7 +75,7 @@ def goal_table(summary: Mapping[str, Any]) -> TableOnPage:
     return _table("goals", "Goals and verdicts.", heads, rows)
 
 
-def not_counted(summary: Mapping[str, Any]) -> list[str]:
+def not_counted(summary: ClosingSummary) -> list[str]:
     """A sentence for each goal that not all twins are judged by: how many are, and why the others are not."""
     sentences = []
     for goal in summary["goals"]:
@@ -84,7 +85,7 @@ def not_counted(summary: Mapping[str, Any]) -> list[str]:
     return sentences
 
 
-def why_table(summary: Mapping[str, Any]) -> TableOnPage:
+def why_table(summary: ClosingSummary) -> TableOnPage:
     """Return a table of the twins that miss a goal."""
     rows: list[tuple[str, ...]] = []
     for goal in summary["goals"]:
@@ -104,7 +105,7 @@ def why_table(summary: Mapping[str, Any]) -> TableOnPage:
     return _table("why", "Twins that miss a goal.", heads, rows, kind="text")
 
 
-def family_table(summary: Mapping[str, Any]) -> TableOnPage:
+def family_table(summary: ClosingSummary) -> TableOnPage:
     """Return a table of the RMS gap by family, observation, and budget."""
     heads = (
         *("family", "observed", "trials", "twins", "RMS gap", "95 % interval"),
@@ -117,7 +118,7 @@ def family_table(summary: Mapping[str, Any]) -> TableOnPage:
             str(row["budget"]),
             str(row["n"]),
             _number(row["rms"]["estimate"]),
-            _span(row["rms"], _number),
+            _span(row["rms"]["low"], row["rms"]["high"], _number),
             str(row["n_counted"]),
             "–" if row["observe"] == "none" else _percent(row["fall"]["estimate"]),
         )
@@ -126,7 +127,7 @@ def family_table(summary: Mapping[str, Any]) -> TableOnPage:
     return _table("families", "RMS gap by family, observation, and budget.", heads, rows)
 
 
-def twin_table(summary: Mapping[str, Any]) -> TableOnPage:
+def twin_table(summary: ClosingSummary) -> TableOnPage:
     """Return a table of the twins, and whether they count."""
     rows = [
         (
@@ -141,10 +142,10 @@ def twin_table(summary: Mapping[str, Any]) -> TableOnPage:
     return _table("twins", "Twins, and whether they count.", heads, rows)
 
 
-def strategy_table(summary: Mapping[str, Any]) -> TableOnPage:
+def strategy_table(summary: ClosingSummary) -> TableOnPage:
     """Return a table of coverage on the twins by strategy."""
     rows = [
-        (row["strategy"], str(row["n"]), _number(row["estimate"]), _span(row, _number))
+        (row["strategy"], str(row["n"]), _number(row["estimate"]), _span(row["low"], row["high"], _number))
         for row in summary["strategies"]
     ]
     heads = ("strategy", "twins", "coverage on the twin", "95 % interval")
@@ -156,13 +157,13 @@ def _table(name: str, caption: str, heads: Sequence[str], rows: Sequence[Row], k
     return TableOnPage(name, caption, columns, (Part(rows),), kind="numbers")
 
 
-def _counted(goal: Mapping[str, Any]) -> str:
+def _counted(goal: GoalRow) -> str:
     """Return the number of twins that a goal is judged by, and their total if some are unknown."""
     n, n_unknown = goal["n"], len(goal["unknown"])
     return f"{n} of {n + n_unknown}" if n_unknown else str(n)
 
 
-def _plain(goal: Mapping[str, Any], value: float | None) -> str:
+def _plain(goal: GoalRow, value: float | None) -> str:
     """A figure of a goal: a share in percent, but correlations and ratios as they are."""
     if any(word in goal["name"] for word in _RATIOS):
         return "–" if value is None else f"{value:.2f}"
@@ -177,7 +178,5 @@ def _number(value: float | None) -> str:
     return "–" if value is None else fixed(value, 3).replace("-", "−")
 
 
-def _span(estimate: Mapping[str, Any], form: Any) -> str:
-    if estimate["low"] is None or estimate["high"] is None:
-        return "–"
-    return f"{form(estimate['low'])} to {form(estimate['high'])}"
+def _span(low: float | None, high: float | None, form: Callable[[float], str]) -> str:
+    return "–" if low is None or high is None else f"{form(low)} to {form(high)}"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
@@ -14,15 +14,16 @@ from realitygap.report.charts.marks import MOST_MARKS, Panel, Series
 from realitygap.report.charts.rows import Row, draw_row, name_rows, stacked
 from realitygap.report.charts.scatter import draw_equality
 from realitygap.report.charts.sheet import Sheet, grid
+from realitygap.study import CalibratedRow, ClosingSummary, TwinRow
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Summary = Mapping[str, Any]
 COLORS = {"none": Ink.RUN, "cells": Ink.PEN2, "encoders": Ink.PEN2, "track": Ink.OURS}
 """Colors by the observation level of the calibration."""
 
 MARKERS = {"none": "o", "cells": "s", "encoders": "s", "track": "D"}
+_OrderMeasure = Literal["srcc_disattenuated", "mmrv_ratio"]
 _GAP = 0.3
 """Space between panels [in]."""
 
@@ -50,7 +51,7 @@ class Words(NamedTuple):
         return f"1 {self.unit}" if n == 1 else f"{n} {self.units}"
 
 
-def words_of(summary: Summary) -> Words:
+def words_of(summary: ClosingSummary) -> Words:
     """Return the words for a study of twins, or of other platforms."""
     label = summary.get("label", "TWIN")
     return (
@@ -58,7 +59,7 @@ def words_of(summary: Summary) -> Words:
     )
 
 
-def draw_closing(summary: Summary) -> dict[str, Drawing]:
+def draw_closing(summary: ClosingSummary) -> dict[str, Drawing]:
     """All figures that the summary of `closing-the-gap` has enough for, by name.
 
     Args:
@@ -78,7 +79,7 @@ def draw_closing(summary: Summary) -> dict[str, Drawing]:
     return drawings
 
 
-def draw_budget(summary: Summary) -> Drawing | None:
+def draw_budget(summary: ClosingSummary) -> Drawing | None:
     """RMS gap against budget, a panel a family: each twin thin, medians thick."""
     words = words_of(summary)
     families = [family for family in summary["plan"]["families"] if _of(summary, family)]
@@ -122,7 +123,7 @@ def draw_budget(summary: Summary) -> Drawing | None:
     return draw_wide(draw, "closing-budget", caption, alt, marks=marks)
 
 
-def _marks_of_budgets(summary: Summary, family: str) -> Iterator[Series]:
+def _marks_of_budgets(summary: ClosingSummary, family: str) -> Iterator[Series]:
     for observe in summary["plan"]["observations"]:
         for name, points in (
             ("median", _budget_medians(summary, family, observe)),
@@ -132,7 +133,9 @@ def _marks_of_budgets(summary: Summary, family: str) -> Iterator[Series]:
                 yield Series(f"{{name}}, {observe}, {{x}} trials: RMS gap {{y}}", np.array(points), name)
 
 
-def _budgets_of_twins(summary: Summary, family: str, observe: str) -> dict[str, list[tuple[int, float]]]:
+def _budgets_of_twins(
+    summary: ClosingSummary, family: str, observe: str
+) -> dict[str, list[tuple[int, float]]]:
     """Return budget and RMS gap of each twin of a family, in order."""
     series = {}
     for twin in _of(summary, family):
@@ -146,7 +149,7 @@ def _budgets_of_twins(summary: Summary, family: str, observe: str) -> dict[str, 
     return series
 
 
-def _budget_medians(summary: Summary, family: str, observe: str) -> list[tuple[int, float]]:
+def _budget_medians(summary: ClosingSummary, family: str, observe: str) -> list[tuple[int, float]]:
     return sorted(
         (row["budget"], row["rms"]["estimate"])
         for row in summary["families"]
@@ -156,7 +159,7 @@ def _budget_medians(summary: Summary, family: str, observe: str) -> list[tuple[i
     )
 
 
-def _budget_lines(axes: Axes, summary: Summary, family: str, observe: str) -> None:
+def _budget_lines(axes: Axes, summary: ClosingSummary, family: str, observe: str) -> None:
     color = COLORS.get(observe, Ink.PEN3)
     for points in _budgets_of_twins(summary, family, observe).values():
         if points:
@@ -167,7 +170,7 @@ def _budget_lines(axes: Axes, summary: Summary, family: str, observe: str) -> No
         draw_line(axes, *zip(*points, strict=True), color=color, linewidth=2.0, marker=marker, markersize=4.5)
 
 
-def draw_scatter(summary: Summary) -> Drawing | None:
+def draw_scatter(summary: ClosingSummary) -> Drawing | None:
     """Draw the mean coverage of each held-out controller in simulation against that on the twin, before and after."""
     budget = summary["budget"]
     kinds = [
@@ -204,6 +207,10 @@ def draw_scatter(summary: Summary) -> Drawing | None:
         panels[0].set_ylabel(f"coverage, {words.label}", labelpad=3)
         return sheet
 
+    longest = max(len(each["source"]) for twins in by_kind.values() for each in twins.values())
+    n_marked = max(
+        1, MOST_MARKS // (longest * len(kinds))
+    )  # twins, from the first, whose controllers have marks
     text = f"{{name}}, controller {{label}}: {{x}} in simulation, {{y}} on the {words.robot}"
     marks = tuple(
         Panel(
@@ -212,7 +219,7 @@ def draw_scatter(summary: Summary) -> Drawing | None:
                 Series(
                     text, np.column_stack([each["source"], each["target"]]), name, _numbered(each["source"])
                 )
-                for name, each in list(by_kind[kind].items())[: _most_series(by_kind, len(kinds))]
+                for name, each in list(by_kind[kind].items())[:n_marked]
             ),
             (3, 3),
         )
@@ -225,13 +232,7 @@ def _numbered(values: Sequence[float]) -> tuple[str, ...]:
     return tuple(str(k + 1) for k in range(len(values)))
 
 
-def _most_series(by_kind: Mapping[str, Mapping[str, Any]], n_kinds: int) -> int:
-    """Return the number of twins, from the first, whose controllers have marks."""
-    longest = max(len(each["source"]) for twins in by_kind.values() for each in twins.values())
-    return max(1, MOST_MARKS // (longest * n_kinds))
-
-
-def draw_strategies(summary: Summary) -> Drawing | None:
+def draw_strategies(summary: ClosingSummary) -> Drawing | None:
     """Quality on the twins by strategy: each twin, and the mean with its interval."""
     rows = summary["strategies"]
     if not rows:
@@ -263,7 +264,7 @@ def draw_strategies(summary: Summary) -> Drawing | None:
         name_rows(axes, [row["strategy"] for row in rows], grid=False)
         for place, row in enumerate(rows):
             color = Ink.OURS if row["strategy"].startswith("posterior") else Ink.RUN
-            ends = None if row["low"] is None else (row["low"], row["high"])
+            ends = None if row["low"] is None or row["high"] is None else (row["low"], row["high"])
             dots = np.array(values[row["strategy"]])
             draw_row(axes, place, Row(row["estimate"], ends, dots, offsets[row["strategy"]], color, color))
         axes.set_xlabel("coverage on the twin, TWIN", labelpad=2)
@@ -288,7 +289,7 @@ def draw_strategies(summary: Summary) -> Drawing | None:
     return draw_wide(draw, "closing-strategies", caption, alt, marks=marks)
 
 
-def draw_order(summary: Summary) -> Drawing | None:
+def draw_order(summary: ClosingSummary) -> Drawing | None:
     """Draw SRCC and MMRV of each twin, before and after, with their goals."""
     if not summary["twins"]:
         return None
@@ -305,11 +306,14 @@ def draw_order(summary: Summary) -> Drawing | None:
         f"Calibrated by {budget} trials."
     )
     alt = "Disattenuated SRCC, and MMRV over its floor, before and after calibrating."
-    goals = {"srcc_disattenuated": 0.95, "mmrv_ratio": 2.0}
-    titles = {"srcc_disattenuated": "Disattenuated SRCC", "mmrv_ratio": "MMRV over its floor"}
+    goals: dict[_OrderMeasure, float] = {"srcc_disattenuated": 0.95, "mmrv_ratio": 2.0}
+    titles: dict[_OrderMeasure, str] = {
+        "srcc_disattenuated": "Disattenuated SRCC",
+        "mmrv_ratio": "MMRV over its floor",
+    }
     by_measure = {
         measure: {
-            label: (kind, [(twin, each[measure]) for twin, each in gaps if each[measure] is not None])
+            label: (kind, [(twin, value) for twin, each in gaps if (value := each[measure]) is not None])
             for label, (kind, gaps) in groups.items()
         }
         for measure in goals
@@ -369,13 +373,13 @@ def _marks_of_order(
 # parts
 
 
-def _of(summary: Summary, family: str) -> list[Summary]:
+def _of(summary: ClosingSummary, family: str) -> list[TwinRow]:
     return [
         twin for twin in summary["twins"] if twin["family"] == family and twin["rms"]["estimate"] is not None
     ]
 
 
-def _after(summary: Summary, observe: str, budget: int) -> list[tuple[Summary, Summary]]:
+def _after(summary: ClosingSummary, observe: str, budget: int) -> list[tuple[TwinRow, CalibratedRow]]:
     return [
         (twin, each)
         for twin in summary["twins"]

@@ -11,6 +11,7 @@ from ._calibrate.ordered import make_calibration
 from ._calibrate.whole import calibrate_all
 from ._camera import CameraObserver, marks_of, read_camera, tag_of
 from ._closing.plan import PLANS, ClosingPlan
+from ._closing.rows import CalibratedRow, ClosingSummary, GoalRow, TwinRow
 from ._closing.study import ClosingProgress, closing_the_gap
 from ._closing.summary import summarize_closing
 from ._code import AllowCode, check_files, python_tasks, task_named
@@ -44,7 +45,7 @@ from ._transfer.ordered import run_transfer
 from ._transfer.result import TransferResult
 from ._transfer.strategies import choose_condition, transfer
 from ._trial_export import export_trials, write_trials
-from ._try_on import TriedGenome, try_genome, try_on
+from ._try_on import try_genome, try_on
 
 __all__ = [
     "DEFAULT_NEAT",
@@ -53,13 +54,16 @@ __all__ = [
     "PLANS",
     "SECTIONS",
     "AllowCode",
+    "CalibratedRow",
     "CameraObserver",
     "ClosingPlan",
     "ClosingProgress",
+    "ClosingSummary",
     "ConditionNotes",
     "GapBetween",
     "GapPlan",
     "GapStudy",
+    "GoalRow",
     "Progress",
     "ReportSection",
     "StoppedByPerson",
@@ -71,7 +75,7 @@ __all__ = [
     "TransferResult",
     "TrialToTrack",
     "TrialsSection",
-    "TriedGenome",
+    "TwinRow",
     "calibrate",
     "calibrate_all",
     "calibrate_from_log",

@@ -24,6 +24,7 @@ from realitygap.trials import Target
 from .._calibrate.whole import calibrate_all
 from .._transfer.strategies import choose_condition
 from .plan import ClosingPlan, TwinName, adopt_plan, plan_of
+from .rows import ClosingSummary
 from .summary import summarize_closing
 from .twin import ClosingTwin
 
@@ -49,7 +50,7 @@ def closing_the_gap(
     *,
     plan: ClosingPlan | None = None,
     tell: Callable[[ClosingProgress], None] | None = None,
-) -> dict[str, Any]:
+) -> ClosingSummary:
     """Run the study, or the missing parts of it, and summarize it; as `realitygap closing-the-gap`.
 
     Each twin is drawn from its family into a file, which only the process that simulates it reads. The held-out
@@ -82,7 +83,7 @@ def closing_the_gap(
 
 def _run(
     folder: Path, plan: ClosingPlan, processes: int, tell: Callable[[ClosingProgress], None] | None
-) -> dict[str, Any]:
+) -> ClosingSummary:
     """Run what is missing in a folder."""
     _write_twins(folder, plan)
     since = time.perf_counter()

@@ -17,6 +17,18 @@ from realitygap.stats import Estimate, Range, mean_interval, median_interval, sh
 from realitygap.world import Fitted
 
 from .plan import ClosingPlan, TwinName, read_plan
+from .rows import (
+    CalibratedRow,
+    ClosingSummary,
+    FamilyRow,
+    GoalRow,
+    MissRow,
+    NumberRow,
+    OrderRow,
+    StrategyRow,
+    TwinRow,
+    UnknownRow,
+)
 
 STANDARD_ERRORS = 3.0
 """A twin counts where the simulator as it is differs from it by more than so many standard errors."""
@@ -34,10 +46,11 @@ KINDS = ("random", "champions")
 LEAST_SRCC = 0.95
 MOST_MMRV = 2.0
 LEAST_OVER_DIRECT = 0.8
-Row = dict[str, Any]
+Unit = dict[str, Any]
+"""The result of one unit, as its file has it."""
 
 
-def summarize_closing(folder: str | Path) -> dict[str, Any]:
+def summarize_closing(folder: str | Path) -> ClosingSummary:
     """Summarize the existing parts of the study in a folder, and list the missing ones.
 
     Returns:
@@ -70,9 +83,9 @@ def summarize_closing(folder: str | Path) -> dict[str, Any]:
     }
 
 
-def _read_units(folder: Path, plan: ClosingPlan) -> dict[str, dict[str, Row]]:
+def _read_units(folder: Path, plan: ClosingPlan) -> dict[str, dict[str, Unit]]:
     """Read the existing results, by twin and unit."""
-    found: dict[str, dict[str, Row]] = {}
+    found: dict[str, dict[str, Unit]] = {}
     for name in plan.names:
         for unit in plan.units(name):
             path = folder / "units" / f"{name}-{unit}.json"
@@ -89,7 +102,7 @@ def _goal_budget(plan: ClosingPlan) -> int:
 # a twin
 
 
-def _twin(name: TwinName, plan: ClosingPlan, units: dict[str, Row]) -> Row | None:
+def _twin(name: TwinName, plan: ClosingPlan, units: dict[str, Unit]) -> TwinRow | None:
     """Return the results of a twin, None before its gap to the uncalibrated simulator is measured."""
     before = units.get("gap-none-0")
     if before is None:
@@ -97,7 +110,7 @@ def _twin(name: TwinName, plan: ClosingPlan, units: dict[str, Row]) -> Row | Non
     rms = before["gap"]["rms"]
     error = standard_error(rms)
     after = [_calibrated(units[unit], rms) for unit in plan.units(name) if unit in units and _is_after(unit)]
-    row: Row = {
+    row: TwinRow = {
         "twin": str(name),
         "family": name.family,
         "rms": rms,
@@ -119,14 +132,14 @@ def _is_after(unit: str) -> bool:
     return unit.startswith("gap-") and unit != "gap-none-0"
 
 
-def standard_error(estimate: Row) -> float | None:
+def standard_error(estimate: NumberRow) -> float | None:
     """Return the standard error of a figure by its 95 % interval, as of a normal one; None without an interval."""
     if estimate["low"] is None or estimate["high"] is None:
         return None
     return float(estimate["high"] - estimate["low"]) / (2 * NORMAL_95)
 
 
-def _calibrated(unit: Row, before: Row) -> Row:
+def _calibrated(unit: Unit, before: NumberRow) -> CalibratedRow:
     """Return the fall of the gap with one calibration, and the checks of the fit."""
     after, fit = unit["gap"]["rms"], unit["calibration"]
     known = after["estimate"] is not None and before["estimate"]
@@ -147,22 +160,26 @@ def _calibrated(unit: Row, before: Row) -> Row:
     }
 
 
-def _measures(unit: Row) -> Row:
+def _measures(unit: Unit) -> OrderRow:
     """Return the numbers of a gap that figures need."""
     gap = unit["gap"]
-    names = ("srcc", "srcc_disattenuated", "mmrv", "mmrv_floor", "level")
-    found: Row = {name: gap[name]["estimate"] for name in names}
-    floor, mmrv = found["mmrv_floor"], found["mmrv"]
-    found["mmrv_ratio"] = mmrv / floor if mmrv is not None and floor else None
-    return found
+    mmrv, floor = gap["mmrv"]["estimate"], gap["mmrv_floor"]["estimate"]
+    return {
+        "srcc": gap["srcc"]["estimate"],
+        "srcc_disattenuated": gap["srcc_disattenuated"]["estimate"],
+        "mmrv": mmrv,
+        "mmrv_floor": floor,
+        "level": gap["level"]["estimate"],
+        "mmrv_ratio": mmrv / floor if mmrv is not None and floor else None,
+    }
 
 
 # families and strategies
 
 
-def _families(plan: ClosingPlan, twins: Sequence[Row]) -> list[Row]:
+def _families(plan: ClosingPlan, twins: Sequence[TwinRow]) -> list[FamilyRow]:
     """Return the RMS gap by family, observation and budget: medians over all twins, and over those that count."""
-    rows: list[Row] = []
+    rows: list[FamilyRow] = []
     for family in plan.families:
         of_family = [twin for twin in twins if twin["family"] == family]
         rows.append(_family(family, "none", 0, of_family, lambda twin: (twin["rms"], 0.0)))
@@ -170,8 +187,8 @@ def _families(plan: ClosingPlan, twins: Sequence[Row]) -> list[Row]:
             for budget in sorted(each for each in plan.budgets if each):
 
                 def after(
-                    twin: Row, observe: str = observe, budget: int = budget
-                ) -> tuple[Row, float] | None:
+                    twin: TwinRow, observe: str = observe, budget: int = budget
+                ) -> tuple[NumberRow, float | None] | None:
                     found = _after(twin, observe, budget)
                     return None if found is None else (found["rms"], found["fall"])
 
@@ -183,9 +200,9 @@ def _family(
     family: str,
     observe: str,
     budget: int,
-    twins: Sequence[Row],
-    read: Callable[[Row], tuple[Row, float | None] | None],
-) -> Row:
+    twins: Sequence[TwinRow],
+    read: Callable[[TwinRow], tuple[NumberRow, float | None] | None],
+) -> FamilyRow:
     units = [(twin, each) for twin in twins if (each := read(twin)) is not None]
     values = [each[0]["estimate"] for _, each in units if each[0]["estimate"] is not None]
     falls = [each[1] for twin, each in units if twin["counts"] and each[1] is not None]
@@ -200,13 +217,13 @@ def _family(
     }
 
 
-def _after(twin: Row, observe: str, budget: int) -> Row | None:
+def _after(twin: TwinRow, observe: str, budget: int) -> CalibratedRow | None:
     return next(
         (each for each in twin["calibrated"] if (each["observe"], each["budget"]) == (observe, budget)), None
     )
 
 
-def _strategies(twins: Sequence[Row]) -> list[Row]:
+def _strategies(twins: Sequence[TwinRow]) -> list[StrategyRow]:
     """Return the quality on the twins by strategy: mean over twins, with an interval over twins."""
     found: dict[str, list[float]] = {}
     for twin in twins:
@@ -221,7 +238,7 @@ def _strategies(twins: Sequence[Row]) -> list[Row]:
 # goals
 
 
-def _goals(plan: ClosingPlan, twins: Sequence[Row], budget: int) -> Iterable[Row]:
+def _goals(plan: ClosingPlan, twins: Sequence[TwinRow], budget: int) -> Iterable[GoalRow]:
     if plan.platforms:
         for family in plan.families:
             yield from _goals_of_platform(plan, family, twins, budget)
@@ -245,7 +262,9 @@ def _goals(plan: ClosingPlan, twins: Sequence[Row], budget: int) -> Iterable[Row
             yield _wins(counted, observe, other, least)
 
 
-def _goals_of_platform(plan: ClosingPlan, family: str, twins: Sequence[Row], budget: int) -> Iterable[Row]:
+def _goals_of_platform(
+    plan: ClosingPlan, family: str, twins: Sequence[TwinRow], budget: int
+) -> Iterable[GoalRow]:
     """Yield goals of one robot over all its sittings: of all controllers, and of each kind."""
     pairs = [(twin, after) for twin in twins if twin["family"] == family for after in twin["calibrated"]]
     for observe in plan.observations:
@@ -254,10 +273,11 @@ def _goals_of_platform(plan: ClosingPlan, family: str, twins: Sequence[Row], bud
         at = [pair for pair in pairs if (pair[1]["observe"], pair[1]["budget"]) == (observe, budget)]
         title = f"{family}, {observe}"
         for part in ("", *KINDS):
-            gaps = [(row["parts"][part] if part else row["rms"])["estimate"] for pair in at for row in pair]
-            figure = pooled_fall(gaps[::2], gaps[1::2])
+            gaps = [[(row["parts"][part] if part else row["rms"])["estimate"] for row in pair] for pair in at]
+            both = [(before, after) for before, after in gaps if before is not None and after is not None]
+            figure = pooled_fall([before for before, _ in both], [after for _, after in both])
             name = f"fall of the RMS gap, {title}" + (f", {part}" if part else "")
-            yield _goal(name, figure, len(at), FALLS[observe], "at least", [])
+            yield _goal(name, figure, len(both), FALLS[observe], "at least", [])
         order = [after["gap"]["srcc_disattenuated"] for _, after in at]
         known = [value for value in order if value is not None]
         figure = _mean(known, (-1.0, 1.0))
@@ -285,8 +305,8 @@ def is_met(low: float | None, high: float | None, goal: float, sense: str) -> bo
 
 
 def _median_goal(
-    name: str, found: Sequence[tuple[Row, Row, float | None]], goal: float, *, above: bool
-) -> Row:
+    name: str, found: Sequence[tuple[TwinRow, CalibratedRow, float | None]], goal: float, *, above: bool
+) -> GoalRow:
     """Return a goal for a median over twins; twins without the figure are listed and not counted."""
     known = [(twin, after, value) for twin, after, value in found if value is not None]
     figure = median_interval([value for _, _, value in known])
@@ -310,8 +330,14 @@ def _median_goal(
 
 
 def _goal(
-    name: str, figure: Estimate, n: int, goal: float, sense: str, why: list[Row], unknown: Sequence[Row] = ()
-) -> Row:
+    name: str,
+    figure: Estimate,
+    n: int,
+    goal: float,
+    sense: str,
+    why: list[MissRow],
+    unknown: Sequence[UnknownRow] = (),
+) -> GoalRow:
     return {
         "name": name,
         "figure": figure.value,
@@ -326,7 +352,9 @@ def _goal(
     }
 
 
-def _no_family_worse(plan: ClosingPlan, observe: str, falls: Sequence[tuple[Row, Row, float]]) -> Row:
+def _no_family_worse(
+    plan: ClosingPlan, observe: str, falls: Sequence[tuple[TwinRow, CalibratedRow, float]]
+) -> GoalRow:
     """Return the smallest median fall of a family."""
     by_family = {
         family: [value for twin, _, value in falls if twin["family"] == family] for family in plan.families
@@ -345,7 +373,7 @@ def _no_family_worse(plan: ClosingPlan, observe: str, falls: Sequence[tuple[Row,
     )
 
 
-def _wins(counted: Sequence[Row], observe: str, other: str, least: float) -> Row:
+def _wins(counted: Sequence[TwinRow], observe: str, other: str, least: float) -> GoalRow:
     """Return the share of twins on which `posterior` does better than another strategy; a draw is half a win."""
     pairs = []
     for twin in counted:
@@ -373,7 +401,7 @@ def _wins(counted: Sequence[Row], observe: str, other: str, least: float) -> Row
     )
 
 
-def _why_unknown(name: str, after: Row) -> str:
+def _why_unknown(name: str, after: CalibratedRow) -> str:
     """Return the reason why a twin has no such figure."""
     gap = after["gap"]
     if name.startswith("MMRV") and gap["mmrv_floor"] == 0 and gap["mmrv"] is not None:
@@ -381,23 +409,24 @@ def _why_unknown(name: str, after: Row) -> str:
     return "it has too few trials to decide"
 
 
-def _why(row: Row, after: Row, value: float) -> Row:
+def _why(row: TwinRow, after: CalibratedRow, value: float) -> MissRow:
     """Return the facts about a twin that misses a goal."""
-    names = ("misspecified", "misspecification_p", "at_prior_end")
     return {
         "twin": row["twin"],
         "family": row["family"],
         "figure": value,
         "rms_before": row["rms"]["estimate"],
         "rms_after": after["rms"]["estimate"],
-        **{name: after[name] for name in names},
+        "misspecified": after["misspecified"],
+        "misspecification_p": after["misspecification_p"],
+        "at_prior_end": after["at_prior_end"],
     }
 
 
 # intervals
 
 
-def _row(estimate: Estimate) -> Row:
+def _row(estimate: Estimate) -> NumberRow:
     """Return the number and the ends of its interval, as they are in a file."""
     return {"estimate": estimate.value, "low": estimate.low, "high": estimate.high}
 

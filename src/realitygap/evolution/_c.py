@@ -13,7 +13,9 @@ import numpy as np
 from realitygap._version import __version__
 from realitygap.kernels.neat.network import IDENTITY_LIMIT
 
+from ._export import check_network
 from ._genome import Network
+from ._interface import given_names
 
 _IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
@@ -115,18 +117,15 @@ def to_c(
         ValueError: Another number of names than of inputs or outputs, an unknown precision, or a name that C does not
             take.
     """
-    if not isinstance(network, Network):
-        raise TypeError(f"network is {network!r}, expected a Network, such as genome.network().")
-    if precision not in ("double", "single"):
-        raise ValueError(f"precision is {precision!r}, expected 'double' or 'single'.")
+    check_network(network, precision)
     if not _IDENTIFIER.fullmatch(name) or name in _RESERVED:
         raise ValueError(f"name is {name!r}, expected a name that C takes, such as 'network'.")
     if network.n_inputs == 0:
         raise ValueError(
             "This network has no inputs but the constant one, so its outputs are constants, too."
         )
-    inputs = _names("input_names", input_names, network.n_inputs)
-    outputs = _names("output_names", output_names, network.n_outputs)
+    inputs = given_names("input_names", input_names, range(network.n_inputs))
+    outputs = given_names("output_names", output_names, range(network.n_outputs))
     values = network.to_dict()
     single = precision == "single"
     guard = name.upper()
@@ -152,12 +151,6 @@ def to_c(
         body=_body(values, common, single=single),
         first_output=values["n_inputs"],
     )
-
-
-def _names(what: str, given: Sequence[str] | None, n: int) -> list[str]:
-    if given is not None and len(given) != n:
-        raise ValueError(f"{what} has {len(given)} names, expected {n}.")
-    return [f"{k}" for k in range(n)] if given is None else list(given)
 
 
 def _in_comment(names: Sequence[str]) -> str:

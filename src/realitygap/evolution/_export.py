@@ -14,6 +14,7 @@ from realitygap._version import __version__
 from realitygap.errors import from_extra
 
 from ._genome import Genome, Network
+from ._interface import given_names
 from ._json import head
 from ._picture import node_names
 
@@ -50,16 +51,9 @@ def to_onnx(
         TypeError: Something else than a network, such as a genome.
         ValueError: Another number of names than of inputs or outputs, or an unknown precision.
     """
-    if not isinstance(network, Network):
-        raise TypeError(f"network is {network!r}, expected a Network, such as genome.network().")
-    if precision not in ("double", "single"):
-        raise ValueError(f"precision is {precision!r}, expected 'double' or 'single'.")
-    for what, given, n in (
-        ("input_names", input_names, network.n_inputs),
-        ("output_names", output_names, network.n_outputs),
-    ):
-        if given is not None and len(given) != n:
-            raise ValueError(f"{what} has {len(given)} names, expected {n}.")
+    check_network(network, precision)
+    given_names("input_names", input_names, range(network.n_inputs))
+    given_names("output_names", output_names, range(network.n_outputs))
     onnx = from_extra("onnx", "export")
     values = network.to_dict()
     parts = _Parts(values, np.float64 if precision == "double" else np.float32)
@@ -88,6 +82,19 @@ def to_onnx(
     )
     onnx.checker.check_model(model, full_check=True)
     return model
+
+
+def check_network(network: object, precision: str) -> None:
+    """Raise an error if something is no network, or there is no such precision.
+
+    Raises:
+        TypeError: Something else than a network, such as a genome.
+        ValueError: An unknown precision.
+    """
+    if not isinstance(network, Network):
+        raise TypeError(f"network is {network!r}, expected a Network, such as genome.network().")
+    if precision not in ("double", "single"):
+        raise ValueError(f"precision is {precision!r}, expected 'double' or 'single'.")
 
 
 Ends = tuple[list[tuple[str, int]], list[tuple[str, int]]]

@@ -161,3 +161,14 @@ def _part(name: str, steps: int) -> Callable[[Sequence[float], bool, int, Channe
     if kind == "range" and index.isdecimal():
         return lambda readings, stalled, step, channels: readings[int(index)]
     return lambda readings, stalled, step, channels: channels[name]
+
+
+def given_names(what: str, given: Sequence[str] | None, default: Sequence[object]) -> list[str]:
+    """Return the names of inputs or outputs that are given, or the default ones.
+
+    Raises:
+        ValueError: Another number of names than of default ones.
+    """
+    if given is not None and len(given) != len(default):
+        raise ValueError(f"{what} has {len(given)} names, expected {len(default)}.")
+    return [str(name) for name in default] if given is None else list(given)

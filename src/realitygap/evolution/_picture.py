@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from realitygap.drawing import Card, Disc, Ink, Line, Picture, Point, Shape, Table, Text, card_of, picture_of
 
 from ._genome import ConnectionGene, Genome
+from ._interface import given_names
 
 NODE = 5.5  # radius of a node [pt]
 _ACROSS, _HEIGHT = (
@@ -110,15 +111,13 @@ def node_names(
 ) -> dict[int, str]:
     """Return the names of inputs and outputs, by id. Raise an error if the number of names is wrong."""
     rules = genome.rules
-    inputs = input_names or ["bias" if k == rules.bias_input else f"input {k}" for k in range(rules.n_inputs)]
-    outputs = output_names or [f"output {k}" for k in range(rules.n_outputs)]
-    for which, given, expected in (
-        ("input", inputs, rules.n_inputs),
-        ("output", outputs, rules.n_outputs),
-    ):
-        if len(given) != expected:
-            raise ValueError(f"{which}_names has {len(given)} names, expected {expected}.")
-    return dict(enumerate([*inputs, *outputs]))
+    inputs = ["bias" if k == rules.bias_input else f"input {k}" for k in range(rules.n_inputs)]
+    outputs = [f"output {k}" for k in range(rules.n_outputs)]
+    names = [
+        *given_names("input_names", input_names or None, inputs),
+        *given_names("output_names", output_names or None, outputs),
+    ]
+    return dict(enumerate(names))
 
 
 def _places(genome: Genome, links: Sequence[ConnectionGene]) -> dict[int, Point]:

@@ -33,7 +33,7 @@ from ._ranks import (
     reliability,
     trials_for_reliability,
 )
-from ._resampling import bootstrap
+from ._resampling import bootstrap, over_controllers
 from ._result import GapResult
 from ._side import GapSide, Values
 
@@ -47,10 +47,6 @@ LEAST_RELIABILITY = 0.2
 
 WANTED_RELIABILITY = 0.5
 """Reliability for which the required number of trials is reported."""
-
-_NO_ORDER_LEFT = (
-    "Noise leaves no order in most resamples, so there is no interval. Drive more trials of each controller."
-)
 
 _FEW_SPLITS = 6
 """Halves in each resample, whose number makes up for how few they are."""
@@ -155,12 +151,7 @@ class _Work:
         return self._with_ends(value, ends)
 
     def _with_ends(self, value: float, ends: Ends | None, method: Method = "percentiles") -> Estimate:
-        if ends is None and self.n < SMALLEST_N:
-            return Estimate.of_few(value, self.n, SMALLEST_N, "controllers")
-        if ends is None:
-            return Estimate(value, None, None, self.n, _NO_ORDER_LEFT)
-        # a statistic of ranks lies lower in resamples than in the sample; no interval leaves its estimate out
-        return Estimate(value, min(ends[0], value), max(ends[1], value), self.n, method=method)
+        return over_controllers(value, ends, self.n, method)
 
     # level
 

@@ -8,6 +8,8 @@ from collections.abc import Callable, Iterator, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from realitygap.stats import SMALLEST_N, Ends, Estimate, Method
+
 from ._side import GapSide, Values
 
 Statistic = Callable[[Values, Values], Values]
@@ -103,6 +105,21 @@ def _drawn(residuals: Values, who: NDArray[np.int64], rng: np.random.Generator) 
     r = residuals.shape[1]
     which = rng.integers(0, r, (*who.shape, r))
     return residuals[who[:, :, None], which]
+
+
+_NO_ORDER_LEFT = (
+    "Noise leaves no order in most resamples, so there is no interval. Drive more trials of each controller."
+)
+
+
+def over_controllers(value: float, ends: Ends | None, n: int, method: Method = "percentiles") -> Estimate:
+    """Return a number over n controllers with the ends of its interval, or why it has none."""
+    if ends is None and n < SMALLEST_N:
+        return Estimate.of_few(value, n, SMALLEST_N, "controllers")
+    if ends is None:
+        return Estimate(value, None, None, n, _NO_ORDER_LEFT)
+    # a statistic of ranks lies lower in resamples than in the sample; no interval leaves its estimate out
+    return Estimate(value, min(ends[0], value), max(ends[1], value), n, method=method)
 
 
 def bootstrap(

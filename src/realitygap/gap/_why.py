@@ -10,9 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from realitygap.stats import SMALLEST_N, Ends, Estimate, percentile_interval
+from realitygap.stats import Estimate, percentile_interval
 
 from ._level import rms_interval, rms_of
+from ._resampling import over_controllers
 from ._side import Values
 
 RESAMPLES = 2_000
@@ -149,18 +150,11 @@ def _rms(value: float, differences: Values, squares: Values, drawn: Values) -> E
     ends = rms_interval(
         differences[0], squares[0], drawn, more_variance=more_variance, most=1.0
     )  # differences in coverage
-    return _with_ends(value, ends, squares.shape[1])
+    return over_controllers(float(value), ends, squares.shape[1])
 
 
 def _estimate(value: float, drawn: Values, n: int) -> Estimate:
-    return _with_ends(value, percentile_interval(drawn, n), n)
-
-
-def _with_ends(value: float, ends: Ends | None, n: int) -> Estimate:
-    if ends is None:
-        return Estimate.of_few(float(value), n, SMALLEST_N, "controllers")
-    value = float(value)
-    return Estimate(value, min(ends[0], value), max(ends[1], value), n, method="percentiles")
+    return over_controllers(float(value), percentile_interval(drawn, n), n)
 
 
 # Shapley values

@@ -212,13 +212,13 @@ def test_every_number_of_the_robot_is_of_one_part():
 def test_the_part_that_differs_carries_the_gap():
     controllers = sample_controllers("random", 10, 1)
     hidden = {"drive.track": 0.21}
-    target = study_gap(sim(), sim(7, **hidden), controllers, trials=8).target
+    gap = study_gap(sim(), sim(7, **hidden), controllers, trials=8)
     calibration = Calibration(
         kind="all", robot="scribbler-s2-fluke2", target="sim", label="SIM", observe="track", trials=1,
         date="2026-01-01", method="known", numbers={**hidden, "contact.friction": 0.3},
         draws={"drive.track": (0.209, 0.211), "contact.friction": (0.3, 0.3)},
     )  # fmt: skip
-    found = why_gap(calibration, ARENA, [each.genome for each in controllers], target, draws=2, trials=4)
+    found = why_gap(calibration, gap, draws=2, trials=4)
     falls = dict(zip(found.parts, found.falls, strict=True))
     assert found.after.value < 0.5 * found.before.value
     assert falls["turn per step"].value == pytest.approx(found.before.value - found.after.value, abs=1e-6)
@@ -227,19 +227,17 @@ def test_the_part_that_differs_carries_the_gap():
     assert "Change this next: " in found.advice
 
 
-def test_why_has_the_commands_of_the_calibration_last_as_long_as_they_did():
+def test_why_has_commands_last_as_long_as_in_the_gap():
     controllers = sample_controllers("random", 6, 1)
-    target = study_gap(sim(), sim(7), controllers, trials=2).target
+    gap = study_gap(sim(), sim(7), controllers, trials=2)
     calibration = Calibration(
         kind="path", robot="scribbler-s2-fluke2", target="twin", label="TWIN", observe="cells", trials=10, step_s=1.0,
         date="2026-01-01", method="known", numbers={"drive.track": 0.16},
     )  # fmt: skip
-    genomes = [each.genome for each in controllers]
-    said, given, other = (
-        why_gap(calibration, ARENA, genomes, target, trials=2, **more).before.value
-        for more in ({}, {"step_s": 1.0}, {"step_s": 0.5})
+    slow, fast = (
+        why_gap(calibration, replace(gap, step_s=step_s), trials=2).before.value for step_s in (1.0, 0.5)
     )
-    assert said == given != other
+    assert slow != fast
 
 
 def test_why_needs_numbers_to_switch_and_noise_to_tell(some):
@@ -247,11 +245,11 @@ def test_why_needs_numbers_to_switch_and_noise_to_tell(some):
         kind="all", robot="scribbler-s2-fluke2", target="sim", label="SIM", observe="cells", trials=1,
         date="2026-01-01", method="known",
     )  # fmt: skip
-    genomes = [each.genome for each in some]
+    gap = study_gap(sim(), sim(), some, trials=2)
     with pytest.raises(StudyError, match="changes no number"):
-        why_gap(nothing, ARENA, genomes, GapSide("t", "SIM", np.zeros((6, 2))))
+        why_gap(nothing, gap)
     with pytest.raises(StudyError, match="one trial"):
-        why_gap(nothing, ARENA, genomes, GapSide("t", "SIM", np.zeros((6, 1))))
+        why_gap(nothing, replace(gap, target=GapSide("t", "SIM", np.zeros((6, 1)))))
 
 
 @pytest.mark.long

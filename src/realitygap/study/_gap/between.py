@@ -132,16 +132,7 @@ def gap_between(
     parts = None
     if order.why and calibration is not None:
         tell_of("Switching parts of the model: 64 choices, each with draws from the posterior.")
-        genomes = [controller.genome for controller in setting.controllers]
-        parts = why_gap(
-            calibration,
-            setting.arena,
-            genomes,
-            gap.target,
-            steps=setting.steps,
-            step_s=gap.step_s,
-            seed=order.seed,
-        )
+        parts = why_gap(calibration, gap, steps=setting.steps, seed=order.seed)
     return GapBetween(gap, parts, order if task is None and arena is None else None)
 
 

@@ -10,9 +10,11 @@ from numpy.typing import NDArray
 
 from realitygap.errors import StudyError
 from realitygap.evolution import Genome
-from realitygap.gap import GapSide, Why, coalitions, explain_gap, square_differences
+from realitygap.gap import Why, coalitions, explain_gap, square_differences
 from realitygap.platforms import Play, SimEnsemble, SimPlatform, split_spec
 from realitygap.world import Arena, Calibration, load_robot, read_calibration
+
+from .study import STEPS, GapStudy
 
 PARTS = ("body", "contact", "sensor noise", "motor", "turn per step", "delay")
 """Parts of a model that are replaced separately. Each number of a robot is in one of them."""
@@ -55,12 +57,9 @@ def calibration_of(spec: str) -> Calibration | None:
 
 def why_gap(
     calibration: Calibration,
-    arena: Arena,
-    genomes: Sequence[Genome],
-    target: GapSide,
+    gap: GapStudy,
     *,
-    steps: int = 100,
-    step_s: float | None = None,
+    steps: int = STEPS,
     seed: int = 1,
     draws: int = DRAWS,
     trials: int = TRIALS,
@@ -72,11 +71,8 @@ def why_gap(
 
     Args:
         calibration: Calibration whose numbers replace those of the robot.
-        arena: Arena of the trials.
-        genomes: The controllers; row k of the target is of genome k.
-        target: Their trials on the target, at least 2 of each.
+        gap: The gap, with at least 2 trials of each controller on the target.
         steps: Commands in a trial.
-        step_s: Duration of each command [s]. Default: that of the calibration, or otherwise that of the robot file.
         seed: Seed of the noise.
         draws: Number of draws from the posterior, in addition to the estimate, for intervals; fewer if the calibration
             has fewer.
@@ -85,6 +81,7 @@ def why_gap(
     Raises:
         StudyError: The calibration changes nothing, or the target has one trial of each controller.
     """
+    target, genomes = gap.target, [each.genome for each in gap.controllers]
     if target.trials < 2:
         raise StudyError(
             f"{target.name} has one trial of each controller, so noise and gap cannot be separated. Request 2 "
@@ -99,8 +96,8 @@ def why_gap(
             "does: realitygap calibrate all."
         )
     values = _choices(default, _rows(fitted, calibration, draws))
-    pace = {"step_s": step_s} if step_s else calibration.step
-    quality = _carry_out(SimPlatform(robot=robot, **pace), arena, genomes, steps, values, seed, trials)
+    platform = SimPlatform(robot=robot, step_s=gap.step_s)
+    quality = _carry_out(platform, gap.arena, genomes, steps, values, seed, trials)
     m, c = len(quality), len(genomes)
     squares = square_differences(quality, np.broadcast_to(target.values, (m, *target.values.shape)))
     differences = target.means - quality.mean(axis=2)

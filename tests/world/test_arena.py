@@ -68,7 +68,7 @@ def test_jyro_robot_is_the_paper_s():
 def test_corners_of_a_cell_lie_within_the_grid_and_around_the_cell():
     grid = Grid(0.5, -1.0, 0.25, columns=4, rows=2)
     assert grid.corners(0) == ((0.5, -1.0), (0.75, -1.0), (0.75, -0.75), (0.5, -0.75))
-    assert grid.corners(grid.n_cells - 1)[2] == (grid.right, grid.top) == (1.5, -0.5)
+    assert grid.corners(grid.n_cells - 1)[2] == (grid.right_end, grid.upper_end) == (1.5, -0.5)
     for cell in range(grid.n_cells):
         xs, ys = zip(*grid.corners(cell), strict=True)
         assert grid.cell_at(sum(xs) / 4, sum(ys) / 4) == cell

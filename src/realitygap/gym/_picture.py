@@ -55,7 +55,7 @@ def _placed(points: Points, pose: Pose) -> Points:
 def _extent(arena: Arena) -> tuple[float, float, float, float]:
     """Return left, bottom, right and top of what a picture shows [m]."""
     grid = arena.grid
-    points = [(grid.x, grid.y), (grid.right, grid.top)]
+    points = [(grid.x, grid.y), (grid.right_end, grid.upper_end)]
     points += [(x, y) for x1, y1, x2, y2 in arena.walls for x, y in ((x1, y1), (x2, y2))]
     points += [(light.x, light.y) for light in arena.lights]
     xs, ys = np.array(points).T

@@ -134,10 +134,10 @@ class SheetLayout:
         """Return lines of the grid: which coordinate stays, its value, and between which values the other goes [m]."""
         grid = self.grid
         upright: list[GridLine] = [
-            ("x", grid.x + k * grid.cell, grid.y, grid.top) for k in range(grid.columns + 1)
+            ("x", grid.x + k * grid.cell, grid.y, grid.upper_end) for k in range(grid.columns + 1)
         ]
         level: list[GridLine] = [
-            ("y", grid.y + k * grid.cell, grid.x, grid.right) for k in range(grid.rows + 1)
+            ("y", grid.y + k * grid.cell, grid.x, grid.right_end) for k in range(grid.rows + 1)
         ]
         return [*upright, *level]
 

@@ -140,7 +140,7 @@ def separate_pens(
 
 def _around_cells(layout: SheetLayout) -> Box:
     grid, out = layout.grid, AROUND
-    return grid.x - out, grid.y - out, grid.right + out, grid.top + out
+    return grid.x - out, grid.y - out, grid.right_end + out, grid.upper_end + out
 
 
 def _part(picture: Floats, whole: Box, box: Box, px_per_m: float) -> Floats:

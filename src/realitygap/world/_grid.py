@@ -41,12 +41,12 @@ class Grid:
         return self.columns * self.rows
 
     @property
-    def right(self) -> float:
+    def right_end(self) -> float:
         """Right end [m]."""
         return self.x + self.columns * self.cell
 
     @property
-    def top(self) -> float:
+    def upper_end(self) -> float:
         """Upper end [m]."""
         return self.y + self.rows * self.cell
 

@@ -38,7 +38,7 @@ def arena_picture(
     left, bottom, right, top = extent_of(arena)
     size = max(right - left, top - bottom) / PAPER_WIDTH  # 1 for the paper's arena
     grid = arena.grid
-    cells_right, cells_top = grid.right, grid.top
+    cells_right, cells_top = grid.right_end, grid.upper_end
     shapes: list[Shape] = [*floor_shapes(arena.floor), *_cells(arena)]
     shapes += [shape for obstacle in arena.obstacles for shape in obstacle_shapes(obstacle)]
     shapes += [Line(((x1, y1), (x2, y2)), Ink.TEXT, 2.4) for x1, y1, x2, y2 in arena.walls]
@@ -101,7 +101,7 @@ def extent_of(arena: Arena) -> tuple[float, float, float, float]:
     points += [(light.x, light.y) for light in arena.lights]
     points += [point for obstacle in arena.obstacles for point in obstacle.outline()]
     if not arena.walls:
-        points += [(grid.x, grid.y), (grid.right, grid.top)]
+        points += [(grid.x, grid.y), (grid.right_end, grid.upper_end)]
     xs, ys = [x for x, _ in points], [y for _, y in points]
     return min(xs), min(ys), max(xs), max(ys)
 
@@ -109,7 +109,7 @@ def extent_of(arena: Arena) -> tuple[float, float, float, float]:
 def _cells(arena: Arena) -> list[Shape]:
     """Return the reachable cells, lightly filled unless there is something on the floor."""
     grid = arena.grid
-    right, top = grid.right, grid.top
+    right, top = grid.right_end, grid.upper_end
     corners = ((grid.x, grid.y), (right, grid.y), (right, top), (grid.x, top))
     fill = Ink.VISITED if arena.floor == BARE_FLOOR else None
     shapes: list[Shape] = [Line(corners, None, closed=True, fill=fill)]

@@ -45,8 +45,8 @@ class CellGrid(Element, component="cell_grid.js"):
     ) -> None:
         super().__init__()
         self._grid = grid = arena.grid
-        xs = [x for wall in arena.walls for x in (wall[0], wall[2])] or [grid.x, grid.right]
-        ys = [y for wall in arena.walls for y in (wall[1], wall[3])] or [grid.y, grid.top]
+        xs = [x for wall in arena.walls for x in (wall[0], wall[2])] or [grid.x, grid.right_end]
+        ys = [y for wall in arena.walls for y in (wall[1], wall[3])] or [grid.y, grid.upper_end]
         low, high = self._in_cells((min(xs), min(ys))), self._in_cells((max(xs), max(ys)))
         self._props |= {
             "columns": grid.columns,

@@ -65,7 +65,7 @@ def draw_arena(axes: Axes, arena: Arena) -> None:
     axes.set_axis_off()
     _show(axes, arena)
     cells = arena.grid
-    right, top = cells.right, cells.top
+    right, top = cells.right_end, cells.upper_end
     xs = cells.x + cells.cell * np.arange(1, cells.columns)
     ys = cells.y + cells.cell * np.arange(1, cells.rows)
     lines = [[x, cells.y, x, top] for x in xs] + [[cells.x, y, right, y] for y in ys]

@@ -44,11 +44,14 @@ class CalibratedRow(GapRow):
     """The gap of a twin after one calibration, its fall, and the checks of the fit.
 
     Attributes:
-        observe, budget: Observation level and number of trials of the calibration.
-        rms_point, rms_draws: RMS gap with the estimate, and with draws from the posterior.
+        observe: Observation level of the calibration.
+        budget: Its number of trials.
+        rms_point: RMS gap with the estimate.
+        rms_draws: RMS gap with draws from the posterior.
         recommended: Numbers that the calibration recommends.
         fall: Share by which the RMS gap falls.
-        misspecified, misspecification_p: Verdict and p of the predictive check.
+        misspecified: Verdict of the predictive check.
+        misspecification_p: Its p.
         at_prior_end: Numbers at an end of their range.
     """
 

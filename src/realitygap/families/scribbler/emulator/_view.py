@@ -73,8 +73,8 @@ def picture(emulator: Emulator, width: int = WIDTH, height: int = HEIGHT) -> lis
     sides = [(*a, *b) for line in outlines for a, b in zip(line, (*line[1:], line[0]), strict=True)]
     walls = np.array([*arena.walls, *sides], dtype=float).reshape(-1, 4)
     grid = arena.grid
-    xs = np.concatenate([walls[:, 0], walls[:, 2], [grid.x, grid.right]])
-    ys = np.concatenate([walls[:, 1], walls[:, 3], [grid.y, grid.top]])
+    xs = np.concatenate([walls[:, 0], walls[:, 2], [grid.x, grid.right_end]])
+    ys = np.concatenate([walls[:, 1], walls[:, 3], [grid.y, grid.upper_end]])
     left, low = float(xs.min()), float(ys.min())
     wide, deep = max(float(np.ptp(xs)), 1e-6), max(float(np.ptp(ys)), 1e-6)
     scale = min((width - 1) / wide, ASPECT * (height - 1) / deep)  # characters in a meter

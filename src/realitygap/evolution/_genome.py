@@ -318,8 +318,6 @@ class Genome(_json.Written[_json.GenomeForm], ShownAsCard):
         same = self.nodes == other.nodes and self.connections == other.connections
         return same and self._interface == other._interface
 
-    __hash__ = None  # type: ignore[assignment]  # arrays behind it may be large; compare, do not index
-
     def __repr__(self) -> str:
         n_inputs = self.rules.n_inputs - (self.rules.bias_input >= 0)
         hidden = f"{self.n_hidden} hidden node{'s' * (self.n_hidden != 1)}"

@@ -11,6 +11,7 @@ from annotated_types import Ge, Gt, Le, Lt
 from pydantic import BaseModel, Field, model_validator
 
 from realitygap.errors import did_you_mean
+from realitygap.kernels.sim.shape import ANGLES
 from realitygap.settings import Settings, table_in
 
 from ._distribution import KINDS, Distribution
@@ -24,17 +25,6 @@ UNITS = {
     "_deg": math.radians,
 }
 """Units by the last part of a key in a file. Other keys are in meters or radians."""
-
-ANGLES = (
-    "heading",
-    "direction",
-    "cone",
-    "turn_rate",
-    "drift_per_m",
-    "heading_noise_per_m",
-    "heading_noise_per_s",
-)
-"""Names of angles. `width` is the angle of a light sensor and the length of an image."""
 
 ROWS = {
     "corner": ("x", "y"),

@@ -126,7 +126,16 @@ NEUTRAL = {
 }
 _ENDLESS = 10**9
 """Parts of a step, at most: of a robot that goes as far as numbers do."""
-ANGLES = ("heading", "direction", "cone", "turn_rate", "heading_noise_per_m", "heading_noise_per_s")
+ANGLES = (
+    "heading",
+    "direction",
+    "cone",
+    "turn_rate",
+    "drift_per_m",
+    "heading_noise_per_m",
+    "heading_noise_per_s",
+)
+"""Last parts of names of numbers that are angles. `width` is the angle of a light sensor and the length of an image."""
 AXES = {"x": 0, "y": 1, "x1": 0, "y1": 1, "x2": 0, "y2": 1}
 
 
@@ -407,7 +416,7 @@ def sim_rows(shape: SimShape) -> dict[str, int]:
 def is_angle(name: str) -> bool:
     """Whether a number is an angle or a rate of one, which the table holds in whole turns."""
     last = name.rsplit(".", 1)[-1]
-    return last in ANGLES or name.endswith(".drift_per_m") or (name.startswith("light.") and last == "width")
+    return last in ANGLES or (name.startswith("light.") and last == "width")
 
 
 def sim_table(

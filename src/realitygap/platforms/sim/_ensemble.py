@@ -481,7 +481,7 @@ def _as_it_is(rehearsal: Rehearsal) -> Rehearsal:
 
 def _n_robots(values: Values) -> int:
     """Return the number of sets of numbers; one robot as it is if there are none."""
-    return len(next(iter(values.values()), np.empty(1)))  # type: ignore[arg-type]
+    return next((len(np.asarray(value)) for value in values.values()), 1)
 
 
 def _in_order(parts: Iterable[tuple[NDArray[np.int64], NDArray[F]]], m: int) -> NDArray[F]:

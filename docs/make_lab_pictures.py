@@ -20,7 +20,7 @@ SCENES = "tests/lab/test_screenshots_in_browser.py"
 def main() -> int:
     """Take all pictures."""
     IMAGES.mkdir(parents=True, exist_ok=True)
-    command = [sys.executable, "-m", "pytest", "-q", "-m", "slow", SCENES, "-k", "not that_pages_show"]
+    command = [sys.executable, "-m", "pytest", "-q", "-m", "long", SCENES]
     environment = os.environ | {"REALITYGAP_SCREENSHOTS": str(IMAGES)}
     return subprocess.run(command, cwd=DOCS.parent, env=environment, check=False).returncode
 

@@ -14,7 +14,7 @@ from realitygap.records import read_observations
 from realitygap.study._calibrate.kinds import KINDS
 from realitygap.world import load_arena, load_robot, read_calibration
 
-from .conftest import DESKTOP, FOR_CHILDREN, PHONE
+from .conftest import FOR_CHILDREN, PHONE
 
 pytestmark = pytest.mark.slow
 
@@ -67,11 +67,10 @@ def test_cards_state_the_trials_and_minutes_of_each_kind():
         assert (n_trials, minutes) == (len(plans), round(seconds / 60)), kind
 
 
-@pytest.mark.parametrize("size", [DESKTOP, PHONE])
-def test_wizard_leads_from_the_robot_to_a_result_and_shows_a_rejection(lab, visit, size):
+def test_wizard_leads_from_the_robot_to_a_result_and_shows_a_rejection(lab, visit):
     (lab.root.parent / FOR_CHILDREN).mkdir()
     (lab.root.parent / FOR_CHILDREN / "sitecustomize.py").write_text(REJECTED)
-    page = visit("calibrate", size=size)
+    page = visit("calibrate")
     step = page.locator(".lab-steps [aria-current=step]")
     page.get_by_text("No calibrations yet.").wait_for()
     page.get_by_label("Name", exact=True).fill("not a name!")

@@ -45,14 +45,13 @@ PLATFORMS = {"": "SIM", "sim": "SIM", "twin:worn.toml": "TWIN", "scribbler:emula
 def test_a_network_drives_live_and_can_be_played_when_it_is_stopped(lab, visit):
     run_study(parse_study(TEXT, "study.toml"), lab.root / "seen")
     (lab.root / "worn.toml").write_text(sample_twin("worn", 1).to_toml())
+    page = visit("study/seen", size=PHONE)
+    page.get_by_role("tab", name="Replay").click()
     for platform, label in PLATFORMS.items():
-        page = visit("study/seen", size=PHONE)
-        page.get_by_role("tab", name="Replay").click()
         page.get_by_label("Platform", exact=True).fill(platform)
         page.get_by_role("button", name="Drive live").click()
         live = page.locator(".rg-live")
-        live.wait_for()
-        assert live.locator(".rg-label").text_content() == label
+        expect(live.locator(".rg-label")).to_have_text(label)
         page.wait_for_function("() => /step [2-9]/.test(document.querySelector('.rg-clock').textContent)")
         expect(live.locator(".rg-ray")).to_have_count(3)
         if (
@@ -68,4 +67,4 @@ def test_a_network_drives_live_and_can_be_played_when_it_is_stopped(lab, visit):
             later.close()
         page.get_by_role("button", name="End drive").click()
         page.get_by_text("Stopped.").wait_for()
-        page.close()
+        expect(live).to_have_count(0)

@@ -1,4 +1,7 @@
-"""The scenes of which the documents show pictures; written where REALITYGAP_SCREENSHOTS names a folder."""
+"""The scenes of which the documents show pictures; written where REALITYGAP_SCREENSHOTS names a folder.
+
+What the scenes do is tested daily by the other tests of their pages, so that taking the pictures is not.
+"""
 
 from __future__ import annotations
 
@@ -16,8 +19,6 @@ from realitygap.study import parse_study, run_study
 from .conftest import PHONE
 from .robot_study import await_trial, begin_sitting, make_study, start_trial
 from .sheets import drive_sheet, photo_of
-
-pytestmark = pytest.mark.slow
 
 ROOT = Path(__file__).parents[2]
 PAGES = ["docs/how-to/lab.md", "docs/tutorials/lesson.md", "docs/tutorials/robot-lab.md"]
@@ -54,6 +55,7 @@ def keep(page: Any, name: str, **options: Any) -> None:
         (Path(folder) / f"{name}.webp").write_bytes(file.getvalue())
 
 
+@pytest.mark.long
 def test_studies_and_one_that_is_watched(lab, visit):
     run_study(parse_study(STUDY, "study.toml"), lab.root / "first-look")
     make_study(lab.root)
@@ -83,6 +85,7 @@ def test_studies_and_one_that_is_watched(lab, visit):
     keep(page, "studies")
 
 
+@pytest.mark.long
 def test_screenshots_show_a_robot_driven_by_hand(lab, visit):
     page = visit("robot", size=PHONE, has_touch=True, **FINE)
     page.get_by_role("button", name="Use an emulated robot").click()
@@ -92,6 +95,7 @@ def test_screenshots_show_a_robot_driven_by_hand(lab, visit):
     keep(page, "robot")
 
 
+@pytest.mark.long
 def test_screenshots_show_a_sitting_on_a_phone(lab, visit):
     make_study(lab.root, steps=60)
     page = visit("study/by-robot/trials", size=PHONE, has_touch=True, **FINE)
@@ -106,6 +110,7 @@ def test_screenshots_show_a_sitting_on_a_phone(lab, visit):
     keep(page, "trial")
 
 
+@pytest.mark.long
 def test_screenshots_show_a_sheet_counted_from_its_photo(lab, visit):
     lines = drive_sheet(lab.root)
     page = visit("study/by-robot/trials", size=TALL)

@@ -82,10 +82,15 @@ def test_compare_adds_up_to_three_trials_to_the_one_that_plays(lab, visit):
     page.locator(".lab-problem", has_text="99").wait_for()
 
 
-@pytest.mark.parametrize("size", [DESKTOP, PHONE])
-def test_condition_of_the_table_filters_both_panels(lab, visit, size):
+def test_condition_of_the_table_filters_both_panels(lab, visit):
     carry_out(lab.root)
-    page = visit("study/seen", size=size)
+    page = visit("study/seen")
+    for width, height in (DESKTOP, PHONE):
+        page.set_viewport_size({"width": width, "height": height})
+        filter_by_the_table(page)
+
+
+def filter_by_the_table(page) -> None:
     page.locator(".lab-curves polyline").nth(1).wait_for()
     page.locator(".lab-panel .rg-player").wait_for()
     row = page.locator(".lab-choosable tbody tr").nth(1)

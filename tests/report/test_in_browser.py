@@ -33,6 +33,8 @@ NUMBERS = "() => [...document.querySelectorAll('#replay-rows tr')].map(" + (
     "row => [...row.querySelectorAll('td')].map(cell => cell.textContent))"
 )
 
+SIZES = "all => all.map(it => it.getBoundingClientRect()).map(box => [box.width, box.height])"
+
 
 @pytest.fixture(scope="module")
 def page_file(tiny_html, tmp_path_factory) -> Path:
@@ -262,16 +264,18 @@ def test_dragging_over_the_curve_goes_through_time(show):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["coverage", "novelty", "turn", "ends"])
-def test_numbers_shown_are_those_recomputed(show, trials, name):
-    chosen = [trials(name, 2, individual) for individual in range(4)]
-    page = show(f"#replay={','.join(link for link, _ in chosen)}@0")
-    for step in (0, 1, 2, 7, 15, 29, 30):
-        page.locator("#replay-scrub").fill(str(step))
-        shown = numbers(page)
-        assert len(shown) == 4
-        for row, (_, trajectory) in zip(shown, chosen, strict=True):
-            check_numbers(row, trajectory, step)
+def test_numbers_shown_are_those_recomputed(show, trials):
+    page = show(reduced_motion="reduce")
+    for name in ("coverage", "novelty", "turn", "ends"):
+        chosen = [trials(name, 2, individual) for individual in range(4)]
+        links = [link for link, _ in chosen]
+        page.evaluate(f"location.hash = '#replay={','.join(links)}@0'")
+        page.locator("#replay-rows .trial", has_text=links[-1]).wait_for()
+        assert page.locator("#replay-rows .trial").all_text_contents() == links
+        for step in (0, 1, 2, 7, 15, 29, 30):
+            page.locator("#replay-scrub").fill(str(step))
+            for row, (_, trajectory) in zip(numbers(page), chosen, strict=True):
+                check_numbers(row, trajectory, step)
 
 
 @pytest.mark.slow
@@ -502,10 +506,22 @@ def luminance(color: str) -> float:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_colors_of_both_themes_have_enough_contrast(show, scheme):
-    page = show(color_scheme=scheme)
+def test_colors_of_both_themes_differ_and_have_enough_contrast(show):
+    page = show()
+    colors = []
+    for scheme in ("light", "dark"):
+        page.emulate_media(color_scheme=scheme)
+        check_contrast(page)
+        colors.append(
+            page.evaluate(
+                "() => ['.rg-walls', '.rg-trail'].map(name => getComputedStyle(document.querySelector(name)).stroke)"
+                ".concat(getComputedStyle(document.body).backgroundColor)"
+            )
+        )
+    assert all(light != dark for light, dark in zip(*colors, strict=True))
 
+
+def check_contrast(page) -> None:
     def contrast(first: str, second: str) -> float:
         style = "getComputedStyle(document.documentElement)"
         colors = [
@@ -529,14 +545,16 @@ def test_colors_of_both_themes_have_enough_contrast(show, scheme):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("size", [DESKTOP, PHONE, (320, 640)])
-def test_the_page_is_not_wider_than_the_window(show, size):
-    page = show(size=size, reduced_motion="reduce")
+def test_the_page_is_not_wider_than_the_window(show):
+    page = show(reduced_motion="reduce")
     page.get_by_role("button", name="All of generation 0").click()
-    assert page.evaluate("() => document.documentElement.scrollWidth") <= size[0]
-    if size != DESKTOP:
-        boxes = [button.bounding_box() for button in page.locator("#replay-figure button:visible").all()]
-        assert all(box["width"] >= 24 and box["height"] >= 24 for box in boxes), "large enough for a finger"
+    for width, height in (DESKTOP, PHONE, (320, 640)):
+        page.set_viewport_size({"width": width, "height": height})
+        assert page.evaluate("() => document.documentElement.scrollWidth") <= width
+        if width < DESKTOP[0]:
+            boxes = page.locator("#replay-figure button:visible").evaluate_all(SIZES)
+            assert boxes
+            assert all(width >= 24 and height >= 24 for width, height in boxes), "large enough for a finger"
 
 
 @pytest.mark.slow
@@ -558,20 +576,6 @@ def test_a_replay_in_use_does_not_start_by_itself(show, used, seen):
     page.locator(f"{seen}-stage").scroll_into_view_if_needed()
     page.wait_for_timeout(300)
     assert page.locator(f"{seen}-play").text_content().strip() == "Play"
-
-
-@pytest.mark.slow
-def test_dark_mode_is_dark(show):
-    colors = []
-    for scheme in ("light", "dark"):
-        page = show(color_scheme=scheme)
-        colors.append(
-            page.evaluate(
-                "() => ['.rg-walls', '.rg-trail'].map(name => getComputedStyle(document.querySelector(name)).stroke)"
-                ".concat(getComputedStyle(document.body).backgroundColor)"
-            )
-        )
-    assert all(light != dark for light, dark in zip(*colors, strict=True))
 
 
 @pytest.mark.slow

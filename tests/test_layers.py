@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 import tomllib
 from collections.abc import Iterator
 from itertools import chain
@@ -123,3 +124,16 @@ def test_the_architecture_page_draws_the_layers_that_are_checked():
     picture = page.partition("```text\n")[2].partition("```")[0].splitlines()
     assert [line[:32].strip().split(" | ") for line in picture] == layers
     assert set(chain.from_iterable(layers)) >= PACKAGES
+
+
+def test_the_architecture_page_names_files_and_names_that_exist():
+    page = (SOURCES.parent.parent / "docs" / "explanations" / "architecture.md").read_text("utf-8")
+    quoted = set(re.findall(r"`([^`\n]+)`", page.partition("## Where to put a change")[2]))
+    files = {f"/{path.relative_to(SOURCES)}" for path in SOURCES.rglob("*") if path.is_file()}
+    paths = {name for name in quoted if re.fullmatch(r"[a-z_/]+(\.py|\.\w+\.jinja)", name)}
+    assert {name for name in paths if not any(file.endswith(f"/{name}") for file in files)} == set()
+    names = {name for name in quoted if re.fullmatch(r"_?[A-Z][A-Z_]+|_[a-z_]+", name)}
+    text = "\n".join(path.read_text("utf-8") for path in SOURCES.rglob("*.py"))
+    assert {name for name in names if not re.search(rf"\b{name}\b", text)} == set()
+    assert len(paths) > 20
+    assert len(names) > 10

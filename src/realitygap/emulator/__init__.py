@@ -3,9 +3,8 @@
 Importing this package lets pyserial open ports whose names begin with `emulator://`.
 """
 
-from ._arena import open_arena
 from ._emulated import MILLISECOND, SECOND, EmulatedRobot, nanoseconds
-from ._port import EmulatedPort, number_in, register
+from ._port import EmulatedPort, number_in, open_arena, register
 from ._serve import Server, WitnessDoor, serve_pty, serve_tcp
 from ._witness import Witness, cells_at_times, connect_witness
 

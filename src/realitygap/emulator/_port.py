@@ -15,8 +15,9 @@ from urllib.parse import parse_qsl, urlsplit
 import serial
 from serial.serialutil import PortNotOpenError, SerialBase, SerialException, Timeout
 
-from realitygap.errors import RobotError, did_you_mean
+from realitygap.errors import DescriptionError, RobotError, did_you_mean
 from realitygap.robots import SystemClock
+from realitygap.world import Arena, load_arena
 
 from ._emulated import SECOND, EmulatedRobot, nanoseconds
 from ._witness import DirectWitness
@@ -284,6 +285,26 @@ def number_in(name: str, text: str, least: float, most: float, *, whole: bool = 
         kind = "a whole number" if whole else "a number"
         raise RobotError(f"{name}={text}: expected {kind} from {least:g} to {most:g}.")
     return value
+
+
+def open_arena(name: str) -> Arena:
+    """Return the arena of that name, or of a file.
+
+    Args:
+        name: Name of an arena, or the path of its TOML or SVG file.
+
+    Raises:
+        RobotError: There is no such arena or file, or the file cannot be used; the text says where and why.
+    """
+    try:
+        arena = load_arena(name)
+    except DescriptionError as error:
+        raise RobotError(str(error)) from None
+    if arena.vary:
+        raise RobotError(
+            f"{name}: {', '.join(arena.vary)} are drawn, expected plain numbers: an emulator draws none."
+        )
+    return arena
 
 
 def register() -> None:

@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from realitygap.evolution import ControllerInterface
+from realitygap.evolution import ControllerInterface, decode_all
 from realitygap.kernels.math.philox import MAX_INDIVIDUALS
 from realitygap.records import EndReason, Observe, TrialRecord, sees
 from realitygap.robots import Label
@@ -30,7 +30,7 @@ from realitygap.trials import (
 from realitygap.world import Arena, Pose
 
 from ._platform import Opening, Platform
-from ._try import try_all
+from ._try import open_for_genomes
 
 # Trials in a call: enough that the overhead of the call is small, but few enough that stored steps need little memory.
 TOGETHER = 256
@@ -176,14 +176,12 @@ class SimTarget(RepeatableTarget):
         platform, arena = self.platform.model_copy(update={"steps": steps}), self.arena
         if start is not None:
             platform, arena = platform.placed(arena, start)
-        genomes = {id(plan.genome): plan.genome for plan in plans if plan.genome is not None}
-        place = {each: k for k, each in enumerate(genomes)}
+        by_id = {id(plan.genome): plan.genome for plan in plans if plan.genome is not None}
+        place, genomes = {each: k for k, each in enumerate(by_id)}, list(by_id.values())
         which = np.array([place[id(plan.genome)] for plan in plans], np.int32)
         counters = counters_of_individuals(NoiseKey(self.key), [plan.number for plan in plans])
-        trials, tried = try_all(
-            platform, arena, list(genomes.values()), which, self.key, counters,
-            inputs=interface.inputs, noise=self.noise, trace=True,
-        )  # fmt: skip
+        trials = open_for_genomes(platform, arena, genomes, inputs=interface.inputs, noise=self.noise)
+        tried = trials.carry_out(decode_all(genomes), which, self.key, counters, trace=True)
         noisy = platform.noisy_readings(arena, tried.distances, counters, self.key, self.noise)
         readings = tried.trace.readings if noisy is None else noisy
         made = []

@@ -59,25 +59,22 @@ def open_trials(
     return platform.prepare(arena, rules, inputs=names, noise=noise, bias_value=bias_value)
 
 
-def try_all(
+def open_for_genomes(
     platform: Platform,
     arena: Arena,
     genomes: Sequence[Genome],
-    which: NDArray[np.int32],
-    key: int,
-    counters: NDArray[np.uint32],
     *,
     inputs: Sequence[str] | None,
     noise: float,
-    trace: bool = False,
-) -> tuple[PlatformTrials, Tried]:
-    """Return trial k is one of genome `which[k]` with the random numbers of `counters[k]`."""
+) -> PlatformTrials:
+    """Return a platform set up as by `open_trials`, ready to try networks of these genomes.
+
+    Raises:
+        ValueError: As in `open_trials`, or the genomes are of several kinds.
+    """
     check_genomes(genomes, inputs)
     first = genomes[0]
-    trials = open_trials(
-        platform, arena, first.rules, inputs=inputs, noise=noise, bias_value=first.bias_value
-    )
-    return trials, trials.carry_out(decode_all(genomes), which, key, counters, trace=trace)
+    return open_trials(platform, arena, first.rules, inputs=inputs, noise=noise, bias_value=first.bias_value)
 
 
 def try_genomes(
@@ -185,17 +182,10 @@ def trace_genome(
         partners: Genomes of the other robots in the arena; the same genome when not given.
     """
     which = np.arange(1 + len(partners), dtype=np.int32)[None]
-    trials, tried = try_all(
-        platform,
-        arena,
-        [genome, *partners],
-        which if partners else which[0],
-        noise_key.key,
-        counters_of(noise_key),
-        inputs=inputs,
-        noise=noise,
-        trace=True,
-    )
+    genomes = [genome, *partners]
+    trials = open_for_genomes(platform, arena, genomes, inputs=inputs, noise=noise)
+    networks, counters = decode_all(genomes), counters_of(noise_key)
+    tried = trials.carry_out(networks, which if partners else which[0], noise_key.key, counters, trace=True)
     others = tuple(_trajectory(trials, tried, robot) for robot in range(1, arena.n_robots))
     return _trajectory(trials, tried, 0, others)
 
@@ -243,6 +233,5 @@ def _try_in_order(
             "numbers would repeat. Begin lower, or try fewer in a call."
         )
     which, counters = np.arange(n, dtype=np.int32), counters_of(noise_key, n)
-    return try_all(
-        platform, arena, genomes, which, noise_key.key, counters, inputs=inputs, noise=noise, trace=trace
-    )
+    trials = open_for_genomes(platform, arena, genomes, inputs=inputs, noise=noise)
+    return trials, trials.carry_out(decode_all(genomes), which, noise_key.key, counters, trace=trace)

@@ -132,7 +132,7 @@ class Served:
     def compute(self, seconds: float) -> None:
         """Have the study compute, until it is at its pace."""
         self.lab.start_new("watched", STUDY)
-        self._until(lambda job: job.progress and job.progress["n_computed"])
+        self._until(lambda job: job.progress and job.progress.n_computed)
         time.sleep(min(WARM_S, seconds))
 
     def drive(self, seconds: float) -> None:
@@ -141,8 +141,10 @@ class Served:
         while not self._job.is_over:
             time.sleep(0.1)
         self.lab.go_on("watched", port=PORT, counts="page", when="sheet", witness="")
-        self._until(lambda job: job.ask and job.ask["question"] == "place")
-        self._job.answer(self._job.ask["number"])
+        from realitygap.lab._messages import Answer, PlaceQuestion
+
+        self._until(lambda job: isinstance(job.ask, PlaceQuestion))
+        self._job.answer(Answer(self._job.ask.number))
         self._until(lambda job: job.step)
 
     def window(self, seconds: float) -> dict[str, float]:
@@ -174,7 +176,7 @@ class Served:
     def _count(self) -> int:
         """Runs computed, or steps driven."""
         job = self._job
-        return int(job.step["step"] if job.step else job.progress["n_computed"])
+        return int(job.step.step if job.step else job.progress.n_computed)
 
     def _until(self, is_so: Callable[[Any], Any]) -> None:
         while not is_so(self._job):

@@ -295,13 +295,13 @@ def _valid_plan() -> bytes:
 
 
 def _draft(path: Path) -> Any:
-    from realitygap.lab._drawn import read_json
+    from realitygap.lab._scoring_files import read_json
 
     return read_json(path)
 
 
 def _frame(data: bytes) -> Any:
-    from realitygap.lab._frames import is_of_page
+    from realitygap.lab._connections import is_of_page
 
     return is_of_page(data.decode("utf-8", "replace"))
 

@@ -122,9 +122,9 @@ realitygap.cli.main()
 IN_A_PROCESS_OF_THE_LAB = """
 import os, types
 import realitygap.lab._work as work
-sys.modules["realitygap.lab._study_work"] = types.SimpleNamespace(work=lambda *_: wait())
+sys.modules["realitygap.lab._study"] = types.SimpleNamespace(run=lambda *_: wait())
 end, order = os.pipe()
-os.write(order, b'{"work": "study"}\\n')  # and it stays open
+os.write(order, b'{"kind": "StudyWork", "folder": ""}\\n')  # and it stays open
 sys.stdin = open(end)
 sys.exit(work.main())
 """

@@ -44,9 +44,8 @@ ALLOWED = {
     "study/_transfer/strategies.py": {"json.loads"},  # of what was just written
     "world/_svg.py": {"ElementTree.fromstring"},
     # between two processes of one program
-    "lab/_channel.py": {"json.loads"},
-    "lab/_check_work.py": {"json.loads"},  # of what was just written
-    "lab/_child.py": {"json.loads"},
+    "lab/_messages.py": {"json.loads"},
+    "lab/_checks.py": {"json.loads"},  # of what was just written
     "platforms/twin/_pool.py": {"json.loads"},
     "platforms/twin/_worker.py": {"json.loads"},
 }

@@ -91,6 +91,14 @@ def count_range(counts: Iterable[int]) -> str:
     return " to ".join(f"{n:,}" for n in dict.fromkeys((min(known), max(known))))
 
 
+def duration(seconds: float) -> str:
+    """Return a time in words: seconds below 90 s, minutes below 90 min, hours above."""
+    for limit, unit, name in ((90.0, 1.0, "s"), (5400.0, 60.0, "min")):
+        if seconds < limit:
+            return f"{seconds / unit:.0f} {name}"
+    return f"{seconds / 3600.0:.1f} h"
+
+
 def counted_range(counts: Iterable[int], noun: str) -> str:
     """Return the smallest and the largest of several numbers with their noun, such as `3 to 10 runs`."""
     known = list(counts)

@@ -19,8 +19,8 @@ from realitygap._toml import toml_table
 from realitygap.cli import app
 from realitygap.errors import RealityGapError, StudyError
 from realitygap.evolution import Genome, NeatSettings, Population
-from realitygap.lab._described import study_of
 from realitygap.lab._studies import Studies
+from realitygap.lab._study import study_of
 from realitygap.platforms import SimPlatform
 from realitygap.records import LEDGER_NAME, Ledger, ResultsFolder, read_observations, write_observations
 from realitygap.report import export_frame, export_individual, save_view, summarize_tasks

@@ -36,12 +36,12 @@ ENDLESS_CHECKS = """
 import sys
 if "realitygap.lab._work" in sys.orig_argv:
     import time
-    from realitygap.lab import _check_work
-    check = _check_work._check
+    from realitygap.lab import _checks
+    check = _checks._check
     def slow(root, text, **options):
         time.sleep(300 if "endless" in text else 0)
         return check(root, text, **options)
-    _check_work._check = slow
+    _checks._check = slow
 """
 
 

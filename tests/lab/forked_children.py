@@ -14,16 +14,16 @@ import matplotlib.figure  # noqa: F401  # imported once, for all that are forked
 
 import realitygap.report  # noqa: F401
 from realitygap.lab import (  # noqa: F401
-    _calibrate_work,
-    _check_work,
+    _calibration,
+    _checks,
     _child,
-    _gap_work,
-    _live_work,
-    _photo_work,
-    _robot_work,
-    _study_work,
-    _track_work,
-    _watch_work,
+    _drawing,
+    _gap,
+    _hand,
+    _live,
+    _photos,
+    _study,
+    _video,
     _work,
 )
 from tests.forks import fork_context

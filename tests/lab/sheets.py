@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from realitygap.lab._drawn import keep_drawn
+from realitygap.lab._scoring_files import keep_drawn
 from realitygap.records import LEDGER_NAME, PATH_PARTS, Ledger, Score, TrialRecord
 from realitygap.study import drive_study, parse_study
 from realitygap.testing import (

@@ -24,12 +24,12 @@ STEP_S = 0.5
 REJECTED = """
 import sys
 if "realitygap.lab._work" in sys.orig_argv:
-    from realitygap.lab import _calibrate_work
-    make_calibration = _calibrate_work.make_calibration
+    from realitygap.lab import _calibration
+    make_calibration = _calibration.make_calibration
     def rejected(*given, **options):
         made = make_calibration(*given, **options)
         return made.model_copy(update={"misspecified": True, "misspecification_p": 0.01})
-    _calibrate_work.make_calibration = rejected
+    _calibration.make_calibration = rejected
 """
 
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import pytest
 
 from realitygap.emulator import serve_tcp
 from realitygap.families.scribbler.emulator import Emulator
-from realitygap.lab._measuring_jobs import CalibrationJob
+from realitygap.lab._calibration import CalibrationJob
+from realitygap.lab._messages import Answer, LengthsQuestion, Question, StartQuestion
 from realitygap.orders import CalibrateOrder
 from realitygap.records import read_observations
 
@@ -18,15 +19,19 @@ from .test_hand import wait_for
 pytestmark = pytest.mark.slow
 
 
-def asked(job: CalibrationJob, question: str) -> dict[str, Any]:
-    wait_for(lambda: job.is_over or (job.ask is not None and job.ask["question"] == question))
-    assert job.ask is not None, job.outcome
-    return job.ask
+Q = TypeVar("Q", bound=Question)
+
+
+def asked(job: CalibrationJob, kind: type[Q]) -> Q:
+    wait_for(lambda: job.is_over or isinstance(job.ask, kind))
+    question = job.ask
+    assert isinstance(question, kind), job.outcome
+    return question
 
 
 def answer(job: CalibrationJob, **values: Any) -> None:
     assert job.ask is not None
-    assert job.answer(job.ask["number"], **values)
+    assert job.answer(Answer(job.ask.number, **values))
 
 
 def test_somebody_is_led_through_measures_and_stops_for_now(tmp_path: Path, forked_children: None):
@@ -34,16 +39,16 @@ def test_somebody_is_led_through_measures_and_stops_for_now(tmp_path: Path, fork
         robot = f"scribbler:{server.name}"
         order = CalibrateOrder(what="path", robot=robot, out=tmp_path / "mine.toml", budget=4)
         job = CalibrationJob(order, tmp_path, lambda: None)
-        assert "24 in free ahead" in asked(job, "place")["text"]
+        assert "24 in free ahead" in asked(job, StartQuestion).text
         assert job.has_robot
-        answer(job, answer="go")
-        assert set(asked(job, "measure")["questions"]) == {"ahead", "left", "turned"}
-        answer(job, ahead="a lot", left="0", turned="0")
-        wait_for(lambda: job.ask is not None and bool(job.ask.get("said")))
-        assert "13 3/4" in asked(job, "measure")["said"]
-        answer(job, ahead="13 3/4", left="-1/8", turned="2")
-        asked(job, "place")
-        answer(job, answer="stop")
+        answer(job, choice="go")
+        assert set(asked(job, LengthsQuestion).labels) == {"ahead", "left", "turned"}
+        answer(job, lengths={"ahead": "a lot", "left": "0", "turned": "0"})
+        wait_for(lambda: isinstance(job.ask, LengthsQuestion) and bool(job.ask.problem))
+        assert "13 3/4" in asked(job, LengthsQuestion).problem
+        answer(job, lengths={"ahead": "13 3/4", "left": "-1/8", "turned": "2"})
+        asked(job, StartQuestion)
+        answer(job, choice="stop")
         wait_for(lambda: job.is_over)
         assert not job.is_failed
         (kept,) = read_observations(tmp_path / "mine.trials.jsonl").trials

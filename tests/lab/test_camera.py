@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 
 from realitygap.errors import StudyError
-from realitygap.lab._camera import under_camera
 from realitygap.lab._counts import Counts
-from realitygap.lab._drawn import Draft, read_drawn
 from realitygap.lab._files import refuse_camera
-from realitygap.lab._page_operator import PageOperator
-from realitygap.lab._proposals import read_proposals
+from realitygap.lab._messages import Answer
+from realitygap.lab._page_operator import PageOperator, under_camera
+from realitygap.lab._scoring_files import Draft, read_drawn, read_proposals
 from realitygap.records import LEDGER_NAME, Ledger, ResultsFolder
 from realitygap.study import CameraObserver, drive_study
 from realitygap.world import paper_arena
@@ -24,13 +23,13 @@ PORT = "emulator://s2?fluke=1&speed=off"
 class _Page:
     """A page at which a person agrees to everything, and counts later."""
 
-    def say(self, what, **values):
+    def say(self, message):
         pass
 
-    def ask(self, what, **values):
-        return {}
+    def ask(self, question, until=None):
+        return Answer()
 
-    def at_once(self, what, act):
+    def at_once(self, kind, act):
         pass
 
 

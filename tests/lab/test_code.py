@@ -11,9 +11,11 @@ import pytest
 
 import realitygap
 from realitygap.errors import StudyError
-from realitygap.lab import _check_work, _lab, _study_work
+from realitygap.lab import _checks, _lab
 from realitygap.lab._checks import Checks
 from realitygap.lab._lab import Lab
+from realitygap.lab._messages import Message, StudyWork, TextChecked, TextRefused
+from realitygap.lab._study import run
 from realitygap.tasks import _python
 from tests.python_tasks import marking_source, study_text
 
@@ -24,7 +26,9 @@ REFUSED = "start the lab with: realitygap lab --allow-code"
 class SilentChannel:
     """Takes what a process says to the server."""
 
-    def say(self, kind: str, **values: Any) -> None: ...
+    def say(self, message: Message) -> None: ...
+
+    def report(self, message: Message, *, is_last: bool) -> None: ...
 
 
 @pytest.fixture
@@ -33,32 +37,33 @@ def root(tmp_path) -> Path:
     return tmp_path.resolve()
 
 
-def work(root: Path, **order: Any) -> None:
-    _study_work.work(SilentChannel(), {"work": "study", "folder": str(root / "mine"), "threads": 1, **order})
+def work(root: Path, **options: Any) -> None:
+    channel: Any = SilentChannel()
+    run(channel, StudyWork(str(root / "mine"), threads=1, **options))
 
 
 @pytest.fixture
-def orders(monkeypatch) -> list[dict[str, Any]]:
-    """Orders to processes, none of which is started."""
-    told: list[dict[str, Any]] = []
+def orders(monkeypatch) -> list[StudyWork]:
+    """Work for processes, none of which is started."""
+    told: list[StudyWork] = []
 
-    def note(_name: str, order: dict[str, Any], _root: Path, _changed: Any) -> SimpleNamespace:
-        told.append(order)
+    def note(_name: str, work: StudyWork, _root: Path, _changed: Any) -> SimpleNamespace:
+        told.append(work)
         return SimpleNamespace(port="", is_over=True, is_lost=False, has_met=False)
 
     monkeypatch.setattr(_lab, "StudyJob", note)
     return told
 
 
-def check(root: Path, text: str = STUDY, *, allow_code: bool) -> dict[str, Any]:
-    return _check_work._check(root, text, allow_code=allow_code)[0]
+def check(root: Path, text: str = STUDY, *, allow_code: bool) -> TextChecked | TextRefused:
+    return _checks._check(root, text, allow_code=allow_code)[0]
 
 
 def test_check_refuses_a_python_task_unless_the_lab_may_run_code(root):
-    assert REFUSED in check(root, allow_code=False)["mistakes"]
+    assert REFUSED in check(root, allow_code=False).text
     inline = STUDY.replace("inputs", 'source = "def far(t): pass"\ninputs')
-    assert "source: code in a study file is not run" in check(root, inline, allow_code=True)["mistakes"]
-    assert check(root, allow_code=True)["name"] == "mine"
+    assert "source: code in a study file is not run" in check(root, inline, allow_code=True).text
+    assert check(root, allow_code=True).name == "mine"
     assert not (root / "marker").exists()  # a check runs none
 
 
@@ -67,12 +72,12 @@ def test_lab_passes_its_permission_to_its_processes(root, orders):
     lab = Lab(root, allow_code=True)
     assert lab.checks._allow_code
     lab.start_new("mine", STUDY)
-    assert [order["allow_code"] for order in orders] == [True]
+    assert [order.allow_code for order in orders] == [True]
     work(root, text=STUDY, allow_code=True)
     assert (root / "marker").exists()
     lab.go_on("mine")
     Lab(root).go_on("mine")
-    assert [order["allow_code"] for order in orders] == [True, True, False]
+    assert [order.allow_code for order in orders] == [True, True, False]
 
 
 @pytest.mark.slow
@@ -103,7 +108,7 @@ def test_module_in_the_labs_folder_is_not_run(root):
     (root / "numpy.py").write_text(f"open({str(root / 'marker')!r}, 'w').close()\n")
     checks = Checks(root, allow_code=False)
     try:
-        assert REFUSED in checks.begin("check", STUDY).found.result(60)["mistakes"]
+        assert REFUSED in checks.begin("check", STUDY).found.result(60).text
     finally:
         checks.end()
     assert not (root / "marker").exists()

@@ -22,7 +22,7 @@ from hypothesis import strategies as st
 from websockets.exceptions import ConnectionClosed
 
 from realitygap.lab._access import LARGEST_BODY
-from realitygap.lab._frames import REFUSED, is_of_page
+from realitygap.lab._connections import REFUSED, is_of_page
 
 from .robot_study import make_study
 

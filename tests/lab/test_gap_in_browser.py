@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import contextlib
 import re
-import time
 
 import pytest
 
-from realitygap.errors import RobotError
-from realitygap.lab._gap_work import _Telling, rounds
+from realitygap.lab._gap import rounds
 from realitygap.records import read_observations
 
 from .conftest import expect, open_advanced
@@ -71,35 +68,6 @@ def test_gap_is_measured_with_its_progress_and_mistakes_are_shown_at_their_field
     page.frame_locator("iframe").get_by_text("jyro").first.wait_for()
     assert len(read_observations(lab.root / "gaps" / "first.jsonl").trials) == 30
     assert (lab.root / "gaps" / "first.html").is_file()
-
-
-class Told:
-    """A channel that keeps what it is told."""
-
-    def __init__(self):
-        self.done = []
-
-    def say(self, kind, *, name, done, total):
-        self.done.append((name, done))
-
-
-def test_last_of_several_trials_that_end_together_is_reported():
-    channel = Told()
-    telling = _Telling(channel)
-    for done in (1, 2, 3):
-        telling.show("robot", done, 10)
-    began = time.monotonic()
-    while ("robot", 3) not in channel.done:
-        assert time.monotonic() - began < 60
-        time.sleep(0.02)
-
-
-def test_trials_that_were_saved_are_reported_before_a_failure():
-    channel = Told()
-    with contextlib.suppress(RobotError), _Telling(channel) as telling:
-        telling.show("robot", 3, 10)
-        raise RobotError("gone")
-    assert channel.done == [("robot", 3)]
 
 
 def test_reports_come_after_2_4_8_trials_and_at_the_end():

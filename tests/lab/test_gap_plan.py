@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from realitygap.lab._gap_plan import NOISE, SPREAD, plan_words
+from realitygap.lab._gap import NOISE, SPREAD, plan_words
 from realitygap.study._gap.plan import pilot_spreads
 
 

@@ -8,45 +8,54 @@ from types import SimpleNamespace
 import pytest
 
 from realitygap.errors import StudyError
-from realitygap.lab import _lab as module
-from realitygap.lab._lab import Lab, Visitor
+from realitygap.lab import _control as module
+from realitygap.lab._control import RobotControl, Visitor
 
 ANNA, BEN, CARL = Visitor("a", "anna"), Visitor("b", "ben"), Visitor("c", "carl")
 
 
 @pytest.fixture
-def lab(tmp_path):
-    """Return a lab in which anna drives a robot by hand."""
-    lab = Lab(tmp_path)
-    lab.stops = []
-    lab.hand = SimpleNamespace(is_over=False, senses=None, stop=lambda: lab.stops.append("stop"))
-    lab.take_robot(ANNA)
-    return lab
+def robot(tmp_path):
+    """Return the robot of a lab, which anna drives by hand."""
+    robot = RobotControl(tmp_path, threading.RLock(), lambda: None)
+    robot.stops = []
+    robot.hand = SimpleNamespace(
+        port="COM3",
+        is_over=False,
+        has_met=True,
+        is_lost=False,
+        has_robot=True,
+        robot_action="",
+        stop_robot=lambda: robot.stops.append("stop"),
+    )
+    robot.note(robot.hand)
+    robot.take(ANNA)
+    return robot
 
 
-def test_robot_stays_with_its_operator_until_they_answer(lab):
-    lab.ask_for_robot(BEN)
-    assert lab.operator is ANNA
-    assert not lab.may_operate(BEN)
+def test_robot_stays_with_its_operator_until_they_answer(robot):
+    robot.ask(BEN)
+    assert robot.operator is ANNA
+    assert not robot.may_operate(BEN)
     with pytest.raises(StudyError, match="ben has requested control"):
-        lab.ask_for_robot(CARL)
+        robot.ask(CARL)
     with pytest.raises(StudyError, match="The request for control has ended"):
-        lab.answer_request(BEN, yes=True)
-    lab.answer_request(ANNA, yes=False)
-    assert lab.operator is ANNA
-    assert lab.request.state == "kept"
+        robot.answer_request(BEN, yes=True)
+    robot.answer_request(ANNA, yes=False)
+    assert robot.operator is ANNA
+    assert robot.request.state == "kept"
     with pytest.raises(StudyError, match="The request for control has ended"):
-        lab.answer_request(ANNA, yes=True)
+        robot.answer_request(ANNA, yes=True)
 
 
-def test_robot_driven_by_hand_stops_as_it_is_handed_over(lab):
-    lab.ask_for_robot(BEN)
-    lab.answer_request(ANNA, yes=True)
-    assert (lab.operator, lab.request, lab.stops) == (BEN, None, ["stop"])
-    assert not lab.may_operate(ANNA)
+def test_robot_driven_by_hand_stops_as_it_is_handed_over(robot):
+    robot.ask(BEN)
+    robot.answer_request(ANNA, yes=True)
+    assert (robot.operator, robot.request, robot.stops) == (BEN, None, ["stop"])
+    assert not robot.may_operate(ANNA)
 
 
-def test_robot_is_taken_without_an_answer_only_while_it_stands_still(lab, monkeypatch):
+def test_robot_is_taken_without_an_answer_only_while_it_stands_still(robot, monkeypatch):
     timers = []
 
     def note_timer(seconds, act, given):
@@ -55,35 +64,35 @@ def test_robot_is_taken_without_an_answer_only_while_it_stands_still(lab, monkey
         return timer
 
     monkeypatch.setattr(module, "threading", SimpleNamespace(Timer=note_timer))
-    lab.ask_for_robot(BEN)
+    robot.ask(BEN)
     with pytest.raises(StudyError, match="Request control first"):
-        lab.take_over(BEN)
+        robot.take_over(BEN)
     (timer,) = timers
     timer.cancel()
     assert timer.interval == module.HANDOVER_S
     timer.function(*timer.args)  # the time is over
-    assert lab.operator is ANNA
-    lab.hand.senses = {"moves": True}
+    assert robot.operator is ANNA
+    robot.hand.robot_action = "It drives."
     with pytest.raises(StudyError, match="The robot is moving"):
-        lab.take_over(BEN)
+        robot.take_over(BEN)
     with pytest.raises(StudyError, match="Request control first"):
-        lab.take_over(CARL)
-    lab.hand.senses = {"moves": False}
-    lab.take_over(BEN)
-    assert (lab.operator, lab.stops) == (BEN, ["stop"])
+        robot.take_over(CARL)
+    robot.hand.robot_action = ""
+    robot.take_over(BEN)
+    assert (robot.operator, robot.stops) == (BEN, ["stop"])
 
 
-def test_request_ends_when_another_visitor_takes_the_robot(lab):
-    lab.ask_for_robot(BEN)
-    request = lab.request
-    lab.take_robot(CARL)
-    lab._end_request(request, "unanswered")
+def test_request_ends_when_another_visitor_takes_the_robot(robot):
+    robot.ask(BEN)
+    request = robot.request
+    robot.take(CARL)
+    robot._end_request(request, "unanswered")
     with pytest.raises(StudyError, match="has ended"):
-        lab.answer_request(ANNA, yes=True)
-    assert lab.operator is CARL
+        robot.answer_request(ANNA, yes=True)
+    assert robot.operator is CARL
 
 
-def test_robot_that_nobody_has_needs_no_consent(lab):
-    lab.hand = None
-    lab.ask_for_robot(BEN)
-    assert lab.operator is BEN
+def test_robot_that_nobody_has_needs_no_consent(robot):
+    robot.hand.has_robot = False
+    robot.ask(BEN)
+    assert robot.operator is BEN

@@ -11,7 +11,7 @@ import pytest
 from realitygap.lab import _studies
 from realitygap.lab._files import plain_files
 from realitygap.lab._lab import Lab
-from realitygap.lab._video_job import videos_in
+from realitygap.lab._video import videos_in
 from realitygap.records import LEDGER_NAME
 
 from .robot_study import make_study
@@ -84,7 +84,7 @@ def test_study_whose_ledger_cannot_be_read_has_failed_and_shows_no_path(root):
             os.mkfifo(ledger)
         else:
             ledger.write_bytes(b"no ledger" * 1000 * (kind == "torn"))
-    standings = {each.name: each for each in lab.standings()}
+    standings = {each.state.name: each for each in lab.standings()}
     assert standings.pop("by-robot").word == "Waiting for robot"
     assert {name: each.word for name, each in standings.items()} == dict.fromkeys(standings, "Failed")
     assert all(each.message and str(root) not in each.message for each in standings.values())

@@ -6,6 +6,7 @@ import pytest
 
 from realitygap.errors import StudyError
 from realitygap.lab import _photos
+from realitygap.lab._messages import Ended, Failure
 from realitygap.lab._photos import MOST_WAITING, Photos
 
 
@@ -14,12 +15,12 @@ class _Idle:
 
     made: list[_Idle] = []  # noqa: RUF012
 
-    def __init__(self, order, root, hear):
-        self.order, self.hear = order, hear
+    def __init__(self, work, root, hear):
+        self.work, self.hear = work, hear
         self.made.append(self)
 
     def end(self):
-        self.hear({"kind": "ended", "status": 0})
+        self.hear(Ended(0))
 
 
 @pytest.fixture
@@ -73,12 +74,12 @@ def test_photos_that_were_being_read_when_the_lab_ended_are_read_again_and_all_c
     kept.end()
     again = photos()
     assert [each.state for each in reversed(again.photos())] == ["reading", "waiting"]
-    _Idle.made[-1].hear({"kind": "error", "text": "no sheet"})
-    _Idle.made[-1].hear({"kind": "ended", "status": 1})
+    _Idle.made[-1].hear(Failure("no sheet"))
+    _Idle.made[-1].hear(Ended(1))
     assert next((each.state, each.said) for each in reversed(again.photos())) == ("refused", "no sheet")
-    assert _Idle.made[-1].order["name"] == "b.jpg"  # its turn
+    assert _Idle.made[-1].work.name == "b.jpg"  # its turn
     assert not (tmp_path / "study" / "lab" / "photos" / f"{mark}.photo").exists()
-    _Idle.made[-1].hear({"kind": "ended", "status": -9})
+    _Idle.made[-1].hear(Ended(-9))
     assert again.photos()[0].said == "The process that read it ended. Send it again."
     for each in again.photos():
         again.forget(each.mark)

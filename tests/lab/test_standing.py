@@ -7,9 +7,10 @@ from typing import Any
 
 import pytest
 
+from realitygap._wording import duration
 from realitygap.lab import _figure_cache
 from realitygap.lab._figure_cache import keep_figures, read_figures, read_rows
-from realitygap.lab._pace import duration
+from realitygap.lab._messages import StudyProgress
 from realitygap.lab._standing import standing_of
 from realitygap.lab._studies import Studies, StudyState
 from realitygap.records import ResultsFolder
@@ -22,8 +23,10 @@ def state(n_done: int = 0, **values: Any) -> StudyState:
     return StudyState("mine", n_runs=8, n_done=n_done, **values)
 
 
-def job(*, is_over: bool = True, is_failed: bool = False, **values: Any) -> Any:
-    return SimpleNamespace(is_over=is_over, is_failed=is_failed, outcome="disk full", ask=None, **values)
+def job(*, is_over: bool = True, is_failed: bool = False, progress: StudyProgress | None = None) -> Any:
+    return SimpleNamespace(
+        is_over=is_over, is_failed=is_failed, outcome="disk full", ask=None, progress=progress
+    )
 
 
 CURVE = {
@@ -34,7 +37,7 @@ CURVE = {
         {"n": 8, "median": 0.5, "low": None, "high": None},
     ],
 }
-PROGRESS = {"n_done": 6, "n_runs": 8, "n_computed": 4, "seconds": 2.0}
+PROGRESS = StudyProgress(n_done=6, n_runs=8, n_computed=4, seconds=2.0)
 
 
 @pytest.mark.parametrize(

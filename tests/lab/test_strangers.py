@@ -11,7 +11,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from realitygap.lab._strangers import MOST_BYTES, PATIENCE_S, Strangers, most_strangers
+from realitygap.lab._connections import MOST_BYTES, PATIENCE_S, Strangers, most_strangers
 
 from .conftest import RunningLab
 from .sheets import drive_paths

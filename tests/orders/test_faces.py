@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 import realitygap.study
 from realitygap.cli import app
-from realitygap.lab._problem import Mistakes
+from realitygap.lab._mistakes import Mistakes
 from realitygap.orders import ORDERS, OrderError, read_order
 from realitygap.settings import MISSING
 

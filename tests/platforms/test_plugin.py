@@ -11,7 +11,7 @@ import pytest
 
 from realitygap.errors import RecordVersionError, StudyError
 from realitygap.evolution import Genome, NeatSettings, Population
-from realitygap.lab._live_work import open_robot
+from realitygap.lab._live import open_robot
 from realitygap.platforms import (
     Opening,
     allow_code,

@@ -11,8 +11,8 @@ import pytest
 
 from realitygap.errors import RecordError
 from realitygap.families.scribbler.emulator._memory import Memory
-from realitygap.lab._drawn import keep_drawn
 from realitygap.lab._photos import Photos
+from realitygap.lab._scoring_files import keep_drawn
 from realitygap.records import (
     Ledger,
     ObservationsFile,

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import queue
 import subprocess
 import sys
 import threading
-from collections.abc import Callable, Mapping
+import traceback
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+
+from ._messages import Ended, Message, Quit, Work, from_line, to_line
 
 PATIENCE_S = 10.0
 """Time after which a process that was told to end is killed [s]. It stops its robot first."""
@@ -23,14 +24,12 @@ class Child:
     does not read is full at some time.
 
     Args:
-        order: What it is to do.
+        work: What it is to do.
         folder: In which it works.
-        hear: Called with each thing that it says, in a thread of its own; at last with `{"kind": "ended"}`.
+        hear: Called with each thing that it says, in a thread of its own; at last with `Ended`.
     """
 
-    def __init__(
-        self, order: Mapping[str, Any], folder: Path, hear: Callable[[dict[str, Any]], None]
-    ) -> None:
+    def __init__(self, work: Work, folder: Path, hear: Callable[[Message], None]) -> None:
         self._hear = hear
         self._lines: queue.SimpleQueue[str | None] = queue.SimpleQueue()
         self._process = subprocess.Popen(
@@ -43,9 +42,9 @@ class Child:
             encoding="utf-8",
             start_new_session=True,  # Ctrl-C reaches it through the server, after which it stops its robot
         )
-        self.tell(order)
-        for work in (self._listen, self._send):
-            threading.Thread(target=work, daemon=True).start()
+        self.tell(work)
+        for act in (self._listen, self._send):
+            threading.Thread(target=act, daemon=True).start()
 
     @property
     def is_alive(self) -> bool:
@@ -57,13 +56,13 @@ class Child:
         """Number of the process."""
         return self._process.pid
 
-    def tell(self, message: Mapping[str, Any]) -> None:
+    def tell(self, message: Message) -> None:
         """Send a message to the process; do nothing if the process has ended."""
-        self._lines.put(json.dumps(message, separators=(",", ":")) + "\n")
+        self._lines.put(to_line(message))
 
     def ask_to_end(self) -> None:
         """Ask the process to stop its robot, then its work."""
-        self.tell({"do": "quit"})
+        self.tell(Quit())
 
     def end(self) -> None:
         """Ask the process to end, and wait for its end."""
@@ -89,8 +88,10 @@ class Child:
         pipe = self._process.stdout
         with contextlib.suppress(OSError, ValueError):
             for line in pipe or ():
-                with contextlib.suppress(ValueError):
-                    self._hear(json.loads(line))
+                try:
+                    self._hear(from_line(line))
+                except Exception:  # a process that is not heard to its end could not be ended
+                    traceback.print_exc()
         status = self._process.wait()
         self._lines.put(None)
-        self._hear({"kind": "ended", "status": status})
+        self._hear(Ended(status))

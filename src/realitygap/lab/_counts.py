@@ -24,8 +24,16 @@ from realitygap.records import (
 from realitygap.runs import Condition
 from realitygap.world import Arena
 
-from ._drawn import FOLDER, Draft, forget_draft, keep_draft, read_draft, read_drawn
-from ._proposals import Proposal, read_proposals
+from ._scoring_files import (
+    FOLDER,
+    Draft,
+    Proposal,
+    forget_draft,
+    keep_draft,
+    read_draft,
+    read_drawn,
+    read_proposals,
+)
 
 LONGEST_NOTE = 2000
 

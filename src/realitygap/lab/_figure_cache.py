@@ -7,25 +7,30 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from pydantic import TypeAdapter, ValidationError
+
 from realitygap import __version__
 from realitygap._limits import read_file
 from realitygap.errors import RecordError
 from realitygap.records import RESULTS_VERSION, refuse_links, write_whole
 
-from ._drawn import FOLDER, read_json, write_json
+from ._messages import Curve, Figure, SummaryRow
+from ._scoring_files import FOLDER, read_json, write_json
 
 _FIGURES, _SUMMARY, _THUMBNAIL = "figures.json", "summary.json", "thumbnail.svg"
 _LONGEST_THUMBNAIL = 500_000
 """Size above which a thumbnail is not shown [bytes]."""
-_TEXTS = ("caption", "alt", "wide", "narrow", "text")
+_ROWS = TypeAdapter(list[SummaryRow])
+_CURVES = TypeAdapter(list[Curve])
+_KEPT_FIGURES = TypeAdapter(dict[str, Figure])
 
 
 def keep_figures(
     folder: Path,
     done: Sequence[int],
-    rows: Sequence[Any],
-    curves: Sequence[Any],
-    figures: Mapping[str, Any],
+    rows: Sequence[SummaryRow],
+    curves: Sequence[Curve],
+    figures: Mapping[str, Figure],
 ) -> None:
     """Keep the figures of a study; nothing happens if the folder cannot be written.
 
@@ -42,7 +47,7 @@ def keep_figures(
         write_json(folder, folder / FOLDER / _FIGURES, values)
 
 
-def keep_rows(folder: Path, done: Sequence[int], rows: Sequence[Any]) -> None:
+def keep_rows(folder: Path, done: Sequence[int], rows: Sequence[SummaryRow]) -> None:
     """Keep the summary of the conditions; nothing happens if the folder cannot be written."""
     with contextlib.suppress(RecordError, OSError):
         write_json(folder, folder / FOLDER / _SUMMARY, {"of": _origin(done), "rows": list(rows)})
@@ -72,58 +77,24 @@ def has_thumbnail(folder: Path) -> bool:
 
 def read_figures(
     folder: Path, done: Sequence[int]
-) -> tuple[list[Any], list[Any], dict[str, dict[str, str]]] | None:
+) -> tuple[list[SummaryRow], list[Curve], dict[str, Figure]] | None:
     """Return the rows, curves, and figures that this version drew of these runs; None if there are none."""
-    kept = _kept(folder, _FIGURES, done)
-    figures, curves = kept.get("figures"), kept.get("curves")
-    rows = read_rows(folder, done)
-    if rows is None or not isinstance(figures, dict) or not _are_curves(curves):
+    kept, rows = _kept(folder, _FIGURES, done), read_rows(folder, done)
+    try:
+        curves = _CURVES.validate_python(kept.get("curves"), strict=True)
+        figures = _KEPT_FIGURES.validate_python(kept.get("figures"), strict=True)
+    except ValidationError:
         return None
-    found = {}
-    for name, figure in figures.items():
-        if not isinstance(figure, dict) or not all(isinstance(figure.get(key, ""), str) for key in _TEXTS):
-            return None
-        found[name] = {key: figure[key] for key in _TEXTS if key in figure}
-    return rows, curves or [], found
+    are_drawn = all(curve["points"] for curve in curves)
+    return (rows, curves, figures) if rows is not None and are_drawn else None
 
 
-def read_rows(folder: Path, done: Sequence[int]) -> list[dict[str, Any]] | None:
+def read_rows(folder: Path, done: Sequence[int]) -> list[SummaryRow] | None:
     """Return the summary of the conditions of these runs by this version; None if there is none."""
-    rows = _kept(folder, _SUMMARY, done).get("rows")
-    if not isinstance(rows, list) or not all(map(_is_row, rows)):
+    try:
+        return _ROWS.validate_python(_kept(folder, _SUMMARY, done).get("rows"), strict=True)
+    except ValidationError:
         return None
-    return rows
-
-
-def _are_curves(curves: Any) -> bool:
-    return isinstance(curves, list) and all(
-        isinstance(curve, dict)
-        and isinstance(curve.get("condition"), str)
-        and isinstance(curve.get("label"), str)
-        and isinstance(curve.get("points"), list)
-        and bool(curve["points"])
-        and all(map(_is_point, curve["points"]))
-        for curve in curves
-    )
-
-
-def _is_point(point: Any) -> bool:
-    return (
-        isinstance(point, dict)
-        and isinstance(point.get("n"), int)
-        and isinstance(point.get("median"), float | int)
-        and all(point.get(key) is None or isinstance(point[key], float | int) for key in ("low", "high"))
-    )
-
-
-def _is_row(row: Any) -> bool:
-    numbers = ("line_median", "line_low", "line_high")
-    return (
-        isinstance(row, dict)
-        and all(isinstance(row.get(key), str) for key in ("condition", "label"))
-        and isinstance(row.get("n"), int)
-        and all(row.get(key) is None or isinstance(row[key], float | int) for key in numbers)
-    )
 
 
 def _kept(folder: Path, name: str, done: Sequence[int]) -> dict[str, Any]:

@@ -15,6 +15,7 @@ from realitygap.errors import StudyError
 from realitygap.platforms import names_a_port, platform_names, platform_of, split_spec
 from realitygap.robot_families import ports_in_words
 from realitygap.robots import split_port
+from realitygap.runs import NAME_PATTERN
 from realitygap.settings import shown
 from realitygap.study import Study, python_tasks
 
@@ -51,6 +52,20 @@ def plain_files(folder: Path, endings: Collection[str]) -> list[Path]:
             if changed is not None and not path.is_dir():
                 found.append((-changed, path))
     return [path for _, path in sorted(found)]
+
+
+def is_name(text: str) -> bool:
+    """Return True if files of the lab can have this name."""
+    return re.fullmatch(NAME_PATTERN, text) is not None and len(text) <= 80
+
+
+def check_name(text: str) -> None:
+    """Raise a StudyError if files of the lab cannot have this name."""
+    if not is_name(text):
+        raise StudyError(
+            "Use letters, digits, '.', '-', and '_'. Start with a letter or digit. You entered "
+            f"{shown(text)}."
+        )
 
 
 def files_outside(root: Path, text: str) -> tuple[list[str], dict[str, Any]]:

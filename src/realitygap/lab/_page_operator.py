@@ -1,24 +1,23 @@
-"""Operators of a physical study whose trials are shown on a page."""
+"""Operators of a physical study whose trials are shown on a page, and the camera above its robot."""
 
 from __future__ import annotations
 
 import contextlib
 import threading
-import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import Any
 
 from realitygap.emulator import Witness
-from realitygap.errors import RobotError
+from realitygap.errors import RobotError, StudyError
 from realitygap.records import LEDGER_NAME, Ledger, Score, TrialRecord
 from realitygap.robots import Command, Observation, Robot
-from realitygap.study import CameraObserver
+from realitygap.study import CameraObserver, Study, physical_conditions, read_camera
 from realitygap.trials import Card, Operator, Preflight, Verdict, WitnessObserver, own_witness
+from realitygap.vision import CameraDevice, LiveTrack
 
-from ._channel import Channel, Message
-from ._drawn import keep_drawn
-from ._proposals import keep_proposal, track_proposal
+from . import _messages as messages
+from ._channel import Channel
+from ._scoring_files import keep_drawn, keep_proposal, track_proposal
 
 LIVE_S = 0.05
 """Time between two messages on the position of an emulated robot [s]."""
@@ -30,13 +29,13 @@ class _Stops:
     def __init__(self, channel: Channel) -> None:
         self.is_asked = False
         self._robot: Robot | None = None
-        channel.at_once("stop", self._stop)
+        channel.at_once(messages.Stop, self._stop)
 
     def met(self, robot: Robot) -> None:
         """Remember the robot that a stop has to reach."""
         self._robot = robot
 
-    def _stop(self, message: Message) -> None:
+    def _stop(self, _wish: messages.Stop) -> None:
         self.is_asked = True
         if self._robot is not None:
             self._robot.stop()
@@ -62,7 +61,7 @@ class _Live:
         # the trial ends with the emulator, and the loop that drives reports it
         with contextlib.suppress(RobotError):
             while not ended.wait(LIVE_S):
-                self._channel.say("pose", pose=list(witness.pose()))
+                self._channel.say(messages.RobotPose(list(witness.pose())))
 
 
 class _Shown:
@@ -76,37 +75,29 @@ class _Shown:
     def met(self, robot: Robot) -> None:
         """Report the robot that is in use."""
         self.stops.met(robot)
-        self._channel.say("met", label=robot.label)
+        self._channel.say(messages.RobotMet(robot.label))
 
     def begun(self, card: Card, observer: WitnessObserver | None) -> None:
         """The robot stands at the start of a trial."""
         if observer is not None:
             self._live.begin(observer.witness)
         self.stops.is_asked = False
-        self._channel.say("driving", card=card_values(card))
+        self._channel.say(messages.TrialBegun(card_values(card)))
 
     def step(self, card: Card, step: int, seen: Observation, command: Command) -> bool:
         """Report a step that begins; return True if a person pressed stop."""
-        self._channel.say(
-            "step",
-            step=step,
-            n_steps=card.n_steps,
-            raw=list(seen.raw),
-            readings=list(seen.readings),
-            stalled=seen.stalled,
-            move=command.move,
-            turn=command.turn,
-        )
+        raw, (move, turn) = list(seen.raw), command
+        self._channel.say(messages.Step(step, card.n_steps, raw, stalled=seen.stalled, move=move, turn=turn))
         return self.stops.is_asked
 
     def cut_off(self) -> None:
         """The trial was interrupted."""
         self._live.end()
 
-    def driven(self, card: Card) -> None:
+    def driven(self) -> None:
         """The trial has ended."""
         self._live.end()
-        self._channel.say("driven", trial=card.trial.trial)
+        self._channel.say(messages.TrialDriven())
 
 
 class WatchedOperator(Operator):
@@ -131,14 +122,14 @@ class WatchedOperator(Operator):
 
     def accept(self, preflight: Preflight) -> bool:
         """Return True if the check found no problem; the page shows the problems."""
-        self._channel.say("preflight", facts=preflight.facts, problems=list(preflight.problems))
+        self._channel.say(_result_of(preflight))
         return super().accept(preflight)
 
     def settle(self, card: Card, problem: str) -> Verdict:
         """Void the trial; after a stop, wait until a visitor continues."""
         if self._is_stopped:
             self._is_stopped = False
-            self._channel.ask("go on", card=card_values(card), problem=problem)
+            self._channel.ask(messages.ContinueQuestion(card_values(card), problem))
         return super().settle(card, problem)
 
     def place(self, card: Card) -> None:
@@ -156,7 +147,7 @@ class WatchedOperator(Operator):
 
     def drawn(self, card: Card, record: TrialRecord) -> Score | None:
         """The cells along the driven line."""
-        self._page.driven(card)
+        self._page.driven()
         return super().drawn(card, record)
 
 
@@ -197,28 +188,27 @@ class PageOperator(Operator):
             else:
                 self.observer = self._witness
         else:
-            self._channel.ask("meet", label=robot.label)
+            self._channel.ask(messages.MeetQuestion())
         super().meet(robot)
 
     def accept(self, preflight: Preflight) -> bool:
         """Show the result of the pre-flight check; return whether to drive."""
-        found: dict[str, Any] = {"facts": preflight.facts, "problems": list(preflight.problems)}
-        self._channel.say("preflight", **found)
+        self._channel.say(_result_of(preflight))
         if not preflight.problems:
             return True
-        return bool(self._channel.ask("accept", **found).get("yes"))
+        return self._channel.ask(messages.AcceptQuestion(list(preflight.problems))).choice == "yes"
 
     # a trial
 
     def settle(self, card: Card, problem: str) -> Verdict:
         """Ask whether a trial that was cut off counts."""
         self._page.cut_off()
-        answer = self._channel.ask("settle", card=card_values(card), problem=problem)
-        return "driven" if answer.get("verdict") == "driven" else "void"
+        choice = self._channel.ask(messages.SettleQuestion(card_values(card), problem)).choice
+        return "driven" if choice == "driven" else "void"
 
     def place(self, card: Card) -> None:
         """Request control at its start, with the pen."""
-        self._channel.ask("place", card=card_values(card), is_placed=self._witness is not None)
+        self._channel.ask(messages.PlaceQuestion(card_values(card), is_placed=self._witness is not None))
         super().place(card)
         self._page.begun(card, self._witness)
 
@@ -229,7 +219,7 @@ class PageOperator(Operator):
 
     def drawn(self, card: Card, record: TrialRecord) -> Score | None:
         """Return the score, or None if a person must check the cells first; they are saved as a proposal."""
-        self._page.driven(card)
+        self._page.driven()
         seen, number = super().drawn(card, record), card.trial.trial
         if card.observe != "cells" or (
             seen is not None and seen.who == CameraObserver.who and not self.proposer
@@ -250,11 +240,8 @@ class PageOperator(Operator):
             numbers = [card.trial.trial for card in cards]
             with Ledger.open(self._folder / LEDGER_NAME, writable=False) as ledger:
                 self._channel.ask(
-                    "score",
+                    messages.ScoreQuestion(numbers, cards[0].trial.sheet, is_full),
                     until=lambda: all(ledger.trial(number).state != "driven" for number in numbers),
-                    trials=numbers,
-                    sheet=cards[0].trial.sheet,
-                    is_full=is_full,
                 )
         return ()
 
@@ -268,21 +255,51 @@ class PageOperator(Operator):
 
             if has_changed():
                 return ()
-            answer = self._channel.ask("close", until=has_changed, trials=numbers)
-        number = answer.get("undo")
-        return [number] if number in numbers else ()
+            again = self._channel.ask(messages.CloseQuestion(numbers), until=has_changed).trial
+        return [again] if again in numbers else ()
 
 
-def card_values(card: Card) -> dict[str, Any]:
+def _result_of(preflight: Preflight) -> messages.PreflightResult:
+    return messages.PreflightResult(preflight.facts, list(preflight.problems))
+
+
+def card_values(card: Card) -> messages.TrialCard:
     """Return the facts that a page shows about a trial; a blind trial hides its condition."""
-    trial = card.trial
     return {
-        "trial": trial.trial,
+        "trial": card.trial.trial,
         "title": card.title,
-        "code": trial.code,
         "pen": card.pen,
-        "sheet": trial.sheet,
+        "sheet": card.trial.sheet,
         "n_steps": card.n_steps,
         "n_left": card.n_left,
-        "time": time.time(),
     }
+
+
+@contextlib.contextmanager
+def under_camera(
+    spec: str, study: Study, operator: PageOperator, say: Callable[[str], None], *, asks: bool
+) -> Iterator[PageOperator]:
+    """The operator of a sitting with a camera above the robot.
+
+    Args:
+        spec: Of the camera, as `read_camera` takes it.
+        study: Whose first physical condition says in which arena.
+        operator: Without a camera.
+        say: Told what the camera did not see.
+        asks: Whether its cells wait for somebody to look at them; else they are entered as they are.
+
+    Raises:
+        StudyError: The camera's options cannot be.
+        VisionError: There is no such camera.
+    """
+    arena = physical_conditions(study)[0].arena.arena()
+    name, marks = read_camera(spec, arena)
+    if not name.isdecimal():
+        raise StudyError(
+            f"The camera is {spec!r}, expected its number such as 0, or 0?tag=10&tag-height=0.1. A video is tracked "
+            "after the sitting, below."
+        )
+    with LiveTrack(CameraDevice(int(name)), marks) as live:
+        operator.observer = CameraObserver(live, arena, say=say)
+        operator.proposer = f"camera {name}" if asks else ""
+        yield operator

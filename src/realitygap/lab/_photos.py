@@ -1,27 +1,64 @@
-"""Photographs of a study's sheets: saved next to its ledger, and read one by one."""
+"""Photographs of a study's sheets: saved next to its ledger, and read one by one.
+
+`Photos` is what pages see; `read` runs in a process of its own.
+"""
 
 from __future__ import annotations
 
 import contextlib
+import io
 import re
 import threading
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from realitygap._limits import read_file
 from realitygap.errors import StudyError
-from realitygap.records import refuse_links, write_whole
-from realitygap.vision import photo_hash
+from realitygap.records import (
+    LEDGER_NAME,
+    Ledger,
+    ResultsFolder,
+    refuse_links,
+    settings_of_condition,
+    write_whole,
+)
+from realitygap.runs import Condition
+from realitygap.vision import (
+    PEN_NAMES,
+    SheetLayout,
+    SheetScore,
+    SheetTrials,
+    TraceScore,
+    photo_bytes,
+    photo_hash,
+    read_photo,
+    score_sheet,
+    trials_on_sheet,
+)
 
 from ._access import LARGEST_BODY
+from ._channel import Channel
 from ._child import Child
-from ._drawn import FOLDER, read_json, write_json
+from ._messages import Ended, Failure, Message, PhotoRead, PhotoStage, PhotoWork
+from ._scoring_files import FOLDER, Proposal, keep_proposal, read_json, write_json
 
 MOST_WAITING = 8
 """Photographs that may wait to be read."""
 LONGEST_NAME = 80
+JUMP_M = 0.02
+"""Points of a trace farther apart belong to two pieces of it."""
+QUALITY = 80
+"""Quality of the JPEG that the page shows."""
+_SPOILED = (
+    "This pen also drew trial {}, which is void. Where that line is still on the sheet, both look alike."
+)
 _MARK = re.compile(r"[0-9a-f]{64}")
 
 PhotoState = Literal["waiting", "reading", "read", "refused"]
@@ -159,32 +196,31 @@ class Photos:
             photo = waiting[0]
             self._reading = photo.mark
             self._photos[photo.mark] = replace(photo, state="reading", said="Opening it")
-            order = {
-                "work": "photo",
-                "folder": str(self._folder),
-                "photo": str(self._file(photo.mark)),
-                "picture": str(self._place / f"{photo.mark}.jpg"),
-                "name": photo.name,
-                "sha256": photo.mark,
-                "sheet": photo.sheet,
-            }
-            self._child = Child(order, self._root, self._hear)
+            work = PhotoWork(
+                folder=str(self._folder),
+                photo=str(self._file(photo.mark)),
+                picture=str(self._place / f"{photo.mark}.jpg"),
+                name=photo.name,
+                sha256=photo.mark,
+                sheet=photo.sheet,
+            )
+            self._child = Child(work, self._root, self._hear)
 
-    def _hear(self, message: dict[str, Any]) -> None:
+    def _hear(self, message: Message) -> None:
         with self._lock:
             photo = self._photos.get(self._reading)
             if photo is None:
                 return
-            kind = message.get("kind")
-            if kind == "stage":
-                self._photos[photo.mark] = replace(photo, said=message["text"])
-                self._changed()
-            elif kind == "read":
-                self._put(_read(photo, message))
-            elif kind == "error":
-                self._put(replace(photo, state="refused", said=message["text"]))
-            elif kind == "ended":
-                self._ended(photo)
+            match message:
+                case PhotoStage():
+                    self._photos[photo.mark] = replace(photo, said=message.text)
+                    self._changed()
+                case PhotoRead():
+                    self._put(_read(photo, message))
+                case Failure():
+                    self._put(replace(photo, state="refused", said=message.text))
+                case Ended():
+                    self._ended(photo)
 
     def _ended(self, photo: SheetPhoto) -> None:
         self._reading = ""
@@ -195,14 +231,14 @@ class Photos:
         self._go_on()
 
 
-def _read(photo: SheetPhoto, message: dict[str, Any]) -> SheetPhoto:
-    untried = ", ".join(message["untried"])
+def _read(photo: SheetPhoto, message: PhotoRead) -> SheetPhoto:
+    untried = ", ".join(message.untried)
     said = (
         f"Not tried in their boxes, so their colors are guessed from their names: {untried}."
         if untried
         else ""
     )
-    return replace(photo, state="read", said=said, box=message["box"], trials=message["trials"])
+    return replace(photo, state="read", said=said, box=message.box, trials=message.trials)
 
 
 def _kept(place: Path) -> list[SheetPhoto]:
@@ -222,3 +258,67 @@ def _plain(name: str) -> str:
     """A file's name without a folder or anything that cannot be printed."""
     last = re.split(r"[/\\]", name)[-1]
     return "".join(letter for letter in last if letter.isprintable())[-LONGEST_NAME:].strip() or "photo"
+
+
+# in a process
+
+
+def read(channel: Channel, work: PhotoWork) -> None:
+    """Read a photograph, keep what it proposes, and the sheet as it looks from straight above."""
+    folder = Path(work.folder)
+    channel.say(PhotoStage("Looking for the sheet and its pens"))
+    image = read_photo(photo_bytes(read_file(Path(work.photo), LARGEST_BODY, plain=True)))
+    with Ledger.open(folder / LEDGER_NAME, writable=False) as ledger:
+        on_sheet = trials_on_sheet(ledger, sheet=work.sheet, role="second")
+    layout = _layout(folder, on_sheet.waiting[0].condition)
+    found = score_sheet(image, layout, on_sheet.pens)
+    _keep_picture(found.picture, Path(work.picture), folder)
+    _propose(folder, on_sheet, found, work)
+    trials = [trial.trial for trial in on_sheet.waiting]
+    untried = [trace.name for trace in found.traces if not trace.is_tried]
+    channel.say(PhotoRead(list(layout.paper), trials, untried))
+
+
+def _layout(folder: Path, name: str) -> SheetLayout:
+    """Return the layout of a condition's sheet."""
+    description = ResultsFolder.open(folder).description
+    settings = settings_of_condition(description, name)
+    pens = tuple((description.get("trials") or {}).get("pens") or PEN_NAMES)
+    try:
+        return SheetLayout.of(Condition.from_settings(name, settings).arena.arena(), pens)
+    except ValueError as error:
+        raise StudyError(f"There is no sheet to print for this study: {error}.") from error
+
+
+def _keep_picture(picture: NDArray[np.uint8], path: Path, folder: Path) -> None:
+    file = io.BytesIO()
+    Image.fromarray(picture).save(file, "JPEG", quality=QUALITY)
+    write_whole(path, file.getvalue(), within=folder)
+
+
+def _propose(folder: Path, on_sheet: SheetTrials, found: SheetScore, work: PhotoWork) -> None:
+    traces = {trace.pen: trace for trace in found.traces}
+    for trial in on_sheet.waiting:
+        trace, spoiled = traces[trial.pen], on_sheet.spoiled.get(trial.pen)
+        proposal = Proposal(
+            kind="photo",
+            mark=work.sha256,
+            source=work.name,
+            time=time.time(),
+            cells=list(trace.cells),
+            sure=np.round(trace.confidence, 4).tolist(),
+            doubtful=list(trace.doubtful),
+            lines=pieces(trace),
+            said="" if spoiled is None else _SPOILED.format(spoiled.trial),
+            is_spoiled=spoiled is not None,
+        )
+        keep_proposal(folder, trial.trial, proposal)
+
+
+def pieces(trace: TraceScore) -> list[list[list[float]]]:
+    """The line through a trace where it is seen, (x, y) [m]."""
+    path = np.round(trace.path, 4)
+    if len(path) < 2:
+        return []
+    cuts = np.flatnonzero(np.hypot(*np.diff(path, axis=0).T) > JUMP_M) + 1
+    return [part.tolist() for part in np.split(path, cuts) if len(part) > 1]

@@ -161,8 +161,8 @@ def _prepare(root: Path, token: str, port: int, *, is_local: bool, allow_code: b
     from nicegui import app as nicegui_app
     from nicegui import run, ui
 
+    from ._connections import Strangers, guarded_protocol, most_strangers
     from ._lab import Lab
-    from ._strangers import Strangers, guarded_protocol, most_strangers
     from .pages import add_pages
 
     lab = Lab(root, allow_code=allow_code)

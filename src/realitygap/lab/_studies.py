@@ -72,12 +72,32 @@ class StudyState:
     @property
     def is_complete(self) -> bool:
         """True if all runs are there."""
-        return not self.problem and (self.n_done, self.n_driven_done) == (self.n_runs, self.n_driven_runs)
+        return not self.problem and self.done == (self.n_runs, self.n_driven_runs)
 
     @property
     def has_robot(self) -> bool:
         """True if a robot drives some of its conditions."""
         return self.n_driven_runs > 0
+
+    @property
+    def n_all_done(self) -> int:
+        """Number of published runs, simulated and driven."""
+        return self.n_done + self.n_driven_done
+
+    @property
+    def n_all(self) -> int:
+        """Number of runs, simulated and driven."""
+        return self.n_runs + self.n_driven_runs
+
+    @property
+    def done(self) -> tuple[int, int]:
+        """Number of published runs: simulated, and driven."""
+        return self.n_done, self.n_driven_done
+
+    @property
+    def share(self) -> float:
+        """Share of its runs that are published, 0 to 1."""
+        return self.n_all_done / max(self.n_all, 1)
 
 
 class Studies:

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import contextlib
 import gzip
 import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TypedDict
 
 from realitygap.drawing import themed_file
 
-from ._drawer import Drawer
+from . import _messages as messages
+from ._drawing import Drawer, DrawingWish
 from ._figure_cache import read_figures
 
 LEAST_S = 1.0
@@ -28,6 +28,16 @@ LIVE = ("scores", "coverage")
 MOST_REPLAYS = 64
 
 
+class PackedFigure(TypedDict, total=False):
+    """A `Figure` with its drawings packed by gzip, as they are served."""
+
+    caption: str
+    alt: str
+    wide: bytes
+    narrow: bytes
+    text: str
+
+
 class Watcher:
     """Figures of a study, drawn once for all pages.
 
@@ -37,7 +47,7 @@ class Watcher:
         rows: Condition, label, number of runs, median best coverage, and its interval, for each condition.
         curves: Best coverage of each condition by generation, as `curves_of` returns it.
         replays: What was asked to be played, by the key of who asked; or why it cannot be.
-        report_said: Why no report could be written; empty otherwise.
+        report_problem: Why no report could be written; empty otherwise.
         report_stamp: Changes whenever one was written, or could not be.
 
     Args:
@@ -47,16 +57,16 @@ class Watcher:
     """
 
     def __init__(self, folder: Path, drawer: Drawer, changed: Callable[[], None]) -> None:
-        self.figures: dict[str, dict[str, Any]] = {}
+        self.figures: dict[str, PackedFigure] = {}
         self.n_drawn = 0
-        self.rows: list[dict[str, Any]] = []
-        self.curves: list[dict[str, Any]] = []
-        self.replays: dict[str, dict[str, Any]] = {}
-        self.report_said = ""
+        self.rows: list[messages.SummaryRow] = []
+        self.curves: list[messages.Curve] = []
+        self.replays: dict[str, messages.Replay | messages.ReplayRefused] = {}
+        self.report_problem = ""
         self.report_stamp = 0
         self._folder, self._drawer, self._changed = folder, drawer, changed
         self._lock = threading.Lock()
-        self._stamp: Any = None
+        self._stamp: tuple[int, int, bool] | None = None
         self._due = 0.0
         self._since = time.monotonic()
         self._not_before = 0.0
@@ -83,15 +93,15 @@ class Watcher:
             self._changed()
             return
         self._stamp, self._is_drawing = stamp, True
-        self._want(what="figures", names=list(LIVE) if is_running else None, done=list(done))
+        self._want(messages.FiguresWish(str(self._folder), done, list(LIVE) if is_running else None))
 
     def want_thumbnail(self, done: tuple[int, int]) -> None:
         """Have the small picture and the summary of these runs saved in the study's folder, once."""
         if self._thumbnail != done:
             self._thumbnail = done
-            self._want(what="thumbnail", done=list(done))
+            self._want(messages.ThumbnailWish(str(self._folder), done))
 
-    def typical(self, condition: str, done: int) -> dict[str, Any] | None:
+    def typical(self, condition: str, done: int) -> messages.Replay | messages.ReplayRefused | None:
         """Return the typical run of a condition to be played, or why it cannot be; ask for it and return None before.
 
         Args:
@@ -107,7 +117,7 @@ class Watcher:
         self.replay(key, [{"condition": condition}])
         return None
 
-    def replay(self, key: str, choices: list[dict[str, Any]]) -> None:
+    def replay(self, key: str, choices: list[messages.TrialChoice]) -> None:
         """Ask for trials to be played; they come into `replays` under the key."""
         with self._lock:
             self.replays.pop(key, None)
@@ -115,39 +125,34 @@ class Watcher:
                 oldest = next(iter(self.replays))
                 del self.replays[oldest]
                 self._typical.discard(oldest)
-        self._want(what="replay", key=key, choices=choices)
+        self._want(messages.ReplayWish(str(self._folder), key, choices))
 
     def write_report(self) -> None:
         """Ask for the report to be written."""
-        self.report_said = ""
-        self._want(what="report", key="report")
+        self.report_problem = ""
+        self._want(messages.ReportWish(str(self._folder)))
 
-    def _want(self, **wish: Any) -> None:
-        self._drawer.want(self._folder, self._hear, **wish)
+    def _want(self, wish: DrawingWish) -> None:
+        self._drawer.want(wish, self._hear)
 
-    def _hear(self, message: dict[str, Any]) -> None:
-        kind = message.get("kind")
-        with contextlib.suppress(KeyError):
-            if kind == "figure":
-                self.figures[message["name"]] = _packed(message)
-            elif kind == "drawn":
+    def _hear(self, message: messages.Message) -> None:
+        match message:
+            case messages.FigureDrawn():
+                self.figures[message.name] = _packed(message.figure)
+            case messages.FiguresDrawn():
                 self.n_drawn += 1
                 self._is_drawing = False
                 now = time.monotonic()
-                pause = min(SHARE * message["seconds"], GROWTH * (now - self._since))
+                pause = min(SHARE * message.seconds, GROWTH * (now - self._since))
                 self._due = now + max(LEAST_S, pause)
-            elif kind == "summary":
-                self.rows, self.curves = message["rows"], message["curves"]
-            elif kind == "replay":
-                self.replays[message["key"]] = message
-            elif kind == "report":
+            case messages.StudySummary():
+                self.rows, self.curves = message.rows, message.curves
+            case messages.Replay() | messages.ReplayRefused():
+                self.replays[message.key] = message
+            case messages.ReportWritten():
+                self.report_problem = message.problem
                 self.report_stamp += 1
-            elif kind == "refused" and message["key"] == "report":
-                self.report_said = message["text"]
-                self.report_stamp += 1
-            elif kind == "refused" and message["key"]:
-                self.replays[message["key"]] = message
-            elif kind == "ended":
+            case messages.Ended():
                 self._typical.intersection_update(self.replays)
                 if self._is_drawing:  # it ended before it had drawn what was asked for
                     self._stamp, self._is_drawing = None, False
@@ -155,11 +160,12 @@ class Watcher:
         self._changed()
 
 
-def _packed(figure: dict[str, Any]) -> dict[str, Any]:
-    """A figure, its drawings packed as they are served."""
-    drawn: dict[str, Any] = {
-        key: gzip.compress(themed_file(figure[key]).encode(), 6)
-        for key in ("wide", "narrow")
-        if key in figure
+def _packed(figure: messages.Figure) -> PackedFigure:
+    if "wide" not in figure:
+        return {"text": figure["text"]}
+    return {
+        "caption": figure["caption"],
+        "alt": figure["alt"],
+        "wide": gzip.compress(themed_file(figure["wide"]).encode(), 6),
+        "narrow": gzip.compress(themed_file(figure["narrow"]).encode(), 6),
     }
-    return {**figure, **drawn}

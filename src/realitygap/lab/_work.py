@@ -7,25 +7,13 @@ import signal
 import sys
 import traceback
 from collections.abc import Callable
-from importlib import import_module
 
 from realitygap._interrupts import kept_interrupts
 from realitygap.errors import RealityGapError, RobotError
+from realitygap.robot_families import load
 
-from ._channel import Channel, Message
-
-_WORK = {
-    "check": "_check_work",
-    "study": "_study_work",
-    "robot": "_robot_work",
-    "identify": "_identify_work",
-    "watch": "_watch_work",
-    "gap": "_gap_work",
-    "calibrate": "_calibrate_work",
-    "photo": "_photo_work",
-    "track": "_track_work",
-    "live": "_live_work",
-}
+from ._channel import Channel
+from ._messages import Failure, Interrupted, Work
 
 
 def main() -> int:
@@ -38,7 +26,7 @@ def main() -> int:
         return _work(channel)
     except KeyboardInterrupt:  # also one that comes while a failure is reported
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # one that comes once more is the same one
-        channel.say("interrupted")
+        channel.say(Interrupted())
         return 130
     finally:
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # Python does not catch one while it ends
@@ -46,19 +34,19 @@ def main() -> int:
 
 def _work(channel: Channel) -> int:
     try:
-        order = channel.begin()
-        work: Callable[[Channel, Message], None] = import_module(f"{__package__}.{_WORK[order['work']]}").work
+        work = channel.begin()
+        act: Callable[[Channel, Work], None] = load(f"{__package__}.{work.function}")
         with kept_interrupts():
-            work(channel, order)
+            act(channel, work)
     except (RealityGapError, OSError, ValueError) as error:
-        channel.say("error", text=str(error), is_of_robot=isinstance(error, RobotError))
+        channel.say(Failure(str(error), isinstance(error, RobotError)))
         return 1
     except Exception as error:
         if isinstance(error.__cause__, KeyboardInterrupt):  # Python 3.11 reports one in a class body so
             raise KeyboardInterrupt from error
         traceback.print_exc()
         channel.say(
-            "error", text=f"This is a mistake in realitygap, and nothing that was written is lost: {error!r}."
+            Failure(f"This is a mistake in realitygap, and nothing that was written is lost: {error!r}.")
         )
         return 1
     return 0

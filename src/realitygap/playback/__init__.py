@@ -8,13 +8,24 @@ from ._divergence import Divergence, measure_divergence, own_divergence
 from ._live import WatchedRobot
 from ._movie import WIDTH, save_movie
 from ._moving import MovingTrial, RobotShape, first_visits, in_motion, placed, ray_ends
-from ._player import pack_pen, pack_scene, pack_shape, pack_trials, play, widget_class
+from ._player import (
+    PackedScene,
+    PackedTrial,
+    pack_pen,
+    pack_scene,
+    pack_shape,
+    pack_trials,
+    play,
+    widget_class,
+)
 from ._twin import TwinDrive, save_twin_trial, wander
 
 __all__ = [
     "WIDTH",
     "Divergence",
     "MovingTrial",
+    "PackedScene",
+    "PackedTrial",
     "RobotShape",
     "TwinDrive",
     "WatchedRobot",

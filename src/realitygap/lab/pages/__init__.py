@@ -9,6 +9,7 @@ from nicegui import app
 from realitygap.lab._lab import Lab
 
 from ._calibrate import add_calibrate
+from ._control import add_stop
 from ._error_pages import add_error_pages
 from ._gap import add_gap
 from ._home import add_home
@@ -16,7 +17,6 @@ from ._new import add_new
 from ._photos import add_photos
 from ._robot import add_robot
 from ._saved import add_saved
-from ._stop import add_stop
 from ._study import add_study
 from ._trials import add_trials
 

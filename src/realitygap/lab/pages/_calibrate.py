@@ -3,25 +3,27 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from nicegui import ui
 from starlette.requests import Request
 
 from realitygap.drawing import Ink, themed_color
-from realitygap.lab._gap_plan import PLACING_S
-from realitygap.lab._lab import Lab, Visitor
-from realitygap.lab._measuring_jobs import CalibrationJob
+from realitygap.lab import _messages as messages
+from realitygap.lab._calibration import CalibrationJob, calibration_mistakes
+from realitygap.lab._control import Visitor
+from realitygap.lab._gap import PLACING_S
+from realitygap.lab._lab import Lab
 from realitygap.orders import CalibrateOrder
 from realitygap.platforms import emulated_robots
 from realitygap.robot_families import default_family, port_platforms
 from realitygap.world import Fitted, load_arena
 
-from ._fields import Form
+from ._control import show_holder
+from ._elements import CellGrid
+from ._fields import Form, needed
 from ._frame import framed, hint, section, text_of, visitor_of
-from ._grid import CellGrid
-from ._handover import show_holder
 from ._notices import attempt, notify
 from ._part import LOOK_S, Part, watching
 from ._status import Silence, show_steps
@@ -67,6 +69,7 @@ def add_calibrate(lab: Lab) -> None:
 class _Page:
     def __init__(self, lab: Lab, visitor: Visitor) -> None:
         self._lab = lab
+        self._mistakes = partial(calibration_mistakes, lab.root)
         self._visitor = visitor
         self._chart: ui.echart | None = None
         self._is_new = False
@@ -112,16 +115,16 @@ class _Page:
         job = self._lab.calibration
         if job is None:
             return None
-        return id(job), job.n_done, job.n_trials, job.outcome, self._lab.operator, len(job.readings)
+        return id(job), job.n_done, job.n_trials, job.outcome, self._lab.robot.operator, len(job.readings)
 
-    def _asked_stand(self) -> tuple[CalibrationJob, dict[str, Any]] | None:
+    def _asked_stand(self) -> tuple[CalibrationJob, messages.Question] | None:
         """The question that this visitor can answer, with its job."""
         job = self._lab.calibration
         ask = None if job is None or job.is_over else job.ask
         return None if job is None or ask is None or not self._may(job) else (job, ask)
 
     def _may(self, job: CalibrationJob) -> bool:
-        return not job.has_robot or self._lab.may_operate(self._visitor)
+        return not job.has_robot or self._lab.robot.may_operate(self._visitor)
 
     def _step(self) -> str:
         job = self._lab.calibration
@@ -175,7 +178,7 @@ class _Page:
                 explanation=f"{port_platforms()}, twin:FILE, sim, or sim:FILE. Emulated robots: "
                 f"{', '.join(emulated_robots())}.",
             )
-            form.text("name", "Name", "my-robot", is_needed=True, explanation="Name of the calibration file.")
+            form.text("name", "Name", "my-robot", parse=needed, explanation="Name of the calibration file.")
             ui.button("Next", on_click=self._go_to_kinds).props("unelevated no-caps")
         with ui.element("div").classes("lab-form") as self._kind_box:
             section("What to calibrate")
@@ -195,7 +198,7 @@ class _Page:
                         form.field_of(field)
 
         async def start() -> None:
-            if not await form.submit(begin, self._lab.calibration_mistakes) and any(
+            if not await form.submit(begin, self._mistakes) and any(
                 self._form.is_wrong(key) for key in _OF_ROBOT
             ):
                 self._show_stage("Robot")
@@ -211,7 +214,7 @@ class _Page:
 
     async def _go_to_kinds(self) -> None:
         """Go on to the kinds of calibration if the robot and the name can be used."""
-        found = await self._form.all_problems(self._lab.calibration_mistakes)
+        found = await self._form.all_problems(self._mistakes)
         problems = {key: text for key, text in found.items() if key in _OF_ROBOT}
         self._form.show_problems(problems)
         if not problems:
@@ -266,7 +269,7 @@ class _Page:
             job.is_failed,
             job.n_done,
             self._may(job),
-            self._lab.operator,
+            self._lab.robot.operator,
         )
 
     def _unfinished_state(self) -> tuple[Any, ...] | None:
@@ -306,7 +309,7 @@ class _Page:
     def _show_plot(self) -> None:
         """Show the mean reading of each sensor by distance from the wall, or by trial."""
         job, self._chart = self._lab.calibration, None
-        if job is not None and any(each["means"] for each in job.readings):
+        if job is not None and any(point["means"] for point in job.readings):
             self._chart = ui.echart({}, renderer="svg").classes("lab-plot").props('role="img"')
             _grow(self._chart, job)
 
@@ -316,58 +319,63 @@ class _Page:
             _show_fit(job.made, job.name)
 
 
-def _show_question(asked: tuple[CalibrationJob, dict[str, Any]] | None) -> None:
+def _show_question(asked: tuple[CalibrationJob, messages.Question] | None) -> None:
     if asked is None:
         return
-    job, ask = asked
+    job, question = asked
 
-    def answer(**values: Any) -> None:
-        if not job.answer(ask["number"], **values):
+    def answer(
+        choice: messages.Choice = "", *, cells: list[int] | None = None, lengths: dict[str, str] | None = None
+    ) -> None:
+        if not job.answer(messages.Answer(question.number, choice, cells=cells or [], lengths=lengths or {})):
             notify("Another page has answered this question.")
 
+    def button(text: str, choice: messages.Choice, look: str = "outline") -> ui.button:
+        return ui.button(text, on_click=lambda: answer(choice)).props(f"{look} no-caps")
+
     with ui.card().classes("lab-card lab-question").props('role="status"'):
-        if ask["question"] == "place":
-            ui.label(f"Trial {ask['trial'] + 1} of {ask['n']}").classes("lab-section")
-            ui.label(ask["text"][:1].upper() + ask["text"][1:])
-            with ui.row().classes("lab-row"):
-                ui.button("Robot is in place", on_click=lambda: answer(answer="go")).props(
+        match question:
+            case messages.StartQuestion():
+                ui.label(f"Trial {question.trial + 1} of {question.n}").classes("lab-section")
+                ui.label(question.text[:1].upper() + question.text[1:])
+                with ui.row().classes("lab-row"):
+                    button("Robot is in place", "go", "unelevated")
+                    button("Undo last trial", "redo").set_enabled(question.trial > 0)
+            case messages.RepeatQuestion():
+                ui.label(question.problem)
+                with ui.row().classes("lab-row"):
+                    if question.can_count:
+                        button("Use this trial", "driven", "unelevated")
+                    button("Repeat trial", "void")
+            case messages.LengthsQuestion():
+                fields = {
+                    key: ui.input(text).props("outlined dense") for key, text in question.labels.items()
+                }
+                ui.label(question.problem).classes("lab-problem")
+                with ui.row().classes("lab-row"):
+                    ui.button(
+                        "Save",
+                        on_click=lambda: answer(
+                            lengths={key: text_of(field) for key, field in fields.items()}
+                        ),
+                    ).props("unelevated no-caps")
+                    button("Repeat trial", "redo")
+            case messages.CellsQuestion():
+                cells: list[int] = []
+                ui.label("Mark the cells that the line crosses").classes("lab-section")
+                CellGrid(
+                    load_arena("paper"),
+                    name="Cells crossed",
+                    change=lambda marked: cells.__setitem__(slice(None), marked),
+                )
+                ui.button("Save score", on_click=lambda: answer(cells=list(cells))).props(
                     "unelevated no-caps"
                 )
-                ui.button("Undo last trial", on_click=lambda: answer(answer="redo")).props(
-                    "outline no-caps"
-                ).set_enabled(ask["trial"] > 0)
-        elif ask["question"] == "settle":
-            ui.label(ask["problem"])
-            with ui.row().classes("lab-row"):
-                if ask["can_count"]:
-                    ui.button("Use this trial", on_click=lambda: answer(verdict="driven")).props(
-                        "unelevated no-caps"
-                    )
-                ui.button("Repeat trial", on_click=lambda: answer(verdict="void")).props("outline no-caps")
-        elif ask["question"] == "measure":
-            fields = {key: ui.input(text).props("outlined dense") for key, text in ask["questions"].items()}
-            ui.label(ask["said"]).classes("lab-problem")
-            with ui.row().classes("lab-row"):
-                ui.button(
-                    "Save", on_click=lambda: answer(**{key: text_of(each) for key, each in fields.items()})
-                ).props("unelevated no-caps")
-                ui.button("Repeat trial", on_click=lambda: answer(redo=True)).props("outline no-caps")
-        else:
-            _ask_cells(answer)
-
-
-def _ask_cells(answer: Callable[..., None]) -> None:
-    found: list[int] = []
-    ui.label("Mark the cells that the line crosses").classes("lab-section")
-    CellGrid(
-        load_arena("paper"), name="Cells crossed", change=lambda cells: found.__setitem__(slice(None), cells)
-    )
-    ui.button("Save score", on_click=lambda: answer(cells=list(found))).props("unelevated no-caps")
 
 
 def _grow(chart: ui.echart, job: CalibrationJob) -> None:
     """Put what has been read into the plot."""
-    stands = [each for each in job.readings if each["purpose"] == "sensors"]
+    stands = [point for point in job.readings if point["purpose"] == "sensors"]
     points = stands or job.readings
     across = "distance from the wall [in]" if stands else "trial"
     chart.options.update(_options(points, across))
@@ -378,9 +386,9 @@ def _grow(chart: ui.echart, job: CalibrationJob) -> None:
     chart.update()
 
 
-def _options(points: list[dict[str, Any]], across: str) -> dict[str, Any]:
+def _options(points: list[messages.ReadingPoint], across: str) -> dict[str, Any]:
     """Return the options of the plot."""
-    n = max(len(each["means"]) for each in points)
+    n = max(len(point["means"]) for point in points)
     text, rule = {"color": "var(--text)"}, {"lineStyle": {"color": "var(--ink-rule)"}}
     axis = {"type": "value", "nameTextStyle": text, "axisLabel": text, "axisLine": rule, "splitLine": rule}
     return {
@@ -395,16 +403,16 @@ def _options(points: list[dict[str, Any]], across: str) -> dict[str, Any]:
                 "type": "scatter",
                 "symbolSize": 9,
                 "itemStyle": {"color": _INKS[k % len(_INKS)]},
-                "data": [[each["at"], each["means"][k]] for each in points if k < len(each["means"])],
+                "data": [[point["at"], point["means"][k]] for point in points if k < len(point["means"])],
             }
             for k in range(n)
         ],
     }
 
 
-def _show_fit(made: dict[str, Any], name: str) -> None:
-    if made["misspecified"]:
-        p = f" (p = {made['p']:.2g})" if made["p"] < 1 else ""
+def _show_fit(made: messages.CalibrationMade, name: str) -> None:
+    if made.misspecified:
+        p = f" (p = {made.p:.2g})" if made.p < 1 else ""
         ui.label(
             f"Rejected: the simulator can't reproduce this robot{p}. Don't use this calibration for conclusions."
         ).classes("lab-rejected").props('role="alert"')
@@ -417,8 +425,8 @@ def _show_fit(made: dict[str, Any], name: str) -> None:
             "outline no-caps"
         )
     section("Parameters with 90 % intervals")
-    fitted = made["fitted"]
-    n_identified = sum(each["identified"] for each in fitted)
+    fitted = [Fitted(**values) for values in made.fitted]
+    n_identified = sum(number.identified for number in fitted)
     ui.label(f"{n_identified} of {len(fitted)} parameters are identified.")
     columns: list[dict[str, Any]] = [
         {"name": name, "label": label, "field": name, "align": "left"}
@@ -433,20 +441,20 @@ def _show_fit(made: dict[str, Any], name: str) -> None:
     ]
     rows = [
         {
-            "name": each["name"],
-            "estimate": _with_minus(f"{Fitted(**each).shown[0]} {each['unit']}"),
-            "interval": _with_minus(Fitted(**each).shown[1]),
-            "bar": _bar(each),
-            "state": "Identified" if each["identified"] else "Not identified",
-            "advice": each.get("advice", ""),
+            "name": number.name,
+            "estimate": _with_minus(f"{number.shown[0]} {number.unit}"),
+            "interval": _with_minus(number.shown[1]),
+            "bar": _bar(number),
+            "state": "Identified" if number.identified else "Not identified",
+            "advice": number.advice,
         }
-        for each in fitted
+        for number in fitted
     ]
     table = ui.table(rows=rows, columns=columns, row_key="name").classes("lab-table lab-fitted")
     table.props("flat bordered dense wrap-cells")
     table.add_slot("body-cell-bar", _BAR)
     table.add_slot("body-cell-state", _STATE)
-    for note in made["notes"]:
+    for note in made.notes:
         hint(note)
 
 
@@ -455,9 +463,11 @@ def _with_minus(text: str) -> str:
     return re.sub(r"(?<![\w-])-(?=[\d.])", "−", text)
 
 
-def _bar(fitted: dict[str, Any]) -> list[float]:
+def _bar(number: Fitted) -> list[float]:
     """Left end, width, and estimate of an interval within its prior [%]."""
-    low, high = fitted["prior_low"], fitted["prior_high"]
+    low, high = number.prior_low, number.prior_high
     width = high - low if high > low else 1.0
-    ends = [min(max(100 * (fitted[key] - low) / width, 0.0), 100.0) for key in ("low", "high", "estimate")]
+    ends = [
+        min(max(100 * (end - low) / width, 0.0), 100.0) for end in (number.low, number.high, number.estimate)
+    ]
     return [round(ends[0], 1), round(max(ends[1] - ends[0], 1.0), 1), round(ends[2], 1)]

@@ -12,14 +12,13 @@ from nicegui import run, ui
 from realitygap._wording import counted
 from realitygap.errors import LedgerError
 from realitygap.lab._counts import CountCard, CountedTrial, Counts
-from realitygap.lab._drawn import Draft
 from realitygap.lab._lab import Lab
 from realitygap.lab._photos import Photos
-from realitygap.lab._proposals import Proposal
+from realitygap.lab._scoring_files import Draft, Proposal
 from realitygap.records import ScoreRole
 
+from ._elements import NO_TRACE, CellGrid, Trace, ink_of
 from ._frame import hint, text_of
-from ._grid import CellGrid, ink_of
 from ._notices import attempt
 
 _ROLES: dict[ScoreRole, str] = {
@@ -208,9 +207,7 @@ class Counting:
                 arena,
                 cells=self._draft.cells,
                 line=[] if chosen else loaded.line,
-                pieces=chosen.lines if chosen else (),
-                sure=chosen.sure if chosen else (),
-                picture=self._picture(chosen),
+                trace=Trace(chosen.lines, chosen.sure, self._picture(chosen)) if chosen else NO_TRACE,
                 ink=each.pen,
                 name=f"Cells crossed in trial {each.number}",
                 change=lambda cells: put(Draft(cells, self._draft.proposal)),
@@ -255,9 +252,9 @@ class Counting:
         await self._load()
         self._card.refresh()
 
-    def _picture(self, proposal: Proposal | None) -> tuple[str, list[float]] | None:
+    def _picture(self, proposal: Proposal) -> tuple[str, list[float]] | None:
         """The sheet below the cells, where they are of a photograph."""
-        photo = None if proposal is None else self._photos.photo(proposal.mark)
+        photo = self._photos.photo(proposal.mark)
         if photo is None or photo.state != "read":
             return None
         return f"/photos/{self._counts.name}/{photo.mark}.jpg", photo.box

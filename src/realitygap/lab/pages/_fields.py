@@ -11,7 +11,7 @@ from typing import Any
 from nicegui import run, ui
 from nicegui.elements.mixins.value_element import ValueElement
 
-from realitygap.lab._problem import FormError, Mistakes
+from realitygap.lab._mistakes import FormError, Mistakes
 from realitygap.orders import Limits, OrderField
 from realitygap.settings import shown
 
@@ -37,6 +37,17 @@ class _Field:
     problem: ui.label
     help: ui.label | None
     check: Callable[[], Any]
+
+
+def needed(text: str) -> str:
+    """Return a text that is not empty.
+
+    Raises:
+        ValueError: It is empty.
+    """
+    if not text:
+        raise ValueError("This field is empty. Enter a value.")
+    return text
 
 
 class Form:
@@ -66,7 +77,6 @@ class Form:
         explanation: str = "",
         options: Sequence[str] = (),
         placeholder: str = "",
-        is_needed: bool = False,
         parse: Callable[[str], Any] = str,
     ) -> ui.input:
         """Add a line of text.
@@ -78,14 +88,11 @@ class Form:
             explanation: Explanation, below the field.
             options: Texts that are proposed.
             placeholder: Text that is shown while the field is empty, such as the default.
-            is_needed: Whether the field must not be empty.
-            parse: Returns the value of the text; raises a ValueError if it has none.
+            parse: Returns the value of the text; raises a ValueError if it has none, as `needed` does for an empty one.
         """
 
         def check() -> Any:
             entered = element.value.strip() if isinstance(element.value, str) else ""
-            if is_needed and not entered:
-                raise ValueError("This field is empty. Enter a value.")
             return parse(entered)
 
         with self._around(label):
@@ -196,8 +203,7 @@ class Form:
             explanation=explanation or field.help,
             options=options,
             placeholder=field.face.default_is,
-            is_needed=is_needed or not field.is_optional,
-            parse=lambda text: text or None,
+            parse=needed if is_needed or not field.is_optional else lambda text: text or None,
         )
 
     def number_of(self, field: OrderField) -> ui.number:

@@ -13,12 +13,12 @@ from starlette.requests import Request
 
 from realitygap.errors import RealityGapError
 from realitygap.lab._access import VISITOR
-from realitygap.lab._lab import Lab, Visitor
+from realitygap.lab._control import Visitor
+from realitygap.lab._lab import Lab
 from realitygap.settings import shown
 
-from ._handover import show_request
+from ._control import Stop, show_request
 from ._notices import show_error
-from ._stop import Stop
 
 WHO = "realitygap_who"
 """The cookie with the name of the person who counts."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from nicegui import app, run, ui
@@ -12,19 +13,20 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, PlainTextResponse, Response
 
 from realitygap.lab._access import FOREIGN_HEADERS
-from realitygap.lab._gap_plan import plan_words
-from realitygap.lab._lab import Lab, Visitor
-from realitygap.lab._measuring_jobs import GapJob
+from realitygap.lab._control import Visitor
+from realitygap.lab._gap import GapJob, gap_mistakes, plan_words
+from realitygap.lab._lab import Lab
+from realitygap.lab._messages import ScorePairs
 from realitygap.orders import GapOrder
 from realitygap.platforms import emulated_robots
 from realitygap.robot_families import default_family
 
-from ._fields import Form
+from ._elements import Scatter
+from ._fields import Form, needed
 from ._frame import framed, hint, section, text_of, visitor_of
 from ._new import CALIBRATED
 from ._notices import attempt
 from ._part import LOOK_S, Part, watching
-from ._plots import Scatter
 from ._status import Silence
 
 _FIELDS = {field.name: field for field in GapOrder.fields() if field.face.label}
@@ -122,7 +124,7 @@ class _Page:
             self._numbers = {key: form.number_of(_FIELDS[key]) for key in _NUMBERS}
         with ui.expansion("Advanced").classes("lab-expansion"):
             form.text(
-                "name", "Name", "gap", is_needed=True, explanation="Name of the report and the saved trials."
+                "name", "Name", "gap", parse=needed, explanation="Name of the report and the saved trials."
             )
             self._margin = form.number_of(_FIELDS["margin"])
             for key, field in _FIELDS.items():
@@ -150,7 +152,7 @@ class _Page:
 
     async def _submit(self) -> None:
         self._button.disable()  # a second press would only find that the first one has begun
-        await self._form.submit(self._measure, self._lab.gap_mistakes)
+        await self._form.submit(self._measure, partial(gap_mistakes, self._lab.root))
         self._button.enable()
 
     def _measure(self, entered: dict[str, Any]) -> None:
@@ -219,14 +221,14 @@ class _Page:
         values = job.order.model_dump(exclude={"results"})
         self._lab.measure_gap(job.name, values, self._visitor)
 
-    def _result(self) -> tuple[GapJob, int] | None:
+    def _result(self) -> tuple[GapJob, ScorePairs, int] | None:
         job = self._lab.gap
-        return None if job is None or not job.verdict else (job, job.n_reports)
+        return None if job is None or job.pairs is None else (job, job.pairs, job.n_reports)
 
-    def _show_result(self, result: tuple[GapJob, int] | None) -> None:
+    def _show_result(self, result: tuple[GapJob, ScorePairs, int] | None) -> None:
         if result is None:
             return
-        job, n_reports = result
+        job, pairs, n_reports = result
         ui.label(job.verdict).classes("lab-finding").props('role="status"')
         with ui.element("dl").classes("lab-facts"):
             for title, words in job.measures:
@@ -237,7 +239,7 @@ class _Page:
         with ui.element("div").classes("lab-panels-two"):
             with ui.column().classes("lab-panel"):
                 section("Controllers on both platforms")
-                Scatter(**job.pairs)
+                Scatter(pairs)
                 hint(
                     "Crosses are 95 % intervals of the means. Circles are champions, squares unrelated networks. "
                     "On the line there is no gap."

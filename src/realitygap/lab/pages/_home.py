@@ -38,7 +38,7 @@ def add_home(lab: Lab) -> None:
     @ui.page("/", response_timeout=30)
     async def home() -> None:
         standings = list(await run.io_bound(lab.standings) or ())
-        if any(standing.n_done for standing in standings):
+        if any(standing.state.n_done for standing in standings):
             lab.drawer.prepare()  # the page of a study then has its figures sooner
         with framed(lab, "Studies", "/", is_wide=True):
             _Page(lab, standings).show()
@@ -97,8 +97,8 @@ class _Page:
 
     def _put_progress(self) -> None:
         for standing in self._standings:
-            if standing.name in self._progress:
-                self._progress[standing.name].put(standing)
+            if standing.state.name in self._progress:
+                self._progress[standing.state.name].put(standing)
 
     def _search(self, event: events.ValueChangeEventArguments[str | None]) -> None:
         self._filter = event.value or ""
@@ -110,12 +110,13 @@ class _Page:
 
     def _now(self) -> tuple[Standing, ...]:
         wanted = self._filter.lower()
-        found = [each for each in self._standings if wanted in f"{each.name} {each.title}".lower()]
+        names = [(standing, f"{standing.state.name} {standing.state.title}") for standing in self._standings]
+        chosen = [standing for standing, name in names if wanted in name.lower()]
         if self._order == "name":
-            found.sort(key=lambda each: each.name)
+            chosen.sort(key=lambda standing: standing.state.name)
         elif self._order == "state":
-            found.sort(key=lambda each: each.word)
-        return tuple(each.steady for each in found)
+            chosen.sort(key=lambda standing: standing.word)
+        return tuple(standing.steady for standing in chosen)
 
     def _show_list(self, standings: tuple[Standing, ...]) -> None:
         self._tools.set_visibility(bool(self._standings))
@@ -127,11 +128,11 @@ class _Page:
             return
         if not standings:
             ui.label("No study has this text in its name or title. Clear the filter.")
-        now = {each.name: each for each in self._standings}
-        shown = [now[each.name] for each in standings[: self._n_shown]]
-        self._progress = {each.name: Progress() for each in shown}
+        now = {standing.state.name: standing for standing in self._standings}
+        shown = [now[standing.state.name] for standing in standings[: self._n_shown]]
+        self._progress = {standing.state.name: Progress() for standing in shown}
         for standing in shown:
-            _show_study(self._lab, standing, self._progress[standing.name])
+            _show_study(self._lab, standing, self._progress[standing.state.name])
         self._put_progress()
         self._want_thumbnails(shown)
         if len(standings) > self._n_shown:
@@ -141,10 +142,11 @@ class _Page:
 
     def _want_thumbnails(self, standings: list[Standing]) -> None:
         """Request the missing pictures of the first studies."""
-        missing = [each for each in standings if each.n_done and not each.medians and each.word in _AT_REST]
-        for each in missing[:MOST_DRAWN]:
+        states = [standing.state for standing in standings if standing.word in _AT_REST]
+        missing = [state for state in states if state.n_done and not state.medians]
+        for state in missing[:MOST_DRAWN]:
             with contextlib.suppress(RealityGapError):  # it was removed in this moment
-                self._lab.watcher(each.name).want_thumbnail((each.n_done, each.n_driven_done))
+                self._lab.watcher(state.name).want_thumbnail(state.done)
 
     def _show_more(self) -> None:
         self._n_shown += MOST_CARDS
@@ -174,46 +176,48 @@ class _Page:
 
 
 def _show_study(lab: Lab, standing: Standing, progress: Progress) -> None:
-    address = f"/study/{standing.name}"
-    row = ui.element("div").classes("lab-study").props(f'data-study="{standing.name}"')
+    state = standing.state
+    address = f"/study/{state.name}"
+    row = ui.element("div").classes("lab-study").props(f'data-study="{state.name}"')
     with row:
         with ui.element("div").classes("lab-thumbnail"):
-            if standing.has_thumbnail:
+            if state.has_thumbnail:
                 picture = ui.element("img").props('loading="lazy"')
-                picture.props["alt"] = f"Best path of {standing.title}"
-                picture.props["src"] = f"/figures/{standing.name}/thumbnail.svg?v={standing.n_done}"
+                picture.props["alt"] = f"Best path of {state.title}"
+                picture.props["src"] = f"/figures/{state.name}/thumbnail.svg?v={state.n_done}"
         with ui.element("div").classes("lab-study-words"):
             with ui.row().classes("lab-row"):
-                ui.label(standing.title).props('role="heading" aria-level="2"').classes("lab-section")
+                ui.label(state.title).props('role="heading" aria-level="2"').classes("lab-section")
                 show_state(standing)
-            if standing.title != standing.name:
-                hint(standing.name)
-            if standing.word != "Complete" and (standing.n_runs or standing.n_driven_runs):
+            if state.title != state.name:
+                hint(state.name)
+            if standing.word != "Complete" and state.n_all:
                 progress.show_bar()
             if standing.progress:
                 progress.show_words()
             if standing.message:
                 ui.label(standing.message).classes("lab-problem")
         with ui.element("div").classes("lab-study-medians"):
-            if standing.medians:
-                _show_medians(standing.medians)
+            if state.medians:
+                _show_medians(state.medians)
         with ui.row().classes("lab-row lab-study-actions"):
             _show_actions(lab, standing, address)
 
 
 def _show_actions(lab: Lab, standing: Standing, address: str) -> None:
     """Show the buttons of a study; one of them is the primary action."""
-    needs_robot = standing.has_robot and (standing.is_asking or standing.word == "Waiting for robot")
+    state = standing.state
+    needs_robot = state.has_robot and (standing.is_asking or standing.word == "Waiting for robot")
     main, other = "unelevated no-caps", "outline no-caps"
-    if standing.n_runs or standing.n_driven_runs:
+    if state.n_all:
         ui.button("Open", on_click=lambda: ui.navigate.to(address)).props(other if needs_robot else main)
-    if standing.has_robot:
+    if state.has_robot:
         text = "Answer" if standing.is_asking else "Open trials"
         ui.button(text, on_click=lambda: ui.navigate.to(f"{address}/trials")).props(
             main if needs_robot else other
         )
-    if standing.has_report and standing.word == "Complete":
-        report = f"/reports/{standing.name}"
+    if state.has_report and standing.word == "Complete":
+        report = f"/reports/{state.name}"
         ui.button("Report", on_click=lambda: ui.navigate.to(report, new_tab=True)).props(other)
     show_control(lab, standing)
 
@@ -239,15 +243,16 @@ def _show_medians(medians: tuple[float, ...]) -> None:
 def show_state(standing: Standing) -> None:
     """Show the state of a study, and the labels of its results."""
     ui.label(standing.word).classes(f"lab-state lab-state-{standing.word.partition(' ')[0].lower()}")
-    for label in standing.labels:
+    for label in standing.state.labels:
         ui.label(label).classes(f"lab-badge lab-label-{label.lower()}")
 
 
 def show_control(lab: Lab, standing: Standing) -> None:
     """Show the button that pauses or resumes a study."""
-    job = lab.job(standing.name)
+    name = standing.state.name
+    job = lab.job(name)
     if job is not None:
         ui.button("Pause", on_click=job.ask_to_end).props("outline no-caps")
     elif standing.can_resume:
-        text = "Resume" if standing.n_done else "Start"
-        ui.button(text, on_click=lambda: attempt(lambda: lab.go_on(standing.name))).props("outline no-caps")
+        text = "Resume" if standing.state.n_done else "Start"
+        ui.button(text, on_click=lambda: attempt(lambda: lab.go_on(name))).props("outline no-caps")

@@ -14,9 +14,9 @@ from typing import Any, Literal
 from nicegui import events, run, ui
 from starlette.requests import Request
 
-from realitygap._wording import counted
+from realitygap._wording import counted, duration
 from realitygap.errors import StudyError
-from realitygap.lab._checks import Check
+from realitygap.lab._checks import Check, TextResult
 from realitygap.lab._files import LONGEST_TEXT
 from realitygap.lab._form import (
     TITLES,
@@ -29,7 +29,7 @@ from realitygap.lab._form import (
     written_form,
 )
 from realitygap.lab._lab import Lab
-from realitygap.lab._pace import duration
+from realitygap.lab._messages import TextChecked, TextRead, TextRefused
 from realitygap.study import named_studies
 
 from ._fields import Form
@@ -215,7 +215,7 @@ class _Page:
         if take != self._n_takes:  # another text was chosen
             return
         self._show_reading(is_reading=False)
-        if "data" not in found:
+        if not isinstance(found, TextRead):
             self._discard.set_visibility(True)
             self._is_text = True
             self._panels.value = "File"
@@ -223,7 +223,7 @@ class _Page:
             return
         self._unread.clear()
         self._form.show_problems({})
-        self._draft.data = found["data"]
+        self._draft.data = found.data
         self._is_read, self._read_text = True, text.strip()
         await self._form_part.refresh()
         self._discard.set_visibility(False)
@@ -400,16 +400,16 @@ class _Page:
     def _whole(self) -> str:
         return text_of(self._text) if self._is_text else written_form(self._draft.data)
 
-    async def _ask(self, do: Literal["read", "check"], text: str) -> dict[str, Any]:
+    async def _ask(self, do: Literal["read", "check"], text: str) -> TextResult:
         """Have another process read or check the text, until it is done or canceled."""
         if self._check is not None:
             self._check.end()
         try:
             check = self._check = await run.io_bound(self._lab.checks.begin, do, text)
         except StudyError as error:
-            return {"mistakes": str(error)}
+            return TextRefused(str(error))
         if check is None:
-            return {"mistakes": "The lab is closing."}
+            return TextRefused("The lab is closing.")
         self._waiting_for.text = f"{'Reading' if do == 'read' else 'Checking'} the study file…"
         self._waiting.set_visibility(True)
         try:
@@ -418,7 +418,7 @@ class _Page:
             if self._check is check:
                 self._check = None
                 self._waiting.set_visibility(False)
-        if "name" in found and text == self._summary.text:
+        if isinstance(found, TextChecked) and text == self._summary.text:
             self._end_estimate()
             self._estimate = check
             self._read_estimate(check)
@@ -428,19 +428,19 @@ class _Page:
         if self._check is not None:
             self._check.end()
 
-    async def _checked(self) -> dict[str, Any] | None:
-        """Check what was entered; None if there are mistakes, which are shown."""
+    async def _checked(self) -> tuple[TextChecked, str] | None:
+        """Check what was entered, and return its text, too; None if there are mistakes, which are shown."""
         problems = await self._problems_of_form()
         text = self._whole()
         summary = self._summary_of("" if self._has_unread else text)
         found = await self._ask("check", text)
-        if "name" not in found or problems:
+        if not isinstance(found, TextChecked) or problems:
             self._show_mistakes(found, problems)
             return None
         self._form.show_problems({})
         summary.is_checked, summary.is_due = True, False
         self._size.text = self._summary.words
-        return {**found, "text": text}
+        return found, text
 
     async def _problems_of_form(self) -> dict[str, str]:
         """Return what is wrong in fields by themselves, and in the name if a study has it."""
@@ -453,13 +453,13 @@ class _Page:
             problems |= {} if taken is None else taken.problems
         return problems
 
-    def _show_mistakes(self, found: dict[str, Any], problems: Mapping[str, str] = _NONE) -> None:
+    def _show_mistakes(self, found: TextResult, problems: Mapping[str, str] = _NONE) -> None:
         """Show the mistakes in the study, and those in fields of the form: each text that is no value."""
-        places = found.get("places")
-        if self._is_text or ("mistakes" in found and not places):
-            self._form.show_problems({"": str(found["mistakes"]), **problems})
+        text, places = (found.text, found.places) if isinstance(found, TextRefused) else ("", [])
+        if text and (self._is_text or not places):
+            self._form.show_problems({"": text, **problems})
             return
-        self._form.show_problems({**dict(_problem_of(each) for each in places or ()), **problems})
+        self._form.show_problems({**dict(_problem_of(mistake) for mistake in places), **problems})
 
     async def _check_only(self) -> None:
         await self._checked()
@@ -505,9 +505,9 @@ class _Page:
     def _read_estimate(self, check: Check) -> None:
         """Take what the check has found so far."""
         summary = self._summary
-        if check.found.done() and "name" in (found := check.found.result()):
-            summary.n_conditions, summary.replicates = found["n_conditions"], found["replicates"]
-            summary.n_trials = found["n_trials"]
+        if check.found.done() and isinstance(found := check.found.result(), TextChecked):
+            summary.n_conditions, summary.replicates = found.n_conditions, found.replicates
+            summary.n_trials = found.n_trials
             summary.is_estimating = not check.seconds.done()
         if check.seconds.done():
             summary.seconds = check.seconds.result()
@@ -519,15 +519,16 @@ class _Page:
             self._estimate = None
 
     async def _start(self) -> None:
-        found = await self._checked()
-        if found is None:
+        checked = await self._checked()
+        if checked is None:
             return
+        found, text = checked
         try:
-            await run.io_bound(self._lab.start_new, found["name"], found["text"])
+            await run.io_bound(self._lab.start_new, found.name, text)
         except WRONG as error:
             self._form.show_problems({"" if self._is_text else "study.name": str(error)})
         else:
-            ui.navigate.to(f"/study/{found['name']}")
+            ui.navigate.to(f"/study/{found.name}")
 
 
 @dataclass

@@ -6,7 +6,6 @@ from collections.abc import Callable
 from typing import Any
 
 from nicegui import app, run, ui
-from nicegui.element import Element
 from starlette.requests import ClientDisconnect, Request
 from starlette.responses import FileResponse, PlainTextResponse, Response
 
@@ -14,20 +13,13 @@ from realitygap._wording import counted
 from realitygap.errors import RealityGapError
 from realitygap.lab._access import FOREIGN_HEADERS, LARGEST_BODY
 from realitygap.lab._counts import CountedTrial, Counts
-from realitygap.lab._drawn import Draft
 from realitygap.lab._lab import Lab
 from realitygap.lab._photos import Photos, SheetPhoto
+from realitygap.lab._scoring_files import Draft
 
+from ._elements import PhotoInput
 from ._frame import hint
 from ._notices import attempt
-
-
-class PhotoInput(Element, component="photo_input.js"):
-    """Field that takes a photograph and sends it to `address`."""
-
-    def __init__(self, address: str, name: str) -> None:
-        super().__init__()
-        self._props |= {"address": address, "name": name}
 
 
 def add_photos(lab: Lab) -> None:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
-from nicegui import events, run, ui
-from nicegui.element import Element
+from nicegui import run, ui
 from starlette.requests import Request
 
+from realitygap._wording import duration
+from realitygap.lab._control import Visitor
 from realitygap.lab._hand import Hand
-from realitygap.lab._lab import Lab, Visitor
-from realitygap.lab._pace import duration
+from realitygap.lab._lab import Lab
+from realitygap.lab._messages import Activity, Senses
 from realitygap.robot_families import (
     Reading,
     RobotFamily,
@@ -21,34 +22,20 @@ from realitygap.robot_families import (
 )
 from realitygap.robots import PortGuess, list_ports, split_port
 
-from ._fields import Form
+from ._control import show_holder
+from ._elements import CellGrid, DrivePad, Pull
+from ._fields import Form, needed
 from ._frame import framed, hint, section, visitor_of
-from ._grid import CellGrid
-from ._handover import show_holder
 from ._notices import attempt
 from ._part import Part, watching
 
 LIVE_S = 0.05
 """Time between two updates of the readings [s]."""
-_DOING = {  # shown meanwhile: over Bluetooth, a picture takes seconds
+_DOING: dict[Activity | None, str] = {  # shown meanwhile: over Bluetooth, a picture takes seconds
     "preflight": "Running the pre-flight…",
     "picture": "Taking a picture…",
     "place": "Putting the robot at its start…",
 }
-
-
-class DrivePad(Element, component="drive_pad.js"):
-    """A pad that drives the robot while it is held."""
-
-    def __init__(self, *, name: str, is_off: bool, stops: int) -> None:
-        super().__init__()
-        self._props |= {"name": name, "disabled": is_off, "stops": stops}
-
-    def know(self, stops: int, *, is_off: bool) -> None:
-        """Set the number of stops so far, and whether the pad is off; it drives only if pressed after all stops."""
-        if (self._props["stops"], self._props["disabled"]) != (stops, is_off):
-            self._props["stops"], self._props["disabled"] = stops, is_off
-            self.update()
 
 
 def add_robot(lab: Lab) -> None:
@@ -90,22 +77,24 @@ class _Page:
         ui.timer(LIVE_S, self._live)
 
     def _state(self) -> Any:
-        hand = self._lab.hand
+        hand = self._lab.robot.hand
         shown = None
         if hand is not None:
-            facts = (hand.preflight, hand.said, hand.doing, hand.picture, hand.battery_v)
+            facts = (hand.preflight, hand.refusal, hand.doing, hand.picture, hand.battery_v)
             shown = (id(hand), hand.label, hand.outcome, *facts)
-        return shown, self._lab.operator, self._lab.robot_job
+        return shown, self._lab.robot.operator, self._lab.robot.study_job
 
     async def _look(self) -> None:
         now = self._state()
         for port, reply in self._replies.items():  # the button that was pressed keeps the focus
-            reply.text = self._lab.reply_on(port)
+            reply.text = self._lab.robot.reply_on(port)
         if now == self._seen:
             return
         before, self._seen = self._seen, now
         if self._is_same_robot(before, now):
-            self._doing.text = _DOING.get(self._lab.hand.doing, "") if self._lab.hand is not None else ""
+            self._doing.text = (
+                _DOING.get(self._lab.robot.hand.doing, "") if self._lab.robot.hand is not None else ""
+            )
             for part in (self._facts, self._picture):
                 part.look()
         else:
@@ -119,7 +108,7 @@ class _Page:
 
     def _show(self) -> None:
         self._pad, self._gauges, self._n_shown, self._replies = None, {}, -1, {}
-        hand, job = self._lab.hand, self._lab.robot_job
+        hand, job = self._lab.robot.hand, self._lab.robot.study_job
         if job is not None:
             ui.label(f"The study {job.name!r} uses the robot.").props('role="status"')
             ui.button("Open trials", on_click=lambda: ui.navigate.to(f"/study/{job.name}/trials")).props(
@@ -169,7 +158,7 @@ class _Page:
                 "port",
                 "Port",
                 explanation=f"For example {ports_in_words()}.",
-                is_needed=True,
+                parse=needed,
             )
             form.text(
                 "witness",
@@ -197,19 +186,19 @@ class _Page:
             ui.button(f"Connect {port}", on_click=lambda: attempt(lambda: self._connect(port))).props(
                 "outline no-caps"
             )
-            ui.button("Identify", on_click=lambda: attempt(lambda: self._lab.identify(port))).props(
+            ui.button("Identify", on_click=lambda: attempt(lambda: self._lab.robot.identify(port))).props(
                 f'flat no-caps aria-label="Identify the robot on {port}"'
             )
             ui.label(guess.seems)
-            self._replies[port] = ui.label(self._lab.reply_on(port)).props('role="status"')
+            self._replies[port] = ui.label(self._lab.robot.reply_on(port)).props('role="status"')
 
     def _connect(self, port: str, witness: str = "") -> None:
-        self._lab.connect(port, witness, self._visitor)
+        self._lab.robot.connect(port, witness, self._visitor)
 
     # a robot that is connected
 
     def _show_robot(self, hand: Hand) -> None:
-        may = self._lab.may_operate(self._visitor)
+        may = self._lab.robot.may_operate(self._visitor)
         with ui.row().classes("lab-row"):
             ui.label(hand.label).classes(f"lab-label-{hand.label.lower()} lab-badge")
             ui.label(f"Connected to {hand.port}").props('role="status"')
@@ -218,7 +207,7 @@ class _Page:
         self._show_panels(hand)
         facts = ui.column().classes("lab-cards")
         self._facts = Part(
-            lambda: (hand.preflight, hand.said, hand.battery_v), lambda _: self._show_facts(hand)
+            lambda: (hand.preflight, hand.refusal, hand.battery_v), lambda _: self._show_facts(hand)
         )
         with facts:
             self._facts.show()
@@ -243,31 +232,34 @@ class _Page:
                 section("Sensors")
                 self._motion = ui.label("Standing").props('role="status"')
                 family = find_family(split_port(hand.port)[0]) or default_family()
-                kinds: dict[str, tuple[Reading, ...]] = {"raw": family.range_readings.get(hand.n_sensors, ())}
-                kinds |= family.channel_readings
+                kinds: dict[str, tuple[Reading, ...]] = {
+                    "range": family.range_readings.get(hand.n_sensors, ())
+                }
+                kinds |= {kind: family.channel_readings[kind] for kind in hand.kinds}
                 for kind, sensors in kinds.items():
-                    if kind == "raw" or kind in hand.more:
-                        with ui.element("div").classes("lab-gauges"):
-                            self._gauges[kind] = [_Gauge(*sensor) for sensor in sensors]
+                    with ui.element("div").classes("lab-gauges"):
+                        self._gauges[kind] = [_Gauge(*sensor) for sensor in sensors]
                 self._picture = Part(lambda: hand.picture, _show_picture)
                 self._picture.show()
 
     def _show_pad(self, hand: Hand) -> None:
         self._pad = DrivePad(
-            name="Drive: hold and pull, or the arrow keys", is_off=self._is_off(hand), stops=hand.n_stops
+            "Drive: hold and pull, or the arrow keys",
+            is_off=self._is_off(hand),
+            stops=hand.n_stops,
+            drive=self._drive,
+            release=self._release,
         )
-        self._pad.on("drive", self._drive)
-        self._pad.on("release", self._release)
         if hand.is_over:
             return
-        ui.button("Stop", on_click=self._lab.stop_robot, color=None).classes("lab-pad-stop").props(
+        ui.button("Stop", on_click=self._lab.robot.stop, color=None).classes("lab-pad-stop").props(
             "unelevated no-caps"
         )
         hint("Hold and pull the pad, or use the arrow keys. The robot stops when you let go.")
 
     def _show_actions(self, hand: Hand) -> None:
-        may = self._lab.may_operate(self._visitor)
-        actions = [("Run pre-flight", "preflight")]
+        may = self._lab.robot.may_operate(self._visitor)
+        actions: list[tuple[str, Activity]] = [("Run pre-flight", "preflight")]
         if hand.has_camera:
             actions.append(("Take picture", "picture"))
         if hand.arena is not None:
@@ -287,29 +279,29 @@ class _Page:
         if hand.has_battery:
             facts["battery"] = "unknown" if hand.battery_v is None else f"{hand.battery_v:.2f} V"
         _show_list(facts)
-        if hand.said:
-            ui.label(hand.said).classes("lab-problem")
+        if hand.refusal:
+            ui.label(hand.refusal).classes("lab-problem")
         if hand.preflight is not None:
             section("Pre-flight check")
-            for problem in hand.preflight["problems"]:
+            for problem in hand.preflight.problems:
                 ui.label(problem).classes("lab-problem")
-            if not hand.preflight["problems"]:
+            if not hand.preflight.problems:
                 ui.label("Pre-flight check passed.").classes("lab-ok")
             known = hand.about
-            _show_list({key: value for key, value in hand.preflight["facts"].items() if key not in known})
+            _show_list({key: value for key, value in hand.preflight.facts.items() if key not in known})
 
     def _is_off(self, hand: Hand) -> bool:
         """Return True if the pad is off: the robot is lost, does not answer, or is another visitor's."""
-        return hand.is_over or hand.is_silent or not self._lab.may_operate(self._visitor)
+        return hand.is_over or hand.silent_s > 0 or not self._lab.robot.may_operate(self._visitor)
 
     def _live(self) -> None:
-        hand = self._lab.hand
+        hand = self._lab.robot.hand
         if hand is None or self._pad is None:
             return
         self._pad.know(hand.n_stops, is_off=self._is_off(hand))
         if hand.senses is None:
             return
-        is_old = hand.is_over or hand.is_silent
+        is_old = hand.is_over or hand.silent_s > 0
         self._senses.classes(**{"add" if is_old else "remove": "lab-stale"})
         if hand.n_live != self._n_shown:
             self._n_shown = hand.n_live
@@ -317,28 +309,27 @@ class _Page:
         if is_old:
             self._motion.text = f"Last reading {duration(hand.age_s)} ago"
 
-    def _show_senses(self, hand: Hand, senses: dict[str, Any]) -> None:
+    def _show_senses(self, hand: Hand, senses: Senses) -> None:
         for kind, gauges in self._gauges.items():
-            for gauge, value in zip(gauges, senses.get(kind, ()), strict=False):
+            for gauge, value in zip(gauges, senses.readings.get(kind, ()), strict=False):
                 gauge.put(value)
-        self._motion.text = ("Driving" if senses["moves"] else "Standing") + (
-            ", blocked" if senses["stalled"] else ""
+        self._motion.text = ("Driving" if senses.moves else "Standing") + (
+            ", blocked" if senses.stalled else ""
         )
-        if self._grid is not None and "pose" in senses:
+        if self._grid is not None and senses.pose is not None:
             line = hand.line
             anew = len(line) < self._n_points or self._n_points == 0
-            self._grid.follow(senses["pose"], line if anew else line[self._n_points :], anew=anew)
+            self._grid.follow(senses.pose, line if anew else line[self._n_points :], anew=anew)
             self._n_points = len(line)
 
-    def _drive(self, event: events.GenericEventArguments) -> None:
-        hand = self._lab.hand
-        given = event.args if isinstance(event.args, dict) else {}
-        if hand is not None and self._lab.may_operate(self._visitor):
-            hand.drive(given.get("move", 0), given.get("turn", 0), given.get("stops", -1))
+    def _drive(self, pull: Pull) -> None:
+        hand = self._lab.robot.hand
+        if hand is not None and self._lab.robot.may_operate(self._visitor):
+            hand.drive(pull["move"], pull["turn"], pull["stops"])
 
-    def _release(self, event: events.GenericEventArguments) -> None:
-        hand = self._lab.hand
-        if hand is not None and self._lab.may_operate(self._visitor):
+    def _release(self) -> None:
+        hand = self._lab.robot.hand
+        if hand is not None and self._lab.robot.may_operate(self._visitor):
             hand.release()
 
 

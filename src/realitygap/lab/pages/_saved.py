@@ -15,9 +15,9 @@ from realitygap.errors import RealityGapError
 from realitygap.lab._lab import Lab
 from realitygap.lab._saved import SavedFile, SavedTrials, saved_files
 
+from ._elements import CellGrid
 from ._fields import Form
 from ._frame import LONGEST_NAME, framed, hint, remember_who, section, text_of, visitor_of
-from ._grid import CellGrid
 from ._notices import attempt
 
 _COLUMNS = {"number": "Trial", "name": "Description", "state": "State", "cells": "Cells", "notes": "Notes"}

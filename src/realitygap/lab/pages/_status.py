@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from nicegui import ui
 
-from realitygap.lab._pace import duration
+from realitygap._wording import duration
 from realitygap.lab._standing import Standing
 
 
@@ -31,8 +31,9 @@ class Progress:
         if self._words is not None:
             self._words.text = standing.progress
         if self._bar is not None:
-            self._bar.value = standing.share
-            self._bar.props["aria-label"] = f"{100 * standing.share:.0f} % done"
+            share = standing.state.share
+            self._bar.value = share
+            self._bar.props["aria-label"] = f"{100 * share:.0f} % done"
 
 
 def show_steps(steps: Sequence[str], current: str) -> None:

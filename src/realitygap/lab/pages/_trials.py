@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from nicegui import run, ui
@@ -11,29 +12,34 @@ from starlette.requests import Request
 
 from realitygap._wording import counted
 from realitygap.errors import RealityGapError
-from realitygap.lab._counts import Counts
-from realitygap.lab._lab import Lab, Visitor
+from realitygap.lab import _messages as messages
+from realitygap.lab._control import Visitor
+from realitygap.lab._counts import CountedTrial, Counts
+from realitygap.lab._lab import Lab
 from realitygap.lab._photos import Photos
-from realitygap.lab._study_job import StudyJob
+from realitygap.lab._study import StudyJob, sitting_mistakes
 from realitygap.report import measure_agreement
 from realitygap.robot_families import default_family
 from realitygap.robots import PortGuess, list_ports
 
+from ._control import show_holder
 from ._counting import Counting
-from ._driving import Driving
-from ._fields import Form
+from ._fields import Form, needed
 from ._frame import LONGEST_NAME, framed, remember_who, text_of, visitor_of
-from ._handover import show_holder
 from ._notices import WRONG, attempt
 from ._part import Part, watching
 from ._photos import SheetPhotos
-from ._questions import show_question
+from ._sitting import Driving, show_question
 from ._status import show_steps
 from ._videos import Videos
 
-"""Emulated robot of a study whose platform has none."""
 _STEPS = ("Place", "Drive", "Score", "Close")
-_STEP_OF = {"settle": "Drive", "go on": "Drive", "score": "Score", "close": "Close"}
+_STEP_OF: dict[type[messages.Question], str] = {
+    messages.SettleQuestion: "Drive",
+    messages.ContinueQuestion: "Drive",
+    messages.ScoreQuestion: "Score",
+    messages.CloseQuestion: "Close",
+}
 """Steps of the questions that do not belong to placing the robot."""
 _SCORERS = {
     "page": "A person, on this page",
@@ -244,8 +250,7 @@ class _Page:
     async def _named(self, who: str) -> None:
         self._visitor = Visitor(self._visitor.key, who.strip()[:LONGEST_NAME])
         remember_who(self._visitor.who)
-        if self._lab.operator is not None and self._lab.operator.key == self._visitor.key:
-            self._lab.operator = self._visitor
+        self._lab.robot.rename(self._visitor)
         await self._sheets.load()
         await self._counting.refresh()
         self._table.refresh()
@@ -258,7 +263,7 @@ class _Page:
         return job if job is not None and job.port else None
 
     def _may(self) -> bool:
-        return self._lab.may_operate(self._visitor)
+        return self._lab.robot.may_operate(self._visitor)
 
     def _robot_stand(self) -> _RobotStand:
         job, last = self._job(), self._lab.jobs.get(self._name)
@@ -270,8 +275,8 @@ class _Page:
             is_failed=last is not None and last.is_failed,
             label="" if job is None else job.label,
             preflight=None if job is None else job.preflight,
-            said="" if job is None else job.said,
-            operator="" if job is None or self._may() else self._lab.operator_name,
+            camera_note="" if job is None else job.camera_note,
+            operator="" if job is None or self._may() else self._lab.robot.operator_name,
         )
 
     def _show_robot(self, now: _RobotStand) -> None:
@@ -285,8 +290,8 @@ class _Page:
         ui.label(f"{now.label or 'Connecting to the robot'} at {job.port}")
         if now.preflight is not None:
             _show_preflight(now.preflight)
-        if now.said:
-            ui.label(now.said).classes("lab-problem").props('role="status"')
+        if now.camera_note:
+            ui.label(now.camera_note).classes("lab-problem").props('role="status"')
 
     def _show_holder(self, operator: str) -> None:
         if operator:
@@ -304,7 +309,7 @@ class _Page:
         """The step that the study is at; empty if all trials are complete."""
         state = self._asked_stand()
         if state.ask is not None:
-            return _STEP_OF.get(state.ask["question"], "Place")
+            return _STEP_OF.get(type(state.ask), "Place")
         if state.job is not None:
             return "Drive" if state.card is not None else "Place"
         if any(each.trial.state == "driven" for each in self._counts.trials()):
@@ -353,18 +358,21 @@ class _Page:
         last = self._lab.jobs.get(self._name)
         is_lost = last is not None and last.is_failed and bool(last.port)
         # a camera that did not open is not proposed again
-        before = last.options if last is not None and last.is_lost else {}
+        before = last.work if last is not None and last.is_lost else messages.StudyWork("")
         likely = [guess.port for guess in found if guess.seems != "a serial port"]
         self._form = form = Form()
         form.summary()
 
         def begin(values: dict[str, Any]) -> None:
             self._lab.go_on(self._name, **values)
-            self._lab.take_robot(self._visitor)
+            self._lab.robot.take(self._visitor)
 
-        def emulate() -> Any:
+        async def connect() -> None:
+            await form.submit(begin, partial(sitting_mistakes, self._lab.root))
+
+        async def emulate() -> None:
             port.value = self._emulated
-            return form.submit(begin, self._lab.sitting_mistakes)
+            await connect()
 
         with ui.element("div").classes("lab-form"):
             port = form.text(
@@ -372,28 +380,26 @@ class _Page:
                 "Port",
                 last.port if last is not None and is_lost else likely[0] if likely else self._emulated,
                 options=[*(guess.port for guess in found), self._emulated],
-                is_needed=True,
+                parse=needed,
                 explanation="For example /dev/rfcomm0 or COM3. Place the robot on free floor first.",
             )
             with ui.row().classes("lab-row"):
                 text = "Reconnect" if is_lost else "Connect robot"
-                ui.button(text, on_click=lambda: form.submit(begin, self._lab.sitting_mistakes)).props(
-                    "unelevated no-caps"
-                ).classes("lab-primary")
+                ui.button(text, on_click=connect).props("unelevated no-caps").classes("lab-primary")
                 ui.button("Use an emulated robot", on_click=emulate).props("outline no-caps")
             with ui.expansion("Advanced").classes("lab-expansion"):
-                form.choice("counts", "Scored by", _SCORERS, before.get("counts") or "page")
-                form.choice("when", "When to score", _WHEN, before.get("when") or "sheet")
+                form.choice("counts", "Scored by", _SCORERS, before.counts or "page")
+                form.choice("when", "When to score", _WHEN, before.when)
                 form.text(
                     "witness",
                     "Witness",
-                    before.get("witness", ""),
+                    before.witness,
                     explanation="HOST:PORT of the witness of an emulator in another program.",
                 )
                 form.text(
                     "camera",
                     "Camera",
-                    before.get("camera", ""),
+                    before.camera,
                     explanation="Number and options of an overhead camera: 0?tag=10.",
                 )
 
@@ -457,12 +463,12 @@ class _Page:
         note = Form().text("note", "Note on the study", explanation="Press Enter to save the note.")
         note.on("keydown.enter", lambda event: self._note(event.sender))
 
-    def _n_cells(self, each: Any) -> str:
+    def _n_cells(self, trial: CountedTrial) -> str:
         """Return the number of cells; hidden from a visitor who can still score a second time."""
-        if each.trial.cells is None:
+        if trial.trial.cells is None:
             return ""
-        is_seen = each.trial.is_closed or each.second or each.first == self._visitor.who
-        return str(len(each.trial.cells)) if is_seen else "counted"
+        is_seen = trial.trial.is_closed or trial.second or trial.first == self._visitor.who
+        return str(len(trial.trial.cells)) if is_seen else "counted"
 
     async def _note(self, field: Any) -> None:
         if await attempt(lambda: self._counts.note(None, text_of(field), self._visitor.who), "Note saved."):
@@ -485,8 +491,8 @@ class _RobotStand:
     outcome: str
     is_failed: bool
     label: str
-    preflight: dict[str, Any] | None
-    said: str
+    preflight: messages.PreflightResult | None
+    camera_note: str
     operator: str
 
 
@@ -495,18 +501,18 @@ class _AskedStand:
     """A question of a study, or the trial that is driven, and whether this visitor may answer."""
 
     job: StudyJob | None
-    ask: dict[str, Any] | None = None
-    card: dict[str, Any] | None = None
+    ask: messages.Question | None = None
+    card: messages.TrialCard | None = None
     may: bool = False
     n_trials: int = 0
     is_complete: bool = False
 
 
-def _show_preflight(found: dict[str, Any]) -> None:
-    n_problems = len(found["problems"])
-    found_words = counted(n_problems, "problem") if n_problems else "passed"
-    with ui.expansion(f"Pre-flight check: {found_words}").classes("lab-expansion"):
-        for name, value in found["facts"].items():
+def _show_preflight(result: messages.PreflightResult) -> None:
+    n_problems = len(result.problems)
+    words = counted(n_problems, "problem") if n_problems else "passed"
+    with ui.expansion(f"Pre-flight check: {words}").classes("lab-expansion"):
+        for name, value in result.facts.items():
             ui.label(f"{name}: {value}")
-        for problem in found["problems"]:
+        for problem in result.problems:
             ui.label(problem).classes("lab-problem")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from nicegui import run, ui
@@ -10,9 +11,9 @@ from nicegui import run, ui
 from realitygap._wording import counted
 from realitygap.lab._counts import Counts
 from realitygap.lab._lab import Lab
-from realitygap.lab._video_job import VideoJob, videos_in
+from realitygap.lab._video import VideoJob, video_mistakes, videos_in
 
-from ._fields import Form
+from ._fields import Form, needed
 from ._frame import hint
 
 
@@ -90,7 +91,7 @@ class Videos:
         )
         form = Form()
         form.summary()
-        form.text("video", "Video", found[-1] if found else "", options=found, is_needed=True)
+        form.text("video", "Video", found[-1] if found else "", options=found, parse=needed)
         form.text(
             "tags",
             "Tags",
@@ -106,6 +107,5 @@ class Videos:
             spec, trial = f"{values['video']}?{values['tags']}", values["trial"]
             self._lab.track(self._counts.name, spec, [trial] if trial else self._waiting())
 
-        ui.button("Track video", on_click=lambda: form.submit(track, self._lab.video_mistakes)).props(
-            "unelevated no-caps"
-        )
+        find = partial(video_mistakes, self._lab.root)
+        ui.button("Track video", on_click=lambda: form.submit(track, find)).props("unelevated no-caps")

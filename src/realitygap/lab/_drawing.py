@@ -1,0 +1,290 @@
+"""Figures and replays of studies, drawn in one process for all of them: starting it takes longer than drawing.
+
+`Drawer` is its end in the server; `draw` runs in the process.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import queue
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import TypeAdapter
+
+from realitygap.drawing import picture_of
+from realitygap.errors import RealityGapError
+from realitygap.playback import pack_scene, pack_trials
+from realitygap.records import ResultsFolder
+from realitygap.report import (
+    NARROW,
+    Drawing,
+    Tally,
+    choose_moving,
+    draw_archive,
+    draw_coverage,
+    draw_networks,
+    draw_paths,
+    draw_scores,
+    draw_species,
+    read_tally,
+    summarize,
+    write_report,
+)
+from realitygap.stats import median_interval
+
+from . import _messages as messages
+from ._channel import Channel
+from ._child import Child
+from ._figure_cache import keep_figures, keep_rows, keep_thumbnail
+
+DrawingWish = messages.FiguresWish | messages.ThumbnailWish | messages.ReplayWish | messages.ReportWish
+FIGURES: dict[str, Callable[..., Drawing | list[Drawing]]] = {
+    "scores": draw_scores,
+    "coverage": draw_coverage,
+    "paths": draw_paths,
+    "networks": draw_networks,
+    "species": draw_species,
+    "archive": draw_archive,
+}
+_COLUMNS = list(messages.SummaryRow.__annotations__)
+_ROWS = TypeAdapter(list[messages.SummaryRow])
+IDLE_S = 600.0
+"""Time without a wish after which the process ends; the next wish starts another [s]."""
+_POLITE = 10
+"""Lowers the priority of the process below that of studies."""
+_QUICK = (messages.ReplayWish, messages.ReportWish)
+"""Wishes that are granted between two figures, because a visitor waits for them."""
+_DIGITS = 4
+
+
+class Drawer:
+    """Passes wishes of all studies to one process, and its answers back.
+
+    Args:
+        root: Folder in which the process works.
+    """
+
+    def __init__(self, root: Path) -> None:
+        self._root = root
+        self._child: Child | None = None
+        self._hearers: dict[str, Callable[[messages.Message], None]] = {}
+        self._lock = threading.Lock()
+
+    def prepare(self) -> None:
+        """Start the process, so that it is ready when a figure is needed."""
+        with self._lock:
+            self._start()
+
+    def want(self, wish: DrawingWish, hear: Callable[[messages.Message], None]) -> None:
+        """Ask for something about a study.
+
+        Args:
+            wish: The wish.
+            hear: Takes each answer about this study, and the end of the process, in another thread.
+        """
+        with self._lock:
+            self._hearers[wish.folder] = hear
+            self._start().tell(wish)
+
+    def end(self) -> None:
+        """End the process."""
+        if self._child is not None:
+            self._child.end()
+
+    @property
+    def process_id(self) -> int | None:
+        """Number of the process; None if there is none."""
+        return None if self._child is None else self._child.process_id
+
+    def _start(self) -> Child:
+        if self._child is None or not self._child.is_alive:
+            self._child = Child(messages.DrawingWork(), self._root, self._hear)
+        return self._child
+
+    def _hear(self, message: messages.Message) -> None:
+        if isinstance(message, messages.Ended):
+            for hear in list(self._hearers.values()):
+                hear(message)
+        elif (
+            isinstance(message, messages.StudyReport)
+            and (hearer := self._hearers.get(message.folder)) is not None
+        ):
+            hearer(message)
+
+
+# in the process
+
+
+def draw(channel: Channel, work: messages.DrawingWork) -> None:
+    """Draw what is wished for, until nobody wishes for anything."""
+    if hasattr(os, "nice"):
+        os.nice(_POLITE)
+    wishes = _Wishes(channel)
+    import_module(
+        "matplotlib.backends.backend_svg"
+    )  # this and the first interval take longer than the first figure
+    median_interval(np.arange(12.0))
+    last = time.monotonic()
+    while time.monotonic() - last < IDLE_S:
+        wish = wishes.next(timeout=0.2)
+        if wish is not None:
+            _grant(channel, wish, wishes)
+            last = time.monotonic()
+
+
+class _Wishes:
+    """Wishes that have come and are not granted yet."""
+
+    def __init__(self, channel: Channel) -> None:
+        self._queue: queue.Queue[DrawingWish] = queue.Queue()
+        self._waiting: deque[DrawingWish] = deque()
+        channel.at_once(messages.FiguresWish, self._queue.put)
+        channel.at_once(messages.ThumbnailWish, self._queue.put)
+        channel.at_once(messages.ReplayWish, self._queue.put)
+        channel.at_once(messages.ReportWish, self._queue.put)
+
+    def next(self, timeout: float) -> DrawingWish | None:
+        """Return the first quick wish, otherwise the first one; None if none comes in this time [s]."""
+        if not self._waiting:
+            with contextlib.suppress(queue.Empty):
+                self._waiting.append(self._queue.get(timeout=timeout))
+        quick = self.quick()
+        return quick if quick is not None else self._waiting.popleft() if self._waiting else None
+
+    def quick(self) -> DrawingWish | None:
+        """Return the first quick wish; None if there is none."""
+        with contextlib.suppress(queue.Empty):
+            while True:
+                self._waiting.append(self._queue.get_nowait())
+        for wish in self._waiting:
+            if isinstance(wish, _QUICK):
+                self._waiting.remove(wish)
+                return wish
+        return None
+
+
+def _grant(channel: Channel, wish: DrawingWish, wishes: _Wishes) -> None:
+    folder = Path(wish.folder)
+    try:
+        match wish:
+            case messages.FiguresWish():
+                _draw_all(channel, wish, lambda: _grant_quick(channel, wishes))
+            case messages.ThumbnailWish():
+                rows = _rows(read_tally(folder, with_uncounted=True))
+                keep_thumbnail(folder, _thumbnail(folder, rows))
+                keep_rows(folder, wish.done, rows)
+                channel.say(messages.ThumbnailDrawn(wish.folder))
+            case messages.ReplayWish():
+                channel.say(_replay(folder, wish))
+            case messages.ReportWish():
+                write_report(ResultsFolder.open(folder))
+                channel.say(messages.ReportWritten(wish.folder))
+    except (RealityGapError, ValueError, TypeError, OSError) as error:
+        match wish:
+            case messages.FiguresWish():
+                channel.say(messages.FiguresDrawn(wish.folder, 0.0))
+            case messages.ReplayWish():
+                channel.say(messages.ReplayRefused(wish.folder, wish.key, str(error)))
+            case messages.ReportWish():
+                channel.say(messages.ReportWritten(wish.folder, str(error)))
+
+
+def _grant_quick(channel: Channel, wishes: _Wishes) -> None:
+    while (wish := wishes.quick()) is not None:
+        _grant(channel, wish, wishes)
+
+
+def _rows(tally: Tally) -> list[messages.SummaryRow]:
+    return _ROWS.validate_python(summarize(tally).select(_COLUMNS).to_dicts())
+
+
+def _draw_all(channel: Channel, wish: messages.FiguresWish, pause: Callable[[], None]) -> None:
+    """Summarize the published runs, and draw their figures; `pause` is called between figures."""
+    folder, began = Path(wish.folder), time.process_time()
+    rows: list[messages.SummaryRow] = []
+    curves: list[messages.Curve] = []
+    figures: dict[str, messages.Figure] = {}
+
+    def tell(name: str, figure: messages.Figure) -> None:
+        figures[name] = figure
+        channel.say(messages.FigureDrawn(wish.folder, name, figure))
+
+    with contextlib.suppress(RealityGapError):  # the figures state why there is nothing to show
+        tally = read_tally(folder, with_uncounted=True)
+        rows, curves = _rows(tally), curves_of(tally)
+        channel.say(messages.StudySummary(wish.folder, rows, curves))
+    for name, draw in FIGURES.items():
+        pause()
+        if wish.names and name not in wish.names:
+            continue
+        try:
+            drawn = draw(folder)
+        except (RealityGapError, ValueError) as error:
+            tell(name, {"text": str(error)})
+            continue
+        for number, wide in enumerate(drawn if isinstance(drawn, list) else [drawn]):
+            narrow = wide.in_width(NARROW).svg
+            figure: messages.Figure = {
+                "caption": wide.caption,
+                "alt": wide.alt,
+                "wide": wide.svg,
+                "narrow": narrow,
+            }
+            tell(f"{name}-{number}" if number else name, figure)
+    if not wish.names:
+        with contextlib.suppress(RealityGapError, ValueError):
+            keep_thumbnail(folder, _thumbnail(folder, rows))
+        keep_figures(folder, wish.done, rows, curves, figures)
+    channel.say(messages.FiguresDrawn(wish.folder, time.process_time() - began))
+
+
+def curves_of(tally: Tally) -> list[messages.Curve]:
+    """Return the median best coverage by generation of each condition with known coverage."""
+    curves: list[messages.Curve] = []
+    for condition in tally.conditions:
+        columns = [
+            values[np.isfinite(values)]
+            for values in tally.generation_bests(condition["name"], tally.measure).T
+        ]
+        points = [_point(values) for values in columns if len(values)]
+        if points:
+            label = str(condition.get("label", ""))
+            curves.append({"condition": condition["name"], "label": label, "points": points})
+    return curves
+
+
+def _point(values: np.ndarray[Any, np.dtype[np.float64]]) -> messages.CurvePoint:
+    interval = median_interval(values).ends
+    return {
+        "n": len(values),
+        "median": round(float(np.median(values)), _DIGITS),
+        "low": None if interval is None else round(interval[0], _DIGITS),
+        "high": None if interval is None else round(interval[1], _DIGITS),
+    }
+
+
+def _thumbnail(folder: Path, rows: list[messages.SummaryRow]) -> str:
+    """Return the path of the typical run of the condition with the highest median, as SVG."""
+    medians = {row["condition"]: row["line_median"] for row in rows}
+    known = {condition: median for condition, median in medians.items() if median is not None}
+    best = max(known, key=lambda condition: known[condition]) if known else None
+    trial = choose_moving([folder], condition=best)[1][0]
+    return picture_of(trial).to_svg(240.0)
+
+
+def _replay(folder: Path, wish: messages.ReplayWish) -> messages.Replay:
+    """Return the scene and the trials that a player shows: one for each of `choices`."""
+    chosen = [choose_moving([folder], **choice) for choice in wish.choices]
+    trials = [trial for _, moving in chosen for trial in moving]
+    title = chosen[0][0] if len(chosen) == 1 else f"{len(chosen)} trials"
+    if any(trial.arena != trials[0].arena for trial in trials):
+        raise ValueError("These trials are in different arenas. Compare trials of one arena.")
+    return messages.Replay(wish.folder, wish.key, pack_scene(trials[0].arena, title), pack_trials(trials))

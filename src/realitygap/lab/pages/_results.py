@@ -1,0 +1,282 @@
+"""Results of a study while they grow: finding, curves, path, conditions, and figures."""
+
+from __future__ import annotations
+
+from nicegui import ui
+
+from realitygap._wording import Basis, counted, highest, highest_median, undecided_highest
+from realitygap.lab._messages import Curve, Replay, ReplayRefused, SummaryRow
+from realitygap.lab._standing import Standing
+from realitygap.lab._watcher import PackedFigure, Watcher
+from realitygap.stats import runs_for_a_claim
+
+from ._elements import Curves, Player
+from ._frame import hint, section
+from ._part import Part
+
+GROWING = ("Running", "In use")
+"""States in which runs are published."""
+_BASIS = Basis("the report tries the best networks again")
+
+_TITLES = {
+    "scores": "Best score by generation",
+    "coverage": "Coverage of every run",
+    "paths": "Best path of each generation",
+    "networks": "Networks",
+    "species": "Species",
+    "archive": "Archive of novelty search",
+}
+_CONDITION = """
+<q-td :props="props">
+  <q-btn flat dense no-caps align="left" class="lab-choose-row" :label="props.value"
+         :aria-pressed="String(props.row.chosen)" @click.stop="$parent.$emit('choose', props.value)" />
+</q-td>
+"""
+"""Name of a condition in the table: a press shows this condition alone."""
+_COLUMNS_AT_END = '["condition", "median", "n", "label"]'
+_ALL_COLUMNS = '["condition", "median", "n", "progress", "label"]'
+_ROW = "(event, row) => emit(row)"
+
+
+class Results:
+    """The results of a study, of which nothing moves when more appear.
+
+    Args:
+        standing: State of the study at first.
+        watcher: Its figures.
+        conditions: Names of its conditions.
+    """
+
+    def __init__(self, standing: Standing, watcher: Watcher, conditions: list[str]) -> None:
+        self._standing, self._watcher, self._conditions = standing, watcher, conditions
+        self._replicates = standing.state.replicates
+        self._chosen = ""
+        self._shown_curves: list[Curve] | None = None
+
+    def show(self) -> None:
+        """Show them."""
+        self._finding = Part(self._found, self._show_finding)
+        self._finding.show()
+        self._waiting = Part(self._waiting_for, self._show_waiting)
+        self._waiting.show()
+        self._filtered = Part(lambda: self._chosen, self._show_filter)
+        self._filtered.show()
+        with ui.element("div").classes("lab-panels-two") as self._panels:
+            with ui.column().classes("lab-panel") as self._curves_box:
+                section("Best coverage by generation")
+                self._curves = Curves([], "Median best coverage by generation, one line per condition")
+            with ui.column().classes("lab-panel"):
+                section("Best path")
+                self._path = Part(self._typical, self._show_path)
+                self._path.show()
+        self._table_box = ui.column().classes("lab-cards")
+        self._table: ui.table | None = None
+        self._gallery = ui.column().classes("lab-cards")
+        self._images: dict[str, _Image] = {}
+        self._n_drawn = 0
+        self._renew()
+
+    def put(self, standing: Standing) -> None:
+        """Show what has changed since."""
+        self._standing = standing
+        if not standing.state.problem:
+            self._replicates = standing.state.replicates
+        self._renew()
+
+    def _rows(self) -> list[_Row]:
+        """Conditions with known coverage, the highest median first."""
+        known = [
+            _Row(row, median) for row in self._watcher.rows if (median := row["line_median"]) is not None
+        ]
+        return sorted(known, key=lambda row: -row.median)
+
+    def _found(self) -> str:
+        """The finding; empty as long as there is none."""
+        rows, state = {row.condition: row for row in self._rows()}, self._standing.state
+        leaders = highest({name: row.median for name, row in rows.items()})
+        if not leaders:
+            return ""
+        score = "best coverage" + (" so far" if state.n_runs > state.n_done else "")
+        needed = runs_for_a_claim(len(rows) - 1, paired=True)
+        if len(rows) > 1 and min(row.n for row in rows.values()) < needed:
+            medians = [row.median for row in rows.values()]
+            return _BASIS.claim(
+                undecided_highest(f"median {score}", medians, _about(list(rows.values())), needed)
+            )
+        of_leaders = [rows[name] for name in leaders]
+        estimates = [row.estimate for row in of_leaders[:2]]
+        claim = highest_median(leaders, estimates, score, n_conditions=len(rows))
+        return _BASIS.claim(f"{claim} ({_about(of_leaders)})")
+
+    def _show_finding(self, finding: str) -> None:
+        if finding:
+            ui.label(finding).classes("lab-finding")
+
+    def _waiting_for(self) -> str | None:
+        """Why there are no figures; None once there are some."""
+        if self._watcher.curves or self._drawn():
+            return None
+        n = self._standing.state.n_all_done
+        return f"Drawing figures for {counted(n, 'run')}…" if n else ""
+
+    def _drawn(self) -> list[str]:
+        """Names of the figures that can be shown."""
+        return [name for name, figure in list(self._watcher.figures.items()) if "text" not in figure]
+
+    def _show_waiting(self, reason: str | None) -> None:
+        if reason:
+            ui.label(reason).props('role="status"')
+            ui.skeleton().classes("lab-skeleton")
+        elif reason is not None:
+            ui.label("No runs yet. Figures appear when the first run finishes.")
+
+    def _renew(self) -> None:
+        """Update the figures, and add new ones below those on the page; nothing else moves."""
+        watcher = self._watcher
+        for part in (self._waiting, self._finding):
+            part.look()
+        is_new = self._n_drawn != watcher.n_drawn
+        self._n_drawn = watcher.n_drawn
+        self._renew_panels()
+        for name in self._drawn():
+            if name not in self._images:
+                with self._gallery:
+                    self._images[name] = _Image(name, watcher.figures[name])
+                self._images[name].load(self._standing.state.name, self._n_drawn)
+            elif is_new:
+                self._images[name].load(self._standing.state.name, self._n_drawn)
+
+    def _renew_panels(self) -> None:
+        """Update the two panels and the table of conditions."""
+        curves = self._watcher.curves
+        self._panels.set_visibility(bool(curves) or bool(self._drawn()))
+        self._curves_box.set_visibility(bool(curves))
+        if curves and curves is not self._shown_curves:
+            self._shown_curves = curves
+            self._curves.put(curves)
+        self._path.look()
+        if self._rows():
+            self._renew_table()
+
+    def _renew_table(self) -> None:
+        rows = [
+            {
+                "condition": row.condition,
+                "median": row.estimate,
+                "n": row.n,
+                "progress": f"{100 * row.n / self._replicates:.0f} %",
+                "label": row.label,
+                "chosen": row.condition == self._chosen,
+            }
+            for row in self._rows()
+        ]
+        if self._table is None:
+            with self._table_box:
+                section("Conditions")
+                self._table = self._make_table()
+                hint(
+                    "Choose a condition to show it alone. Best coverage of a run, along the robot's path. Brackets: "
+                    "95 % interval of the median."
+                )
+        is_growing = self._standing.state.share < 1
+        columns = _ALL_COLUMNS if is_growing else _COLUMNS_AT_END
+        if (
+            self._table.props.get(":visible-columns") != columns
+        ):  # each change draws the buttons in the rows again
+            self._table.props[":visible-columns"] = columns
+        if self._table.rows != rows:
+            self._table.rows = rows
+
+    def _make_table(self) -> ui.table:
+        columns = [
+            {"name": key, "label": label, "field": key, "align": align, "sortable": True}
+            for key, label, align in (
+                ("condition", "Condition", "left"),
+                ("median", "Median best coverage", "left"),
+                ("n", "Runs", "right"),
+                ("progress", "Progress", "right"),
+                ("label", "Label", "left"),
+            )
+        ]
+        table = ui.table(rows=[], columns=columns, row_key="condition").classes("lab-table lab-choosable")
+        table.props("flat bordered dense wrap-cells")
+        table.props[":table-row-class-fn"] = "(row) => row.chosen ? 'lab-chosen' : ''"
+        table.add_slot("body-cell-condition", _CONDITION)
+        table.on("choose", lambda event: self._choose(event.args))
+        table.on("rowClick", lambda event: self._choose(event.args["condition"]), js_handler=_ROW)
+        return table
+
+    def _choose(self, condition: object) -> None:
+        """Show one condition alone in both panels; all if it was chosen already."""
+        names = [row.condition for row in self._rows()]
+        is_new = condition in names and condition != self._chosen
+        self._chosen = str(condition) if is_new else ""
+        self._curves.choose(self._chosen)
+        self._filtered.look()
+        self._renew_panels()
+
+    def _show_filter(self, chosen: str) -> None:
+        if chosen:
+            with ui.row().classes("lab-row"):
+                ui.label(f"Showing {chosen}.").props('role="status"')
+                ui.button("Show all", on_click=lambda: self._choose("")).props("flat no-caps")
+
+    def _typical(self) -> tuple[str, bool, Replay | ReplayRefused | None]:
+        """Condition of the path that is shown, whether there is one, and its replay; None while it is computed."""
+        rows, standing = self._rows(), self._standing
+        condition = self._chosen or (rows[0].condition if rows else "")
+        if not condition and self._drawn():
+            condition = self._conditions[0]
+        if not condition:
+            return "", False, None
+        done = 0 if standing.word in GROWING else standing.state.n_all_done
+        return condition, True, self._watcher.typical(condition, done)
+
+    def _show_path(self, typical: tuple[str, bool, Replay | ReplayRefused | None]) -> None:
+        condition, is_known, replay = typical
+        if not is_known:
+            return
+        if replay is None:
+            ui.label("Computing the path…").props('role="status"')
+            ui.skeleton().classes("lab-skeleton")
+        elif isinstance(replay, ReplayRefused):
+            ui.label(replay.text).classes("lab-problem")
+        else:
+            Player(replay.scene, replay.trials)
+            hint(f"Best trial of the typical run of {condition}: the run with the median best coverage.")
+
+
+class _Image:
+    """A figure in its two widths, with its caption."""
+
+    def __init__(self, name: str, figure: PackedFigure) -> None:
+        self._name = name
+        section(_TITLES[name.partition("-")[0]])
+        with ui.element("picture").classes("lab-figure"):
+            self._narrow = ui.element("source").props('media="(max-width: 700px)"')
+            self._wide = ui.element("img")
+            self._wide.props["alt"] = figure["alt"]
+        self._caption = hint(figure["caption"])
+
+    def load(self, study: str, version: int) -> None:
+        """Load the drawing of this version."""
+        address = f"/figures/{study}/{self._name}"
+        self._narrow.props["srcset"] = f"{address}-narrow.svg?v={version}"
+        self._wide.props["src"] = f"{address}-wide.svg?v={version}"
+
+
+class _Row:
+    """A condition with known coverage."""
+
+    def __init__(self, row: SummaryRow, median: float) -> None:
+        self.condition, self.label, self.n, self.median = row["condition"], row["label"], row["n"], median
+        self.estimate = f"{median:.3f}"
+        """The median with its interval, if there are enough runs for one."""
+        if (low := row["line_low"]) is not None and (high := row["line_high"]) is not None:
+            self.estimate += f" [{low:.3f}, {high:.3f}]"
+
+
+def _about(rows: list[_Row]) -> str:
+    """Return the labels of conditions, and the number of their runs."""
+    labels = " and ".join(dict.fromkeys(row.label for row in rows))
+    return f"{labels}, {counted(max(row.n for row in rows), 'run')}{' each' if len(rows) > 1 else ''}"

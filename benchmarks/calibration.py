@@ -28,6 +28,7 @@ import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
+from dataclasses import replace
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
@@ -43,12 +44,12 @@ from realitygap.calibration import (
     scribbler_prior,
     values_of,
 )
-from realitygap.calibration.infrared._scales import AMPLITUDE, BURST, DECAY, DROP
+from realitygap.calibration.infrared._parameters import AMPLITUDE, BURST, DECAY, DROP
 from realitygap.platforms import SimEnsemble, SimPlatform, SimTarget, TwinTarget
 from realitygap.robots.twin import sample_twin
 from realitygap.study import calibrate, calibrate_all, gap_between
 from realitygap.trials import TrialPlan
-from realitygap.world import Calibration, Distribution, Fitted, paper_arena
+from realitygap.world import Calibration, Fitted, paper_arena
 
 ARENA = paper_arena()
 PLATFORM = SimPlatform()
@@ -86,13 +87,11 @@ def on_contact(_: str, seed: int, observe: str) -> dict[str, Any]:
 def on_sensors(_: str, seed: int, observe: str) -> dict[str, Any]:
     """The same of a robot with range sensors drawn from the prior, each by itself, and `calibrate sensors`."""
     prior = [
-        Parameter(
-            f"range.{k}.{scale.name}",
-            Distribution(**{"log_uniform" if scale.kind == "ratio" else "uniform": (scale.low, scale.high)}),
-            expand=(Effect(f"range.{k}.{scale.name}"),),
+        replace(
+            parameter, name=f"range.{k}.{parameter.name}", expand=(Effect(f"range.{k}.{parameter.name}"),)
         )
         for k in range(len(PLATFORM.robot.range))
-        for scale in (AMPLITUDE, DECAY, *DROP, BURST)
+        for parameter in (AMPLITUDE, DECAY, *DROP, BURST)
     ]
     return _one_kind("sensors", prior, seed, observe)
 

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from realitygap.calibration._rays import rays_of
+from realitygap.calibration.infrared._readings import rays_of
 from realitygap.platforms import SimEnsemble, SimPlatform
 from realitygap.records import read_observations
 from realitygap.study import choose_condition

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from realitygap.calibration import fit_from_poses, numbers_of, ranges_of, scribbler_prior, values_of
-from realitygap.calibration._rays import rays_of
 from realitygap.calibration._shots import shots_of
+from realitygap.calibration.infrared._readings import rays_of
 from realitygap.platforms import SimEnsemble, SimPlatform, SimTarget
 from realitygap.study._calibrate.whole import all_plans
 from realitygap.world import Obstacle, RangeSensor, paper_arena

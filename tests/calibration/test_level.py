@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from realitygap.calibration._tempering import level_ends
+from realitygap.calibration._posterior import level_ends
 
 
 def test_ends_are_those_of_a_normal_distribution_when_parameters_correlate() -> None:

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from scipy.stats import binom, multivariate_normal
 
-from realitygap.calibration import MotionFit, fit_motion, motion_plans, step_of
-from realitygap.calibration._identify import collinear_groups
-from realitygap.calibration._prior import MOTION, MOTION_NOISE
+from realitygap.calibration import Fit, fit_motion, motion_plans, step_of
+from realitygap.calibration._identify import advice_for, collinear_groups
+from realitygap.calibration._prior import CONTACT, MOTION, MOTION_NOISE
 from realitygap.calibration._scatter import LEAST, Scatter
+from realitygap.records import CALIBRATES
 from realitygap.world import load_arena, load_robot
 
 from .drawn_robots import ARENA, ENSEMBLE, PRIOR, ROBOT, carried_out, drawn
@@ -22,7 +23,7 @@ NAMES = (*MOTION, *MOTION_NOISE, "drive.dead_band")
 PLANS = motion_plans(ARENA, ROBOT)
 
 
-def _fit(seed: int, n_trials: int = 10, **options: object) -> tuple[dict[str, float], MotionFit]:
+def _fit(seed: int, n_trials: int = 10, **options: object) -> tuple[dict[str, float], Fit]:
     truth = drawn(seed, NAMES)
     trials = carried_out(PLANS[:n_trials], truth, seed)
     return truth, fit_motion(trials, ENSEMBLE.replay, ROBOT, ARENA, prior=PRIOR, **options)  # type: ignore[arg-type]
@@ -35,6 +36,12 @@ def _covered(seeds: range) -> tuple[int, int]:
         inside += sum(found.low <= truth[found.name] <= found.high for found in fit.fitted)
         total += len(fit.fitted)
     return inside, total
+
+
+def test_every_parameter_has_advice_at_every_level() -> None:
+    for name in (*NAMES, *CONTACT):
+        for observe in CALIBRATES:
+            assert advice_for(name, observe).startswith("Not identified: ")
 
 
 @pytest.mark.long

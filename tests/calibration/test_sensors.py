@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from realitygap.calibration import Placement, fit_sensor, independence
+from realitygap.calibration._prior import place_of
 from realitygap.calibration.infrared._mixture import MixtureReadings, resolution_of
+from realitygap.calibration.infrared._parameters import AMPLITUDE, BURST, DECAY, DROP, GAIN, OUTLIER
 from realitygap.calibration.infrared._pulses import PulseReadings
-from realitygap.calibration.infrared._scales import AMPLITUDE, BURST, DECAY, DROP, GAIN, OUTLIER
 from realitygap.platforms import SimPlatform, SimRobot
 from realitygap.robots import Command
 from realitygap.trials import NoiseKey
@@ -53,9 +54,9 @@ def placements(
     return found
 
 
-def drawn(scales, rng) -> dict[str, float]:
+def drawn(parameters, rng) -> dict[str, float]:
     """Numbers drawn from what is thought possible."""
-    return {scale.name: float(scale.of(rng.random())) for scale in scales}
+    return {parameter.name: float(parameter.prior.of(np.array(rng.random()))) for parameter in parameters}
 
 
 @pytest.mark.slow
@@ -86,10 +87,12 @@ def test_a_mixture_is_recovered_from_its_readings():
     own = {each.name.rpartition(".")[2]: each for each in fit.fitted}
     # nine intervals of 90 %: fewer than six hold their number by chance alone once in a thousand keys
     assert sum(own[name].low <= value <= own[name].high for name, value in truth.items()) >= 6
-    for scale in MIXTURE:
-        if own[scale.name].identified:
-            off = scale.place(own[scale.name].estimate) - scale.place(truth[scale.name])
-            assert abs(off) < 0.1 or abs(own[scale.name].estimate / truth[scale.name] - 1) < 0.05
+    for parameter in MIXTURE:
+        if own[parameter.name].identified:
+            off = place_of(parameter, own[parameter.name].estimate) - place_of(
+                parameter, truth[parameter.name]
+            )
+            assert abs(off) < 0.1 or abs(own[parameter.name].estimate / truth[parameter.name] - 1) < 0.05
     assert {name for name in ("amplitude", "decay", "noise_gain", "drop_most") if own[name].identified} == {
         "amplitude", "decay", "noise_gain", "drop_most",
     }  # fmt: skip
@@ -100,16 +103,16 @@ def test_a_mixture_is_recovered_from_its_readings():
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("robot", "scales", "make"),
+    ("robot", "parameters", "make"),
     [("scribbler-s2-fluke2", PULSES, "pulses"), ("scribbler-s2-fluke1", MIXTURE, "mixture")],
 )
-def test_the_likelihood_is_what_the_kernels_draw(robot, scales, make):
+def test_the_likelihood_is_what_the_kernels_draw(robot, parameters, make):
     rng = np.random.default_rng(5)
-    truth = drawn(scales, rng) | {"amplitude": 1.1, "decay": 0.2}
+    truth = drawn(parameters, rng) | {"amplitude": 1.1, "decay": 0.2}
     read = placements(robot, truth, 21, inches=(3, 9, 15), times=1, readings=4000)
     reach = load_robot(robot).range[1].reach
     model = PulseReadings(read, reach, 10) if make == "pulses" else MixtureReadings(read, reach)
-    chances = model.probabilities(np.array([[truth[scale.name] for scale in scales]]))[0]
+    chances = model.probabilities(np.array([[truth[parameter.name] for parameter in parameters]]))[0]
     assert chances.sum(axis=1) == pytest.approx(1.0, abs=1e-5)
     expected = 4000 * chances
     off = (model.counts - expected) / np.sqrt(expected + 1.0)
@@ -122,9 +125,11 @@ def test_likelihoods_of_readings_add_up_to_one_where_a_sensor_is_saturated():
     read = [Placement(np.array([0.08, 0.08, 0.08]), np.array([1.0, 1.0, 0.73215, 0.73218, 0.0]))]
     model = MixtureReadings(read, 0.5)
     truth = {"amplitude": 3.0, "decay": 0.2, "noise_gain": 0.1} | {
-        name: value for scale in (*DROP, *OUTLIER) for name, value in [(scale.name, scale.low)]
+        name: value
+        for parameter in (*DROP, *OUTLIER)
+        for name, value in [(parameter.name, parameter.prior.lowest)]
     }
-    values = np.array([[truth[scale.name] for scale in MIXTURE]])
+    values = np.array([[truth[parameter.name] for parameter in MIXTURE]])
     saturated = model._rows[1] >= 1.0
     assert model._rows[2][saturated].tolist() == [2.0]
     certain = MixtureReadings([Placement(read[0].distances, np.ones(50))], 0.5)

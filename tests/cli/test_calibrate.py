@@ -10,13 +10,12 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from realitygap.calibration import path_plans
+from realitygap.calibration import Fit, path_plans
 from realitygap.cli import _calibrate, _calibration_operator, app
 from realitygap.errors import RealityGapError
 from realitygap.platforms import SimPlatform, SimTarget
 from realitygap.records import read_observations, write_observations
 from realitygap.study import parse_length, save_calibration
-from realitygap.study._calibrate.kinds import Parts
 from realitygap.study._calibrate.one import _still_said
 from realitygap.study._targets import observations_head
 from realitygap.trials import _target_robot
@@ -334,7 +333,7 @@ def test_refitted_parameters_are_not_listed_with_the_earlier_fit(tmp_path):
             )
             for name in names
         )  # fmt: skip
-        return Parts(rows, dict.fromkeys(numbers, 1.0), {}, kind)
+        return Fit(rows, dict.fromkeys(numbers, 1.0), {}, kind)
 
     below = made(
         "path", ["path.sim_steps", "drive.gain", "drive.track", "range.0.decay", "range.amplitude"], []
@@ -409,7 +408,6 @@ def test_data_without_what_is_to_be_fitted_is_refused(sensors, tmp_path):
 
 
 def test_motion_contact_and_all_are_dispatched_with_what_was_observed(tmp_path, monkeypatch):
-    from realitygap.calibration import MotionFit
     from realitygap.study._calibrate import kinds as _calibrate_kinds
 
     asked = {}
@@ -419,7 +417,7 @@ def test_motion_contact_and_all_are_dispatched_with_what_was_observed(tmp_path, 
             asked[kind] = trials, observe, seed
             poses = simulate([trials[0].start], trials[0].commands[None], {"drive.track": [0.15]}, 1).poses
             assert poses.shape == (1, 1, len(trials[0].commands) + 1, 3)
-            return MotionFit((), {"drive.track": 0.15}, {"drive.track": (0.149, 0.151)}, method=kind)
+            return Fit((), {"drive.track": 0.15}, {"drive.track": (0.149, 0.151)}, method=kind)
 
         return fitted
 

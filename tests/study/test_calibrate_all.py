@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from realitygap.calibration import (
+    Fit,
     evidence_of,
     fit_all,
     numbers_of,
@@ -15,7 +16,6 @@ from realitygap.evolution import Genome
 from realitygap.platforms import SimEnsemble, SimPlatform, SimTarget
 from realitygap.study import calibrate_all
 from realitygap.study._calibrate.held_out_trials import _mean_error, compare_on_trials, is_held_out
-from realitygap.study._calibrate.parts import Parts
 from realitygap.study._calibrate.whole import _bound_by_prior, all_plans
 from realitygap.world import Fitted, paper_arena
 
@@ -115,14 +115,14 @@ def test_held_out_trials_are_spread_and_recommend_what_predicts_them():
         trials = target.carry_out(all_plans(ARENA, SimPlatform().robot, 5), "track")
     asked = []
 
-    def judged(gain: float, trials=trials) -> Parts:
+    def judged(gain: float, trials=trials) -> Fit:
         numbers = dict.fromkeys(truth, gain)
 
         def fit(some):
             asked.append(len(some))
             return numbers, {name: [value] for name, value in numbers.items()}
 
-        parts = Parts((), numbers, {}, "given")
+        parts = Fit((), numbers, {}, "given")
         return compare_on_trials(parts, trials, fit, SimEnsemble(SimPlatform(), ARENA, threads=1))
 
     right, wrong = judged(0.8), judged(0.4)

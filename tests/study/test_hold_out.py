@@ -1,14 +1,12 @@
 """The verdict on a fit by its errors on what it did not see, for every calibration with held-out data."""
 
+from realitygap.calibration import Fit
 from realitygap.study._calibrate.hold_out import FITTED, NOISE, NOMINAL, TABLE, Compared, chosen_parts
-from realitygap.study._calibrate.parts import Parts
 
-PARTS = Parts(
-    (), {"drive.gain_left": 1.1}, {"drive.gain_left": [1.1]}, "given", reasons=("Windows disagree.",)
-)
+PARTS = Fit((), {"drive.gain_left": 1.1}, {"drive.gain_left": [1.1]}, "given", reasons=("Windows disagree.",))
 
 
-def judged(fitted: float, nominal: float, table: float | None) -> Parts:
+def judged(fitted: float, nominal: float, table: float | None) -> Fit:
     errors = {FITTED: fitted, NOMINAL: nominal, NOISE: 2 * nominal}
     errors |= {} if table is None else {TABLE: table}
     return chosen_parts(PARTS, Compared("mean distance", "m", 9, errors), {"drive.speed": 0.2})

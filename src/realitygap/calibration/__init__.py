@@ -1,20 +1,18 @@
 """Fits of a simulator to what was observed of a robot: arrays in, values out; no platform is run here."""
 
-from ._abc import Effort, Posterior, fit_all, mixed
 from ._all_from_commands import fit_from_commands
 from ._all_from_poses import fit_from_poses
+from ._all_from_simulation import Effort, Posterior, fit_all, mixed
 from ._contact import fit_contact
 from ._evidence import LEAST_STEPS, Evidence, Vectors, evidence_of
-from ._held_out import DECISIVE, is_better
+from ._fit import DECISIVE, Fit, is_better
 from ._log_model import MotionLog
 from ._log_prediction import PathErrors, Steps, look_up_motion, path_errors, summary_of
 from ._marker import Marker, fit_marker
-from ._motion import MotionFit, fit_motion
+from ._motion import fit_motion
 from ._motion_log import LogPrediction, MotionLogFit, fit_motion_log, fit_motion_logs, motion_log
-from ._next_trial import information_of, next_trials
 from ._path import fit_path, path_plans
-from ._plans import contact_plans, excitation, motion_plans, random_controllers
-from ._predict_table import look_up_readings, place_ranks, predict_range_table
+from ._plans import contact_plans, excitation, motion_plans, next_trials, random_controllers
 from ._predictive import PREDICTED, Misfit, misfits, prediction_errors
 from ._prior import (
     CONTACT,
@@ -22,16 +20,24 @@ from ._prior import (
     Effect,
     Floats,
     Parameter,
+    is_identified,
     numbers_of,
     ranges_of,
     scribbler_prior,
-    standard_of,
     values_of,
 )
-from ._range_table import BearingFrom, MeasuredFrom, bearings_from_heading, fit_range_table
+from ._range_table import choose_frame, fit_range_table
 from ._ruler import Moved, end_pose_of, moved_in, ruled
+from ._score import information_of
 from ._simulate import Simulate, of_one_length, step_of
-from ._table_frame import TableFrame, choose_frame
+from ._wall_table import (
+    BearingFrom,
+    MeasuredFrom,
+    TableFrame,
+    look_up_readings,
+    place_ranks,
+    predict_range_table,
+)
 from .infrared._checks import independence
 from .infrared._fit import LEAST_PLACEMENTS, SensorFit, fit_sensor
 from .infrared._plans import distance_of, placements_of, sensor_plans
@@ -48,12 +54,12 @@ __all__ = [
     "Effect",
     "Effort",
     "Evidence",
+    "Fit",
     "Floats",
     "LogPrediction",
     "Marker",
     "MeasuredFrom",
     "Misfit",
-    "MotionFit",
     "MotionLog",
     "MotionLogFit",
     "Moved",
@@ -66,7 +72,6 @@ __all__ = [
     "Steps",
     "TableFrame",
     "Vectors",
-    "bearings_from_heading",
     "choose_frame",
     "contact_plans",
     "distance_of",
@@ -87,6 +92,7 @@ __all__ = [
     "independence",
     "information_of",
     "is_better",
+    "is_identified",
     "look_up_motion",
     "look_up_readings",
     "misfits",
@@ -108,7 +114,6 @@ __all__ = [
     "ruled",
     "scribbler_prior",
     "sensor_plans",
-    "standard_of",
     "step_of",
     "summary_of",
     "values_of",

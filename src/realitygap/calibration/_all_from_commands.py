@@ -24,13 +24,12 @@ from realitygap.platforms import Play, Rehearsal, SimEnsemble
 from realitygap.records import TrialRecord
 from realitygap.world import Arena, RobotModel
 
-from ._abc import Effort, Posterior
 from ._all_from_poses import WITH_SLIP, own_places, sensors_of
-from ._posterior import N_DRAWS
-from ._prior import PRIOR_PRECISION, Floats, Parameter, numbers_of, standard_of
+from ._all_from_simulation import Effort, Posterior
+from ._posterior import N_DRAWS, sample_posterior
+from ._prior import OFF_ENDS, PRIOR_PRECISION, Floats, Parameter, numbers_of, place_of, standard_of, values_at
 from ._shots import shots_of
-from ._single_commands import MOST_OFF, NOISE, PARTS, SLIP, places_of, values_at
-from ._tempering import sample_posterior
+from ._single_commands import MOST_OFF, NOISE, PARTS, SLIP
 
 if TYPE_CHECKING:
     from cmaes import CMA
@@ -230,7 +229,9 @@ class _Fit:
 
     def _spread_of_whole(self) -> tuple[Floats, float, Floats]:
         """Return the mean place (p,) of the draws from whole trials, their standard deviation, and its shape (p, p)."""
-        draws = np.stack([places_of(p, self.whole.values[p.name]) for p in self.free], axis=1)
+        draws = np.stack(
+            [np.clip(place_of(p, self.whole.values[p.name]), *OFF_ENDS) for p in self.free], axis=1
+        )
         spread = np.cov(draws, rowvar=False) + LEAST_SPREAD**2 * np.eye(len(self.free))
         width = float(np.sqrt(np.diag(spread).mean()))
         return draws.mean(axis=0), width, spread / width**2

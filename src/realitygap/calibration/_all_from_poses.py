@@ -15,16 +15,14 @@ from realitygap.platforms import SimEnsemble
 from realitygap.records import TrialRecord
 from realitygap.world import Arena, RobotModel
 
-from ._abc import Posterior
-from ._posterior import N_DRAWS
-from ._prior import Floats, Parameter, standard_of
-from ._rays import rays_of
+from ._all_from_simulation import Posterior
+from ._posterior import N_DRAWS, sample_posterior
+from ._prior import OFF_ENDS, Floats, Parameter, place_of, standard_of, values_at
 from ._shots import Shooter, Shots, shots_of
-from ._single_commands import BLOCK, SLIP, MotionOfCommands, places_of, values_at
-from ._tempering import sample_posterior
+from ._single_commands import BLOCK, SLIP, MotionOfCommands
 from .infrared._mixture import MixtureReadings
 from .infrared._pulses import PulseReadings
-from .infrared._readings import Placement
+from .infrared._readings import Placement, rays_of
 
 N_READINGS = 3000  # of all that were made
 N_PARTICLES = 150
@@ -95,7 +93,8 @@ def own_places(robot: RobotModel, parameters: Sequence[Parameter]) -> Floats:
     }
     own |= {p.name: numbers[p.expand[0].number] for p in parameters if p.name.startswith("range.")}
     own |= numbers
-    return np.array([places_of(p, np.array(own[p.name])) if p.name in own else 0.5 for p in parameters])
+    places = [float(place_of(p, own[p.name])) if p.name in own else 0.5 for p in parameters]
+    return np.clip(places, *OFF_ENDS)
 
 
 def sensors_of(
@@ -125,7 +124,7 @@ def sensors_of(
         if first.response == "pulses"
         else MixtureReadings(chosen, first.reach)
     )
-    names = [scale.name for scale in model.scales]
+    names = [parameter.name for parameter in model.parameters]
     free = [p for p in parameters if p.name.removeprefix("range.") in names]
     own = robot.centers()
     k = robot.range.index(first)

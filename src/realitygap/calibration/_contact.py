@@ -13,8 +13,9 @@ import numpy as np
 from realitygap.records import Observe, TrialRecord
 from realitygap.world import Arena, RobotModel
 
+from ._fit import Fit
 from ._identify import identify_from
-from ._motion import N_DRAWS, MotionFit, fitted_parameter, nothing_known, observed_as
+from ._motion import N_DRAWS, fitted_parameter, nothing_known, observed_as
 from ._posterior import sample_clusters
 from ._prior import CONTACT, MAD, Parameter, parameters_of, values_at
 from ._shooting import Problem, make_problem
@@ -46,7 +47,7 @@ def fit_contact(
     observe: Observe | None = None,
     prior: Sequence[Parameter] | None = None,
     seed: int = 0,
-) -> MotionFit:
+) -> Fit:
     """Fit contact to windows of trials in which the robot was near a wall.
 
     Only ratios of how easily it is pushed count: `contact.long` stays as it is.
@@ -123,7 +124,7 @@ def _log_likelihoods(noisy: Problem, scale: Floats, places: Floats) -> Floats:
 
 def _report(
     problem: Problem, noise: Mapping[str, float], rng: np.random.Generator, encounters: Encounters
-) -> MotionFit:
+) -> Fit:
     place = _first_place(problem)
     noisy = problem.fixed_at(**noise)
     scale = _scale(noisy, place)
@@ -145,7 +146,7 @@ def _report(
     )
     agree = encounters.agreeing(best["contact.friction"])
     other = int((np.abs(off) > FLIPS * scale).any(axis=1).sum())
-    return MotionFit(
+    return Fit(
         fitted,
         best,
         {name: tuple(value.tolist()) for name, value in draws.items()},
@@ -154,7 +155,7 @@ def _report(
             f"{len(off)} windows near walls, {other} of which took another path than simulated",
             f"{agree} of {len(encounters.aligned)} encounters align or stall as the fitted friction has it",
         ),
-        {"windows": len(off), "flips": other, "typical": dict(zip(CHANNELS[:3], typical, strict=True)),
+        evidence={"windows": len(off), "flips": other, "typical": dict(zip(CHANNELS[:3], typical, strict=True)),
          "encounters": len(encounters.aligned), "agreeing": agree},
     )  # fmt: skip
 

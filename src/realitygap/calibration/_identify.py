@@ -9,7 +9,7 @@ import numpy as np
 
 from realitygap.records import CALIBRATES, Observe
 
-from ._prior import IDENTIFIED, PRIOR_PRECISION, Known, Parameter, place_of
+from ._prior import ENDS, PRIOR_PRECISION, Known, Parameter, is_identified, place_of
 from ._simulate import Floats
 
 LEARNED = 20.0  # times the prior's precision: a parameter that would be known if the others were
@@ -65,10 +65,11 @@ def identify_from(
     groups = collinear_groups(sensitivities.reshape(-1, len(free)), [parameter.name for parameter in free])
     identified = {}
     for name, values in draws.items():
-        low, high = np.quantile(values, [0.05, 0.95])
-        ratio = (place_of(known[name], float(high)) - place_of(known[name], float(low))) / 0.9
+        low, high = np.quantile(values, ENDS)
+        low_place, high_place = place_of(known[name], np.array([low, high]))
+        ratio = float(high_place - low_place) / (ENDS[1] - ENDS[0])
         partners = sorted({other for group in groups if name in group for other in group} - {name})
-        identified[name] = Identified(ratio, ratio < IDENTIFIED, tuple(partners))
+        identified[name] = Identified(ratio, is_identified(ratio, 1.0), tuple(partners))
     return identified
 
 
@@ -108,6 +109,6 @@ ADVICE: dict[str, tuple[str, str, str]] = {
 
 def advice_for(name: str, observe: Observe, partners: Sequence[str] = ()) -> str:
     """Return the trials to record to identify a parameter, for an observation level."""
-    what = ADVICE[name][CALIBRATES.index(observe)] if name in ADVICE else "record more trials"
+    what = ADVICE[name][CALIBRATES.index(observe)]
     first = f"Identified only together with {' and '.join(partners)}" if partners else "Not identified"
     return f"{first}: {what}."

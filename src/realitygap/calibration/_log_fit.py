@@ -2,15 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
 
-from ._log_checks import Contradictions, contradictions
-from ._log_model import MotionLog, encoder_likelihood, pose_likelihood, wheel_ways
-from ._log_parameters import LogNumbers, LogParameter
-from ._simulate import Floats, Ints
+from ._log_model import (
+    MotionLog,
+    Numbers,
+    body_steps,
+    encoder_likelihood,
+    pose_likelihood,
+    read_late,
+    wheel_ways,
+)
+from ._log_parameters import LogNumbers
+from ._prior import Deviation
+from ._simulate import Bools, Floats, Ints
 
 FREE = 0.01
 """Weight of the prior in a first search, in which the log alone decides what it can tell."""
@@ -61,7 +70,7 @@ class LogProblem:
     at_zero: tuple[str, ...] = ()
 
     @property
-    def every(self) -> tuple[LogParameter, ...]:
+    def every(self) -> tuple[Deviation, ...]:
         """Parameter of each value of a point."""
         return self.numbers.free + self.numbers.camera * (max(self.cameras) + 1)
 
@@ -102,7 +111,7 @@ class LogProblem:
             float(parameter.log_prior(value)) for parameter, value in zip(self.every, point, strict=True)
         )
         slopes = [
-            -value if parameter.kind == "noise" else -2 * value / (1 + value**2)
+            -value if parameter.is_noise else -2 * value / (1 + value**2)
             for parameter, value in zip(self.every, point, strict=True)
         ]
         return logs, np.array(slopes)
@@ -151,11 +160,11 @@ class LogProblem:
         """Return a point with the robot's own numbers, and the delays and the noise that suit them best."""
         free, p = self.numbers.free, len(self.numbers.free)
         point = np.zeros(len(self.every))
-        point[:p][[parameter.kind == "size" for parameter in free]] = 0.1
+        point[:p][[parameter.is_size for parameter in free]] = 0.1
         own_noise = [
             k
             for k, parameter in enumerate(free)
-            if parameter.kind == "noise" and parameter.name.startswith("drive.")
+            if parameter.is_noise and parameter.name.startswith("drive.")
         ]
         if not self.numbers.camera:
             return point
@@ -324,7 +333,7 @@ def _vague(problem: LogProblem, draws: Floats) -> tuple[str, ...]:
         parameter.name
         for parameter, at, wide in zip(problem.numbers.free, middle, spread, strict=False)
         if parameter.name.startswith("drive.")
-        and parameter.kind != "noise"
+        and not parameter.is_noise
         and wide > VAGUE
         and abs(at) < CLEAR * wide
     )
@@ -338,7 +347,7 @@ def _draw(
     Differs: the peak of the posterior stands for that of the likelihood, so that a direction of which the logs show
     nothing has no slope.
     """
-    is_noise = np.array([parameter.kind == "noise" for parameter in problem.every])
+    is_noise = np.array([parameter.is_noise for parameter in problem.every])
     least = np.full(len(point), -np.inf)
     least[: len(problem.numbers.free)] = [
         problem.numbers.least(parameter) for parameter in problem.numbers.free
@@ -383,3 +392,80 @@ def _normal_above(low: float, rng: np.random.Generator) -> float:
 def rows_of(draws: Floats, n: int, rng: np.random.Generator) -> Ints:
     """Return which of the draws to keep, (n,)."""
     return rng.choice(len(draws), n, replace=False)
+
+
+THIRDS = {
+    "speed": ("slowest", "middle", "fastest"),
+    "turn": ("straightest", "middle", "sharpest"),
+    "time": ("first", "middle", "last"),
+}
+CLEAR, LARGE = 4.0, 0.03
+"""Standard errors, and share of the motion, beyond which a rest contradicts the fit."""
+LEAST_SHARE = 0.05
+"""Share of the whole motion that a third must have."""
+
+
+@dataclass(frozen=True)
+class Contradictions:
+    """Thirds of logs that contradict a fit.
+
+    Attributes:
+        lines: The third that contradicts it most, by speed, by turn, and by time, in words.
+        drives: Largest share by which the robot drives more or less.
+        turns: Largest share by which it turns more or less.
+    """
+
+    lines: tuple[str, ...] = ()
+    drives: float = 0.0
+    turns: float = 0.0
+
+
+def contradictions(logs: Sequence[MotionLog], numbers: Sequence[Numbers]) -> Contradictions:
+    """Return what thirds of logs, by speed, by turn, and by time, say against a fit.
+
+    Args:
+        logs: Logs with poses.
+        numbers: Fitted numbers for each log, as arrays of one value.
+    """
+    rows = [_rests(log, values) for log, values in zip(logs, numbers, strict=True) if log.sees_poses]
+    if not rows:
+        return Contradictions()
+    length, turn, lasts, along, about = (np.concatenate(columns) for columns in zip(*rows, strict=True))
+    lines, largest = [], {"drives": 0.0, "turns": 0.0}
+    for name, order in (
+        ("speed", np.abs(length) / lasts),
+        ("turn", np.abs(turn) / lasts),
+        ("time", np.arange(len(length), dtype=np.float64)),
+    ):
+        third = np.searchsorted(np.quantile(order, (1 / 3, 2 / 3)), order)
+        worst, line = 0.0, ""
+        for k, which in enumerate(THIRDS[name]):
+            for verb, rest, motion in (("drives", along, length), ("turns", about, turn)):
+                share = _share(rest, motion, third == k)
+                largest[verb] = max(largest[verb], abs(share))
+                if abs(share) > abs(worst):
+                    more = "more" if share > 0 else "less"
+                    where = f"In the {which} third of the log by {name}"
+                    worst, line = share, f"{where}, the robot {verb} {abs(share):.0%} {more} than the fit."
+        lines += [line] if line else []
+    return Contradictions(tuple(lines), **largest)
+
+
+def _rests(log: MotionLog, values: Numbers) -> tuple[Floats, Floats, Floats, Floats, Floats]:
+    """Return the predicted distance and turn of each seen row, its time, and the rest of its pose."""
+    ways = wheel_ways(log, values)
+    off = pose_likelihood(log, ways, values)[1][0, 1:]
+    length, turn = body_steps(read_late(log, ways, values["camera.delay"]), values)
+    seen = np.isfinite(off[:, 0]) & np.isfinite(log.poses[:-1, 0])
+    return length[0, seen], turn[0, seen], np.diff(log.time_s)[seen], off[seen, 0], off[seen, 2]
+
+
+def _share(rest: Floats, motion: Floats, part: Bools) -> float:
+    """Return the share of the motion in a part by which the fit is clearly off there; 0 if it is not."""
+    part = part & np.isfinite(rest)
+    size = float(np.abs(motion[part]).sum())
+    if size < LEAST_SHARE * float(np.abs(motion).sum()) or size == 0.0:
+        return 0.0
+    share = float((rest[part] * np.sign(motion[part])).sum()) / size
+    error = float(np.sqrt((rest[part] ** 2).sum())) / size
+    return share if abs(share) > max(LARGE, CLEAR * error) else 0.0

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from realitygap._wording import fixed
 
 from ._log_model import MotionLog
+from ._prior import ENDS
 from ._simulate import Floats, Ints
 
 HORIZONS_S = (1.0, 5.0, 30.0)
@@ -218,7 +219,7 @@ def summary_of(errors: Sequence[PathErrors], parts: str = "trials", seed: int = 
 def _interval(errors: Floats, n_apart: int, seed: int) -> tuple[float, float]:
     """Return the 90 % interval of a mean error, by a bootstrap of as many starts as are apart from each other."""
     drawn = np.random.default_rng(seed).integers(len(errors), size=(RESAMPLES, min(n_apart, len(errors))))
-    low, high = np.quantile(errors[drawn].mean(axis=1), (0.05, 0.95))
+    low, high = np.quantile(errors[drawn].mean(axis=1), ENDS)
     return float(low), float(high)
 
 

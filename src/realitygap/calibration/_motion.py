@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from realitygap.records import Observe, TrialRecord
 from realitygap.world import Arena, Fitted, RobotModel
 
+from ._fit import Fit
 from ._identify import Identified, advice_for, identify_from
 from ._prior import (
+    ENDS,
     MOTION,
     MOTION_NOISE,
     Known,
@@ -49,27 +50,6 @@ SETTLED = 0.004  # move of a place after which no further round is needed
 DELAYS = (0.0, 0.15, 0.3, 0.5)  # from which a fit begins, as parts of the range: it may have several minima
 
 
-@dataclass(frozen=True)
-class MotionFit:
-    """Parts of a calibration.
-
-    Attributes:
-        fitted: The parameters with 90 % intervals.
-        numbers: Estimated numbers of the robot, by dotted name.
-        draws: (d,) samples of each number from the joint posterior.
-        method: Method of the fit.
-        notes: Notes on the fit.
-        evidence: Data of figures.
-    """
-
-    fitted: tuple[Fitted, ...]
-    numbers: dict[str, float]
-    draws: dict[str, tuple[float, ...]]
-    method: str = METHOD
-    notes: tuple[str, ...] = ()
-    evidence: dict[str, Any] = field(default_factory=dict)
-
-
 def observed_as(trials: Sequence[TrialRecord], observe: Observe | None) -> list[TrialRecord]:
     """Return trials of which no more than this is known."""
     return [trial if observe is None else trial.seen_as(observe) for trial in trials]
@@ -84,7 +64,7 @@ def fit_motion(
     observe: Observe | None = None,
     prior: Sequence[Parameter] | None = None,
     seed: int = 0,
-) -> MotionFit:
+) -> Fit:
     """Fit the drive of a robot to windows of trials in which it touched nothing.
 
     Args:
@@ -135,7 +115,7 @@ class DeadBand:
         return np.asarray(rng.uniform(self.edges[part], self.edges[part + 1]))
 
 
-def nothing_known(names: Sequence[str], known: Known, robot: RobotModel, method: str) -> MotionFit:
+def nothing_known(names: Sequence[str], known: Known, robot: RobotModel, method: str) -> Fit:
     """Return parameters of which cells alone tell nothing to a fit of windows, with what to record."""
     own = own_values(robot)
     fitted = []
@@ -150,7 +130,7 @@ def nothing_known(names: Sequence[str], known: Known, robot: RobotModel, method:
     notes = (
         "Cells, readings and stalls do not show where it was at each command: fit all parameters to whole trials.",
     )
-    return MotionFit(tuple(fitted), {}, {}, method, notes)
+    return Fit(tuple(fitted), {}, {}, method, notes)
 
 
 def _solve(problem: Problem) -> tuple[Problem, Floats, DeadBand, Floats]:
@@ -219,7 +199,7 @@ def _report(
     noise: Floats,
     dead_band: DeadBand,
     rng: np.random.Generator,
-) -> MotionFit:
+) -> Fit:
     slopes = problem.slopes(place)
     scatter = scatter_of(problem, place)
     off = np.nan_to_num(problem.off(place[None])[0])
@@ -246,10 +226,11 @@ def _report(
     )
     kept = rng.choice(len(places), N_DRAWS, replace=False)
     drawn = robot_numbers(problem.known, problem.robot, {name: value[kept] for name, value in draws.items()})
-    return MotionFit(
+    return Fit(
         fitted,
         {name: float(value[0]) for name, value in numbers.items()},
         {name: tuple(value.tolist()) for name, value in drawn.items()},
+        METHOD,
         notes=_notes(problem, noises, scatters),
         evidence={"windows": len(off), "rms": dict(zip(CHANNELS, _rms(off, scatter.seen), strict=True))},
     )
@@ -280,7 +261,7 @@ def fitted_parameter(
 
     The interval also holds the estimate, which may lie at an end of a ridge that the draws fill.
     """
-    low, high = np.quantile(draws, [0.05, 0.95])
+    low, high = np.quantile(draws, ENDS)
     return Fitted(
         name=parameter.name,
         estimate=estimate,

@@ -13,19 +13,18 @@ from realitygap._wording import fixed
 from realitygap.errors import finite_numbers
 from realitygap.world import Fitted, RobotModel
 
-from ._held_out import HeldOut, HeldOutFit
+from ._fit import HeldOut, HeldOutFit
 from ._log_fit import LogPosterior, LogProblem, rows_of, sample_log_posterior
 from ._log_model import MotionLog, Numbers, body_steps, read_late, seen_rows, wheel_ways
-from ._log_parameters import LogNumbers, LogParameter
+from ._log_parameters import LogNumbers
 from ._log_prediction import PathErrors, Steps, last_seen, path_errors, positions, summary_of
+from ._prior import ENDS, Deviation, is_identified
 from ._simulate import Floats
 
 N_DRAWS = 200
-ENDS = (0.05, 0.95)
 LEAST_ROWS = 10
-IDENTIFIED = 0.35
-"""A parameter is identified if its standard deviation is below this, in scales of its prior: half of what the prior has
-at its peak."""
+PEAK = 0.7
+"""Standard deviation of a normal prior with the curvature of a Cauchy one at its peak, in scales of the prior."""
 
 MAIN = ("drive.gain", "drive.asymmetry", "drive.track", "drive.axle", "encoder.gain", "encoder.asymmetry")
 DISAGREE = 2.0
@@ -65,12 +64,9 @@ class MotionLogFit(HeldOutFit):
 
     Attributes:
         by_log: Predictions of the unseen part of each log; None for a log that the fit saw wholly.
-        misspecified: True if parts of the logs contradict each other, or if a parameter left its prior.
     """
 
-    method: str = METHOD
     by_log: tuple[LogPrediction | None, ...] = ()
-    misspecified: bool = False
 
 
 def fit_motion_log(
@@ -170,8 +166,8 @@ def fit_motion_logs(
         fitted,
         {name: float(value[0]) for name, value in numbers.items()},
         {name: tuple(value.tolist()) for name, value in drawn.items()},
-        held_out,
-        held_out.recommended if held_out else "fitted",
+        METHOD,
+        held_out=held_out,
         notes=(*notes, *posterior.against.lines),
         by_log=by_log,
         misspecified=misspecified or bool(posterior.against.lines),
@@ -211,7 +207,7 @@ def _fitted(posterior: LogPosterior, best: Floats) -> tuple[Fitted, ...]:
     return tuple(rows)
 
 
-def _unknown(parameter: LogParameter, own: float) -> Fitted:
+def _unknown(parameter: Deviation, own: float) -> Fitted:
     """Return a parameter that keeps the robot's own number, with the interval of its prior."""
     low, high = _ends(parameter, own)
     return Fitted(
@@ -220,17 +216,17 @@ def _unknown(parameter: LogParameter, own: float) -> Fitted:
     )  # fmt: skip
 
 
-def _ends(parameter: LogParameter, own: float) -> tuple[float, float]:
+def _ends(parameter: Deviation, own: float) -> tuple[float, float]:
     """Return the 90 % interval of a parameter's prior."""
-    low, high = parameter.of(own, np.array([-parameter.most, parameter.most])).tolist()
-    return max(low, 0.0) if parameter.kind == "size" else low, high
+    low, high = parameter.at(own, np.array([-parameter.most, parameter.most])).tolist()
+    return max(low, 0.0) if parameter.is_size else low, high
 
 
-def _row(parameter: LogParameter, own: float, best: float, draws: Floats) -> Fitted:
+def _row(parameter: Deviation, own: float, best: float, draws: Floats) -> Fitted:
     prior_low, prior_high = _ends(parameter, own)
-    low, high = np.quantile(parameter.of(own, draws), ENDS)
-    estimate = float(parameter.of(own, np.array([best]))[0])
-    identified = bool(np.std(draws) < IDENTIFIED) and prior_low <= estimate <= prior_high
+    low, high = np.quantile(parameter.at(own, draws), ENDS)
+    estimate = float(parameter.at(own, np.array([best]))[0])
+    identified = is_identified(float(np.std(draws)), PEAK) and prior_low <= estimate <= prior_high
     return Fitted(
         name=parameter.name,
         estimate=estimate,

@@ -9,8 +9,8 @@ Source: Rosenzweig & Remy, section 2.2.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,8 +19,9 @@ from realitygap.records import TrialRecord
 from realitygap.trials import TrialPlan
 from realitygap.world import Arena, Fitted, Pose, RobotModel
 
+from ._fit import Fit
 from ._posterior import N_DRAWS
-from ._prior import IDENTIFIED
+from ._prior import ENDS, is_identified
 from ._ruler import EXACT, Moved, moved_in
 
 Array = NDArray[np.float64]
@@ -40,7 +41,6 @@ ROBOT_STEPS = 100
 JYRO_STEP = 0.1
 """Length of a full step in the paper's simulation [m] (19.7 in are five)."""
 
-ENDS = (0.05, 0.95)
 
 STANDS = 1e-3
 """Way of five full steps below which a robot stood still [m]."""
@@ -48,29 +48,15 @@ STANDS = 1e-3
 GAIN_SPREAD, UNEVEN_SPREAD, TRACK_SPREAD = 0.29, 0.115, 0.17
 """Standard deviations of what is thought possible of gain, of their difference, and of the track, as shares."""
 
+METHOD = (
+    "Full-speed paths, straight and turning (Rosenzweig & Remy, section 2.2): ways and turns against those of the "
+    "simulated robot; Student's intervals from repeats and from the step to which was read."
+)
+
 STRAIGHT, TURNING = (1.0, 0.0), (0.0, 1.0)
 
 Simulate = Callable[[TrialRecord], Moved]
 """A function that simulates a trial with the same start and commands, without noise."""
-
-
-@dataclass(frozen=True)
-class PathFit:
-    """The fit to straight paths and turns.
-
-    Attributes:
-        fitted: Parameters with intervals.
-        numbers: Numbers of the robot, by dotted name.
-        draws: (n,) draws of each number.
-        notes: Notes on the fit.
-        evidence: Measured values.
-    """
-
-    fitted: tuple[Fitted, ...]
-    numbers: Mapping[str, float]
-    draws: Mapping[str, Array]
-    notes: tuple[str, ...]
-    evidence: dict[str, list[float]] = field(default_factory=dict)
 
 
 def path_plans(arena: Arena, n: int = 2 * REPEATS) -> list[TrialPlan]:
@@ -99,7 +85,7 @@ def fit_path(
     simulate: Simulate,
     robot: RobotModel,
     rng: np.random.Generator,
-) -> PathFit:
+) -> Fit:
     """Fit the gains of the wheels and the track from the ends of paths.
 
     Args:
@@ -162,12 +148,13 @@ def fit_path(
     else:
         numbers["drive.track"] = track
         rows += _rows_of_turning(turning, turn, track, robot)
-    return PathFit(
+    return Fit(
         tuple(rows),
         {name: float(values[0]) for name, values in numbers.items()},
         {name: values[1:] for name, values in numbers.items()},
+        METHOD,
         tuple(notes),
-        {
+        evidence={
             "straight_m": [moved.way for moved in straight.moved],
             "straight_turned_rad": [moved.turned for moved in straight.moved],
             "turned_rad": [moved.turned for moved in turning.moved],
@@ -288,7 +275,7 @@ def _in_jyro_steps(steps: Fitted) -> str:
 
 def _row(name: str, values: Array, unit: str, prior: tuple[float, float], repeats: int) -> Fitted:
     low, high = np.quantile(values[1:], ENDS)
-    identified = repeats > 1 and high - low < IDENTIFIED * (ENDS[1] - ENDS[0]) * (prior[1] - prior[0])
+    identified = repeats > 1 and is_identified(high - low, (ENDS[1] - ENDS[0]) * (prior[1] - prior[0]))
     return Fitted(
         name=name,
         estimate=float(values[0]),

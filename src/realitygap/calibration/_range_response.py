@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from typing import Literal
+from dataclasses import replace
 
 import numpy as np
 
 from realitygap.world import RangeSensor, RobotModel
 
+from ._prior import Deviation
 from ._simulate import Bools, Floats
 
 LEAST_COSINE = 1e-3
@@ -23,64 +23,34 @@ TABLE_DISTANCE = "table_distance"
 """The factor of all distances in the table of a sensor with the response `table`; 1 as in the robot file."""
 
 
-@dataclass(frozen=True)
-class Number:
-    """A number of a range sensor with its prior.
-
-    Attributes:
-        name: Name, the same as in the robot's file, or `TABLE_DISTANCE`.
-        kind: ratio: its logarithm is normal around the robot's own; plus: it is normal around the robot's own.
-        spread: Standard deviation of the prior.
-        unit: Unit of its values.
-        advice: Data to record if it is not identified.
-        least: The middle of a prior of ratios is at least this.
-        limits: Least and largest value.
-        usual: A usual value, as a share of the farthest distance if it is in meters; 0 if there is none.
-    """
-
-    name: str
-    kind: Literal["ratio", "plus"]
-    spread: float
-    unit: str
-    advice: str
-    least: float = 0.0
-    limits: tuple[float, float] = (-math.inf, math.inf)
-    usual: float = 0.0
-
-    def value(self, middle: float, z: float) -> float:
-        """Return the value at a point of the standard normal scale, with the middle of its prior."""
-        value = middle * math.exp(self.spread * z) if self.kind == "ratio" else middle + self.spread * z
-        return min(max(value, self.limits[0]), self.limits[1])
-
-
 NEARER = "Record nearer to the wall."
 DISTANCES = "Record at more distances at which readings are between 0 and 1."
 BEARINGS = "Record at more bearings, to both sides of the sensor."
 FARTHER = "Record at more distances at which readings begin to fail, and beyond them."
 
-AMPLITUDE = Number("amplitude", "ratio", 3.0, "", NEARER, 0.01, usual=2.0)
-DECAY = Number("decay", "ratio", 1.0, "m", DISTANCES, 1e-4, usual=0.25)
-DIRECTION = Number("direction", "plus", 0.3, "rad", BEARINGS)
-CONE = Number("cone", "ratio", 0.7, "rad", BEARINGS, 0.02, (0.0, math.pi), usual=0.2)
-INCIDENCE = Number("incidence", "ratio", 1.5, "", BEARINGS, 0.3, usual=1.0)
-COMPRESSION = Number(
+AMPLITUDE = Deviation("amplitude", "ratio", 3.0, "", NEARER, least=0.01, usual=2.0)
+DECAY = Deviation("decay", "ratio", 1.0, "m", DISTANCES, least=1e-4, usual=0.25)
+DIRECTION = Deviation("direction", "plus", 0.3, "rad", BEARINGS)
+CONE = Deviation("cone", "ratio", 0.7, "rad", BEARINGS, least=0.02, limits=(0.0, math.pi), usual=0.2)
+INCIDENCE = Deviation("incidence", "ratio", 1.5, "", BEARINGS, least=0.3, usual=1.0)
+COMPRESSION = Deviation(
     "compression",
     "ratio",
     1.5,
     "",
     "Record at more distances at which readings are between 0.5 and 1.",
-    0.3,
+    least=0.3,
     usual=0.3,
 )
-HALF_WIDTH = Number("half_width", "ratio", 0.7, "m", DISTANCES, 1e-3)
-REACH = Number("reach", "ratio", 0.5, "m", DISTANCES, 1e-3)
+HALF_WIDTH = Deviation("half_width", "ratio", 0.7, "m", DISTANCES, least=1e-3)
+REACH = Deviation("reach", "ratio", 0.5, "m", DISTANCES, least=1e-3)
 DROP = (
-    Number("drop_most", "plus", 0.3, "", FARTHER, limits=(0.0, 1.0)),
-    Number("drop_at", "ratio", 1.0, "m", FARTHER, 1e-3),
-    Number("drop_width", "ratio", 1.0, "m", FARTHER, 1e-4),
+    Deviation("drop_most", "plus", 0.3, "", FARTHER, limits=(0.0, 1.0)),
+    Deviation("drop_at", "ratio", 1.0, "m", FARTHER, least=1e-3),
+    Deviation("drop_width", "ratio", 1.0, "m", FARTHER, least=1e-4),
 )
 OUTLIER = tuple(replace(each, name=each.name.replace("drop", "outlier")) for each in DROP)
-SCALE = Number(TABLE_DISTANCE, "ratio", 0.3, "", DISTANCES)
+SCALE = Deviation(TABLE_DISTANCE, "ratio", 0.3, "", DISTANCES)
 
 OF_RESPONSE = {
     "ir": (AMPLITUDE, DECAY, DIRECTION, CONE, INCIDENCE, COMPRESSION),
@@ -94,7 +64,7 @@ OF_RESPONSE = {
 NAMES = tuple(dict.fromkeys(number.name for numbers in OF_RESPONSE.values() for number in numbers))
 
 
-def numbers_to_fit(sensor: RangeSensor) -> tuple[Number, ...]:
+def numbers_to_fit(sensor: RangeSensor) -> tuple[Deviation, ...]:
     """Return the numbers of a sensor that decide its mean readings. A sensor of one ray has no cone."""
     numbers = [number for number in OF_RESPONSE[sensor.response] if number is not CONE or sensor.rays > 1]
     if sensor.response == "lorentz":
@@ -102,7 +72,7 @@ def numbers_to_fit(sensor: RangeSensor) -> tuple[Number, ...]:
         limits = {CONE: (0.0, WIDEST_LORENTZ), HALF_WIDTH: (1.01 * peak, math.inf)}
         numbers = [replace(number, limits=limits.get(number, number.limits)) for number in numbers]
     numbers += [
-        Number(f"table.{k}.reading", "plus", 0.3, "", DISTANCES, limits=(0.0, 1.0))
+        Deviation(f"table.{k}.reading", "plus", 0.3, "", DISTANCES, limits=(0.0, 1.0))
         for k in range(len(sensor.table))
     ]
     numbers += DROP if _is_above_0(sensor.drop_most) else ()

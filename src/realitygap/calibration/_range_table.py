@@ -5,24 +5,20 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from realitygap.errors import finite_numbers
-from realitygap.world import Distribution, Fitted, RobotModel
+from realitygap.world import Fitted, RobotModel
 
-from ._held_out import HeldOut, HeldOutFit
-from ._prior import IDENTIFIED
-from ._range_response import NAMES, Number, file_numbers, numbers_in_file, numbers_to_fit, wall_reading
+from ._fit import HeldOut, HeldOutFit
+from ._prior import Deviation, is_identified
+from ._range_response import NAMES, file_numbers, numbers_in_file, numbers_to_fit, wall_reading
 from ._simulate import Bools, Floats, Ints
-
-MeasuredFrom = Literal["body", "origin", "sensor"]
-BearingFrom = Literal["body", "sensor"]
+from ._wall_table import BearingFrom, MeasuredFrom, TableFrame, place_ranks
 
 N_DRAWS = 200
-ENDS = (0.05, 0.95)
 LEAST_PLACES = 20
 """Readings of a sensor in the part that is fitted."""
 
@@ -50,18 +46,17 @@ N_TRIED, N_STARTS, FEW_STEPS = 150, 3, 30
 MOST_ROWS = 400
 """Readings of a sensor that the search of a start uses."""
 
+FRAME_SENSORS, FRAME_ROWS = 4, 150
+"""Sensors, and readings of each, that decide about a frame. More take longer and decide the same."""
+FRAME_TRIED, FRAME_STARTS = 60, 2
+CLEARLY, MARGIN = 1.1, 4.0
+"""A frame is taken instead of an earlier one if that leaves this factor more unexplained, and `MARGIN` squares more."""
+
 METHOD = (
     "Least squares of readings between 0 and 1 with a normal prior from several starts, response as in `sim`; "
     "distances that were set together may be off together; "
     "intervals from the sandwich covariance, clustered by distance (White 1982)."
 )
-
-
-@dataclass(frozen=True)
-class RangeTableFit(HeldOutFit):
-    """Range sensors fitted to a table; attributes as in `HeldOutFit`."""
-
-    method: str = METHOD
 
 
 def fit_range_table(
@@ -77,7 +72,7 @@ def fit_range_table(
     shared: Sequence[str] = ("compression",),
     distance_sd_m: float = 0.0005,
     seed: int = 0,
-) -> RangeTableFit:
+) -> HeldOutFit:
     """Fit range sensors to readings along a long, straight wall, and predict the places that the fit does not see.
 
     Args:
@@ -105,9 +100,8 @@ def fit_range_table(
     Raises:
         ValueError: The arrays do not fit together, or a sensor is not in the robot's file.
     """
-    table = Readings.of(
-        sensor, distance_m, bearing_rad, readings, robot, measured_from, bearing_from, hold_out=hold_out
-    )
+    frame = TableFrame.of(measured_from, bearing_from)
+    table = Readings.of(sensor, distance_m, bearing_rad, readings, robot, frame, hold_out=hold_out)
     if not 0.0 <= distance_sd_m < 0.1:
         raise ValueError(f"distance_sd_m is {distance_sd_m:g}, expected 0 to 0.1 m.")
     problem = RangeProblem.of(table, robot, shared, distance_sd_m)
@@ -121,12 +115,12 @@ def fit_range_table(
     drawn = [problem.numbers(row) for row in draws]
     off = 1000 * problem.off_by(best)
     held_out = _compare(problem, best) if hold_out else None
-    return RangeTableFit(
+    return HeldOutFit(
         tuple(problem.fitted(best, spread)),
         numbers,
         {name: tuple(each[name] for each in drawn) for name in numbers},
-        held_out,
-        held_out.recommended if held_out else "fitted",
+        METHOD,
+        held_out=held_out,
         notes=(f"Distances are off by {np.sqrt(np.mean(off**2)):.2f} mm (root mean square).",)
         if len(off)
         else (),
@@ -153,8 +147,7 @@ class Readings:
         bearing_rad: ArrayLike,
         readings: ArrayLike,
         robot: RobotModel,
-        measured_from: MeasuredFrom,
-        bearing_from: BearingFrom | None,
+        frame: TableFrame,
         *,
         hold_out: bool,
     ) -> Readings:
@@ -179,19 +172,14 @@ class Readings:
             )
         if arrays["distance_m"].min() < 0:
             raise ValueError(f"A distance is {arrays['distance_m'].min():g} m, expected at least 0.")
-        gap, bearing = gaps_to_wall(
-            index, arrays["distance_m"], arrays["bearing_rad"], robot, measured_from, bearing_from
-        )
-        ranks = tuple(
-            np.unique(np.round(arrays[name], 6), return_inverse=True)[1]
-            for name in ("distance_m", "bearing_rad")
-        )
+        gap, bearing = frame.gaps(index, arrays["distance_m"], arrays["bearing_rad"], robot)
+        ranks = place_ranks(distance_m, bearing_rad)
         seen = (ranks[0] + ranks[1]) % 2 == 0 if hold_out else np.ones(len(index), np.bool_)
         for k in np.unique(index):
             n = int((seen & (index == k)).sum())
             if n < LEAST_PLACES:
                 raise ValueError(f"The fit sees {n} readings of range.{k}, expected at least {LEAST_PLACES}.")
-        return cls(index, gap, bearing, arrays["readings"], seen, (ranks[0], ranks[1]))
+        return cls(index, gap, bearing, arrays["readings"], seen, ranks)
 
     def of_sensor(self, k: int, most: int = MOST_ROWS) -> Readings:
         """Return the seen readings of one sensor; a random part of them if there are more than `most`."""
@@ -204,48 +192,13 @@ class Readings:
         )
 
 
-def bearings_from_heading(
-    sensor: Ints, bearing: Floats, robot: RobotModel, bearing_from: BearingFrom
-) -> Floats:
-    """Return the bearing of the wall from the body's heading, (n,) [rad]."""
-    if bearing_from not in ("body", "sensor"):
-        raise ValueError(f"bearing_from is {bearing_from!r}, expected 'body' or 'sensor'.")
-    if bearing_from == "body":
-        return bearing
-    return np.asarray(bearing + np.array([_center(device.direction) for device in robot.range])[sensor])
-
-
-def gaps_to_wall(
-    sensor: Ints,
-    distance: Floats,
-    bearing: Floats,
-    robot: RobotModel,
-    measured_from: MeasuredFrom,
-    bearing_from: BearingFrom | None = None,
-) -> tuple[Floats, Floats]:
-    """Return the distance from each sensor's mount to the wall [m], and the wall's bearing from the heading [rad]."""
-    if measured_from not in ("body", "origin", "sensor"):
-        raise ValueError(f"measured_from is {measured_from!r}, expected 'body', 'origin' or 'sensor'.")
-    is_own = measured_from == "sensor"
-    bearing = bearings_from_heading(sensor, bearing, robot, bearing_from or ("sensor" if is_own else "body"))
-    if is_own:
-        return distance, bearing
-    mounts = np.array([[_center(device.x), _center(device.y)] for device in robot.range])[sensor]
-    normal = np.stack([np.cos(bearing), np.sin(bearing)], axis=1)
-    gap = distance - (normal * mounts).sum(axis=1)
-    if measured_from == "body":
-        reach = [(normal @ np.array(part.corners).T).max(axis=1) + part.radius for part in robot.body]
-        gap = gap + np.max(reach, axis=0)
-    return gap, bearing
-
-
 @dataclass(frozen=True)
 class RangeProblem:
     """A table, and the numbers that are fitted to it."""
 
     table: Readings
     robot: RobotModel
-    free: tuple[tuple[Number, tuple[int, ...]], ...]  # a number, and the sensors that have it
+    free: tuple[tuple[Deviation, tuple[int, ...]], ...]  # a number, and the sensors that have it
     distance_sd: float
     own: Mapping[int, dict[str, float]]  # numbers in the robot file, by sensor
     prior_weight: float = 1.0  # of the priors of numbers
@@ -257,11 +210,11 @@ class RangeProblem:
         unknown = sorted(set(shared) - set(NAMES))
         if unknown:
             raise ValueError(f"shared has {unknown[0]!r}, expected some of {', '.join(NAMES)}.")
-        sensors: dict[Number, list[int]] = {}
+        sensors: dict[Deviation, list[int]] = {}
         for k in np.unique(table.sensor):
             for number in numbers_to_fit(robot.range[k]):
                 sensors.setdefault(number, []).append(int(k))
-        free: list[tuple[Number, tuple[int, ...]]] = []
+        free: list[tuple[Deviation, tuple[int, ...]]] = []
         for number, which in sensors.items():
             free += [(number, tuple(which))] if number.name in shared else [(number, (k,)) for k in which]
         own = {int(k): numbers_in_file(robot, int(k)) for k in np.unique(table.sensor)}
@@ -276,7 +229,7 @@ class RangeProblem:
         """Return by how much each distance is larger than written, (r,) [m]."""
         return np.asarray(self.distance_sd * point[len(self.free) :])
 
-    def middle(self, number: Number, sensors: Sequence[int]) -> float:
+    def middle(self, number: Deviation, sensors: Sequence[int]) -> float:
         """Return the center of the prior."""
         own = float(np.mean([self.own[k][number.name] for k in sensors]))
         return max(own, number.least) if number.kind == "ratio" else own
@@ -285,7 +238,7 @@ class RangeProblem:
         """Return the fitted numbers of each sensor at a point (p,) of the standard normal scale."""
         values: dict[int, dict[str, float]] = {k: {} for k in self.own}
         for (number, sensors), z in zip(self.free, point, strict=False):  # distances follow
-            value = number.value(self.middle(number, sensors), float(z))
+            value = number.limited(self.middle(number, sensors), float(z))
             for k in sensors:
                 values[k][number.name] = value
         return values
@@ -447,11 +400,11 @@ class RangeProblem:
         for k, (number, sensors) in enumerate(self.free):
             middle = self.middle(number, sensors)
 
-            def of(z: float, number: Number = number, middle: float = middle) -> float:
-                return number.value(middle, z)
+            def of(z: float, number: Deviation = number, middle: float = middle) -> float:
+                return number.limited(middle, z)
 
             wide = 1.645 * float(np.sqrt(spread[k, k]))
-            identified = wide < IDENTIFIED * 1.645
+            identified = is_identified(wide, 1.645)
             rows.append(
                 Fitted(
                     name=f"range.{number.name}" if len(sensors) > 1 else f"range.{sensors[0]}.{number.name}",
@@ -466,6 +419,49 @@ class RangeProblem:
                 )
             )
         return rows
+
+
+def choose_frame(
+    sensor: ArrayLike,
+    distance_m: ArrayLike,
+    bearing_rad: ArrayLike,
+    readings: ArrayLike,
+    robot: RobotModel,
+    frames: Sequence[TableFrame],
+    seed: int = 0,
+) -> tuple[TableFrame, dict[TableFrame, float]]:
+    """Return the frame in which the sensors of a robot fit a table best, and the error of a first fit in each frame.
+
+    Each sensor is fitted alone, to a part of its readings and from several starts. An earlier frame is preferred if a
+    later one fits hardly better.
+
+    Args:
+        sensor, distance_m, bearing_rad, readings: (n,) as in `fit_range_table`; bearings in the sign of the table.
+        robot: The robot with its nominal numbers.
+        frames: The frames to try, the usual ones first.
+        seed: Seed of the starts.
+
+    Raises:
+        ValueError: As in `fit_range_table`.
+    """
+    which: Ints = np.asarray(sensor, np.int64)
+    bearing: Floats = np.asarray(bearing_rad, np.float64)
+    sensors = np.unique(which)
+    chosen = sensors[np.linspace(0, len(sensors) - 1, min(len(sensors), FRAME_SENSORS)).astype(int)]
+    costs, errors = {}, {}
+    for frame in frames:
+        left = -bearing if frame.clockwise else bearing
+        table = Readings.of(which, distance_m, left, readings, robot, frame, hold_out=False)
+        cost, squares, n = 0.0, 0.0, 0
+        for k in chosen:
+            alone = RangeProblem.of(table.of_sensor(int(k), FRAME_ROWS), robot, (), 0.0)
+            best = alone.best_of_several(seed, FRAME_TRIED, FRAME_STARTS)
+            cost += alone.cost(best)
+            squares += float(np.sum((alone.at(best) - alone.table.readings) ** 2))
+            n += len(alone.table.readings)
+        costs[frame], errors[frame] = cost, math.sqrt(squares / n)
+    least = min(costs.values())
+    return next(frame for frame in frames if costs[frame] <= CLEARLY * least + MARGIN), errors
 
 
 def _compare(problem: RangeProblem, best: Floats) -> HeldOut:
@@ -512,10 +508,6 @@ def _floor(table: Readings) -> float | None:
     if not some.any():
         return None
     return _rms(np.nanmean(around[:, some], axis=0) - table.readings[~table.seen][some])
-
-
-def _center(value: float | Distribution) -> float:
-    return value.center if isinstance(value, Distribution) else value
 
 
 def _rms(values: Floats) -> float:

@@ -84,6 +84,18 @@ def learn_compression(places: Floats, vectors: Vectors, finest: Vectors) -> Comp
     return made
 
 
+def information_of(places: Floats, vectors: Vectors, finest: Vectors) -> Floats:
+    """Return the Fisher information of a trial's expected observations about the parameters, (p, p).
+
+    Args:
+        places: (m, p) parameters of robots from the posterior.
+        vectors: (m, d) observations of each robot in the trial.
+        finest: (d,) the least standard deviation of an entry.
+    """
+    weights = learn_compression(places, vectors, finest).of_means.astype(np.float64)
+    return np.asarray(weights.T @ weights)
+
+
 def _shrunk(slopes: Vectors, variance: Vectors) -> Vectors:
     shrink = 1.0 - SHRINK * variance / np.maximum(slopes * slopes, 1e-30)
     return np.asarray(slopes * np.maximum(shrink, 0.0))

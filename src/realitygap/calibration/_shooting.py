@@ -100,7 +100,7 @@ def make_problem(
 ) -> Problem:
     """Return windows that are to be met by parameters of these names."""
     own = own_values(robot)
-    places = np.array([place_of(known[name], own[name]) for name in names])
+    places = np.array([float(place_of(known[name], own[name])) for name in names])
     free = tuple(known[name] for name in names)
     return Problem(simulate, robot, known, windows, free, {}, places)
 

@@ -11,14 +11,12 @@ Marquardt 1963; weighted likelihood bootstrap, Newton & Raftery, JRSS B 56 (1994
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import NDArray
 
-from ._prior import MAD, PRIOR_PRECISION, Floats, Parameter
+from ._posterior import sample_posterior
+from ._prior import MAD, PRIOR_PRECISION, Floats, values_at
 from ._shots import Shooter
-from ._tempering import sample_posterior
 from ._windows import wrapped
 
 NOISE = (
@@ -141,7 +139,11 @@ class MotionOfCommands:
         return scales
 
     def _best(self, start: Floats) -> tuple[Floats, Floats]:
-        """Return the places with the smallest differences, and these differences."""
+        """Return the places with the smallest differences, and these differences.
+
+        SciPy's robust losses weigh each difference by itself. Here, all three of a command have one weight: a robot
+        that takes another path differs in all of them.
+        """
         places, off = start, self._off(start[None])[0]
         scales, damping = self._scales(off), 1e-2
         for turn in range(MOST_ROUNDS):
@@ -220,21 +222,6 @@ class MotionOfCommands:
         draws = np.stack([drawn[p.name] for p in self.noise], axis=1)
         self.own_scales = np.sqrt(np.einsum("q,qkts->kts", (draws**2).mean(axis=0), made_by) + FINEST**2)
         return draws
-
-
-def values_at(parameters: Sequence[Parameter], places: Floats) -> dict[str, Floats]:
-    """Return the values of parameters at places (m, p) in 0 to 1, (m,) each."""
-    return {
-        p.name: np.asarray(p.prior.of(np.clip(places[:, k], 0.0, 1.0 - 1e-9)))
-        for k, p in enumerate(parameters)
-    }
-
-
-def places_of(parameter: Parameter, values: Floats) -> Floats:
-    """Return the positions of values (m,) between the limits, 0..1."""
-    low = parameter.scale(parameter.prior.lowest)
-    with np.errstate(divide="ignore"):
-        return np.clip((parameter.scale(values) - low) / parameter.width, 0.002, 0.998)
 
 
 def _weights(off: Floats) -> Floats:

@@ -8,24 +8,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from realitygap.calibration._tempering import level_ends, sample_posterior
+from realitygap.calibration._posterior import level_ends, sample_posterior
 from realitygap.world import Fitted, RobotModel
 
 from .._posterior import N_DRAWS
+from .._prior import ENDS, Parameter, is_identified
 from ._checks import Independence, independence, predictive_check
 from ._mixture import LorentzReadings, MixtureReadings
+from ._parameters import BATTERY
 from ._pulses import PulseReadings
 from ._readings import Array, Placement, refuse_response
-from ._scales import BATTERY, Scale
 
 LEAST_PLACEMENTS = 3
 """Minimum number of placements with which the correlation of readings is distinguished from their placement."""
 
-ENDS = (0.05, 0.95)
-"""Ends of the 90 % interval."""
-
-IDENTIFIED = 1 / 3
-"""A parameter is identified if its interval is narrower than this part of its prior."""
+MOST = 1 / 3
+"""Share of the width of its prior that an identified parameter may have."""
 
 NO_WALL = "{} never had a wall in view. Place the robot so that this sensor faces one."
 """The advice for a sensor that looked away from the wall in all placements."""
@@ -91,20 +89,23 @@ def fit_sensor(
     def log_likelihood(places: Array) -> Array:
         return model.log_likelihood(_values(model, places))
 
-    places = sample_posterior(log_likelihood, len(model.scales), rng)
+    places = sample_posterior(log_likelihood, len(model.parameters), rng)
     ends = _ends(places, level_ends(log_likelihood, places, rng))
     values = _values(model, places)
     chosen = rng.choice(len(values), N_DRAWS, replace=len(values) < N_DRAWS)
     name = f"range.{number}"
-    centers = {scale.name: scale.center(values[:, k]) for k, scale in enumerate(model.scales)}
+    centers = {
+        parameter.name: _center(parameter, values[:, k]) for k, parameter in enumerate(model.parameters)
+    }
     advice = "" if np.any(model.places.near < sensor.reach) else NO_WALL.format(name)
     fitted = tuple(
-        _fitted(name, scale, ends[:, k], values[:, k], advice) for k, scale in enumerate(model.scales)
+        _fitted(name, parameter, ends[:, k], values[:, k], advice)
+        for k, parameter in enumerate(model.parameters)
     )
     # what a sensor that saw no wall does not tell stays as the robot's file has it, and not in the middle of its prior
     is_own = {
-        scale.name: scale.name != BATTERY.name and (parameter.identified or not advice)
-        for scale, parameter in zip(model.scales, fitted, strict=True)
+        parameter.name: parameter.name != BATTERY.name and (row.identified or not advice)
+        for parameter, row in zip(model.parameters, fitted, strict=True)
     }
     return SensorFit(
         name,
@@ -112,9 +113,9 @@ def fit_sensor(
         + (() if model.places.battery_varied or sensor.response == "lorentz" else (_unknown_battery(name),)),
         {f"{name}.{key}": value for key, value in centers.items() if is_own[key]},
         {
-            f"{name}.{scale.name}": values[chosen, k]
-            for k, scale in enumerate(model.scales)
-            if is_own[scale.name]
+            f"{name}.{parameter.name}": values[chosen, k]
+            for k, parameter in enumerate(model.parameters)
+            if is_own[parameter.name]
         },
         apart,
         *predictive_check(model.probabilities(values[chosen]), model.counts, rng),
@@ -133,7 +134,9 @@ def _model(robot: RobotModel, number: int, placements: list[Placement], weight: 
 
 def _values(model: SensorModel, places: Array) -> Array:
     """Return parameters at places (m, d) in the unit cube, (m, d)."""
-    return np.stack([scale.of(places[:, k]) for k, scale in enumerate(model.scales)], axis=1)
+    return np.stack(
+        [parameter.prior.of(places[:, k]) for k, parameter in enumerate(model.parameters)], axis=1
+    )
 
 
 def _ends(places: Array, level: Array) -> Array:
@@ -142,19 +145,30 @@ def _ends(places: Array, level: Array) -> Array:
     return np.stack([np.minimum(low, level[0]), np.maximum(high, level[1])])
 
 
-def _fitted(name: str, scale: Scale, ends: Array, values: Array, advice: str = "") -> Fitted:
-    low, high = scale.of(ends)
-    identified = bool(np.ptp(ends) < IDENTIFIED * (ENDS[1] - ENDS[0]))
+def _center(parameter: Parameter, values: Array) -> float:
+    """Return the center of samples.
+
+    A decay is averaged as 1 / L: with log A it makes the readings' logarithms straight lines, so that the average
+    of draws that agree with what was read agrees with it, too.
+    """
+    if parameter.name == "decay":
+        return float(1 / np.mean(1 / values))
+    return float(np.exp(np.mean(np.log(values)))) if parameter.is_ratio else float(np.mean(values))
+
+
+def _fitted(name: str, parameter: Parameter, ends: Array, values: Array, advice: str = "") -> Fitted:
+    low, high = parameter.prior.of(ends)
+    identified = is_identified(float(np.ptp(ends)), ENDS[1] - ENDS[0], MOST)
     return Fitted(
-        name=f"{name}.{scale.name}",
-        estimate=scale.center(values),
+        name=f"{name}.{parameter.name}",
+        estimate=_center(parameter, values),
         low=float(low),
         high=float(high),
-        prior_low=scale.low,
-        prior_high=scale.high,
+        prior_low=parameter.prior.lowest,
+        prior_high=parameter.prior.highest,
         identified=identified,
-        unit=scale.unit,
-        advice="" if identified else advice or scale.advice,
+        unit=parameter.unit,
+        advice="" if identified else advice or parameter.advice,
     )
 
 
@@ -163,10 +177,10 @@ def _unknown_battery(name: str) -> Fitted:
     return Fitted(
         name=f"{name}.{BATTERY.name}",
         estimate=0.0,
-        low=BATTERY.low,
-        high=BATTERY.high,
-        prior_low=BATTERY.low,
-        prior_high=BATTERY.high,
+        low=BATTERY.prior.lowest,
+        high=BATTERY.prior.highest,
+        prior_low=BATTERY.prior.lowest,
+        prior_high=BATTERY.prior.highest,
         identified=False,
         unit=BATTERY.unit,
         advice=BATTERY.advice,

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from realitygap.world import RangeSensor
 
+from ._parameters import AMPLITUDE, DECAY, DROP, GAIN, HALF_WIDTH, NOISE, OUTLIER
 from ._readings import Array, Placement, Places, Readings, logistic
-from ._scales import AMPLITUDE, DECAY, DROP, GAIN, OUTLIER, Scale
 
 Parts = tuple[Array, Array, Array, Array]
 
@@ -51,7 +51,7 @@ class MixtureReadings(Readings):
         placements: Placements with their readings.
         reach: Reach of the sensor [m].
         weight: Weight of a reading: below 1 if readings have less information than as many independent ones.
-        sensor: The sensor whose scales and compression these are; by default one that sees `REACH` far and does not
+        sensor: The sensor whose parameters and compression these are; by default one that sees `REACH` far and does not
             compress.
     """
 
@@ -146,10 +146,6 @@ def _inner_edges(step: float) -> Array:
     return edges
 
 
-HALF_WIDTH = Scale("half_width", 0.02, 0.5, "ratio", "m", AMPLITUDE.advice)
-NOISE = Scale("noise_uniform", 0.0002, 0.1, "ratio", "", "Record more readings in one place.")
-
-
 class LorentzReadings(MixtureReadings):
     """Readings whose mean follows `lorentz` of kernels/sim/ranges.py, with noise of one spread at all distances.
 
@@ -163,7 +159,7 @@ class LorentzReadings(MixtureReadings):
 
     def __init__(self, placements: list[Placement], sensor: RangeSensor, weight: float = 1.0) -> None:
         super().__init__(placements, sensor.reach, weight)
-        self.scales = (AMPLITUDE, HALF_WIDTH, NOISE)
+        self.parameters = (AMPLITUDE, HALF_WIDTH, NOISE)
         self._sensor = sensor
 
     def parts(self, places: Places, values: Array) -> Parts:

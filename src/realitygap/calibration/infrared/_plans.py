@@ -13,7 +13,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from realitygap.calibration._rays import rays_of
+from realitygap.calibration.infrared._readings import rays_of
 from realitygap.records import TrialRecord
 from realitygap.trials import TrialPlan
 from realitygap.world import INCH, Arena, Pose, RobotModel

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from realitygap.world import RangeSensor
 
+from ._parameters import AMPLITUDE, BURST, DECAY, DROP
 from ._readings import Array, Placement, Places, Readings, logistic
-from ._scales import AMPLITUDE, BURST, DECAY, DROP
 
 STRAY = 1e-6
 """Probability of any count, so that one that the model cannot make is unlikely and not impossible."""
@@ -26,7 +26,7 @@ class PulseReadings(Readings):
         reach: Reach of the sensor [m].
         pulses: Sent for one reading.
         weight: Weight of a reading: below 1 if readings have less information than as many independent ones.
-        sensor: The sensor whose scales these are; by default one that sees `REACH` far.
+        sensor: The sensor whose parameters these are; by default one that sees `REACH` far.
     """
 
     def __init__(

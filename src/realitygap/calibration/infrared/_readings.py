@@ -4,18 +4,23 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from realitygap.world import RangeSensor, RobotModel
+from realitygap.world import Arena, RangeSensor, RobotModel
 
-from ._scales import BATTERY, INCIDENCE, Scale, column, scaled
+from .._prior import Parameter
+from ._parameters import BATTERY, INCIDENCE, column, scaled
 
 Array = NDArray[np.float64]
 
 SAME_V = 0.05
 """Voltages that differ by less say nothing of a battery [V]."""
+
+GRAZING = 1e-3
+"""Smallest cosine of the angle between a ray and a normal at which something is met."""
 
 VARIED = 0.05
 """Difference of the cosines of a ray between placements from which on angles varied."""
@@ -35,6 +40,48 @@ def refuse_response(robot: RobotModel, number: int, response: str) -> None:
             f"range.{number} of robot {robot.name!r} has the response {response!r}, expected ir, pulses or lorentz: of "
             "others there is no noise to fit."
         )
+
+
+def rays_of(sensor: RangeSensor, poses: Array, arena: Arena) -> tuple[Array, Array]:
+    """Return the lengths of the rays of a sensor, and the cosines at the obstacles that they meet.
+
+    Args:
+        sensor: Sensor of the robot.
+        poses: (n, 3) x [m], y [m], heading [rad].
+        arena: Round things count as polygons.
+
+    Returns:
+        (n, rays) distances [m], at most the sensor's reach, and cosines between ray and normal, 1 if the ray meets
+        nothing.
+    """
+    x, y, heading = poses[:, None].T.transpose(0, 2, 1)
+    cosine, sine = np.cos(heading), np.sin(heading)
+    spread = np.linspace(-sensor.cone, sensor.cone, sensor.rays) if sensor.rays > 1 else np.zeros(1)
+    from_x = x + cosine * sensor.x - sine * sensor.y
+    from_y = y + sine * sensor.x + cosine * sensor.y
+    along, beside = np.cos(heading + sensor.direction + spread), np.sin(heading + sensor.direction + spread)
+    distances, cosines = np.full(along.shape, sensor.reach), np.ones(along.shape)
+    for x1, y1, x2, y2 in _sides(arena):
+        edge_x, edge_y = x2 - x1, y2 - y1
+        length = np.hypot(edge_x, edge_y)
+        if length == 0:
+            continue
+        facing = (along * edge_y - beside * edge_x) / length  # cosine to one of both normals
+        safe = np.where(np.abs(facing) < GRAZING, GRAZING, facing)
+        far = ((x1 - from_x) * edge_y - (y1 - from_y) * edge_x) / length / safe
+        place = ((from_x + far * along - x1) * edge_x + (from_y + far * beside - y1) * edge_y) / length**2
+        hit = (np.abs(facing) >= GRAZING) & (far >= 0) & (far < distances) & (place >= 0) & (place <= 1)
+        distances, cosines = np.where(hit, far, distances), np.where(hit, np.abs(facing), cosines)
+    return distances, cosines
+
+
+def _sides(arena: Arena) -> list[tuple[float, float, float, float]]:
+    """Return all sides of the obstacles in an arena; round ones as short lines."""
+    sides = list(arena.walls)
+    for obstacle in arena.obstacles:
+        points = obstacle.outline()
+        sides += [(*first, *second) for first, second in pairwise((*points, points[0]))]
+    return sides
 
 
 @dataclass(frozen=True)
@@ -145,16 +192,16 @@ class Readings:
         self,
         placements: list[Placement],
         reach: float,
-        scales: tuple[Scale, ...],
+        parameters: tuple[Parameter, ...],
         weight: float,
         sensor: RangeSensor | None,
     ) -> None:
         self.places = Places.of(placements, reach)
         self.weight = weight
-        self.scales = scales
-        self.scales += (BATTERY,) * self.places.battery_varied + (INCIDENCE,) * self.places.slants_varied
+        self.parameters = parameters
+        self.parameters += (BATTERY,) * self.places.battery_varied + (INCIDENCE,) * self.places.slants_varied
         if sensor is not None:
-            self.scales = tuple(scaled(scale, sensor) for scale in self.scales)
+            self.parameters = tuple(scaled(parameter, sensor) for parameter in self.parameters)
         self._incidence = 0.0 if sensor is None else sensor.incidence
 
     @property
@@ -168,15 +215,15 @@ class Readings:
 
     def _response(self, places: Places, values: Array) -> tuple[Array, Array]:
         """Return `Places.response` for parameters (m, d), of which the first are amplitude and decay."""
-        per_volt = column(self.scales, values, BATTERY)
-        incidence = column(self.scales, values, INCIDENCE, self._incidence)
+        per_volt = column(self.parameters, values, BATTERY)
+        incidence = column(self.parameters, values, INCIDENCE, self._incidence)
         return places.response(values[:, 0], values[:, 1], per_volt, incidence)
 
     def probabilities(self, values: Array) -> Array:
         """Return the probability of each bin at each placement, (m, p, b).
 
         Args:
-            values: (m, d) values of the parameters, in the order of `scales`.
+            values: (m, d) values of the parameters, in the order of `parameters`.
         """
         return self._at(self.places, values)
 

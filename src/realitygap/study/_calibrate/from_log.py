@@ -30,7 +30,6 @@ from realitygap.world import Calibration, RobotModel
 
 from .hold_out import FITTED, NOISE, NOMINAL, TABLE, Compared, HoldOut, chosen_parts
 from .one import calibration_of, measured_at
-from .parts import Parts
 
 BLOCKS = 4
 """Parts of a log, each of which is fitted in its first half and predicted in its second."""
@@ -91,10 +90,9 @@ def calibrate_from_log(
     if n_logs > 1:
         notes.append(f"The fit uses {len(logs)} of {n_logs} trials.{LEFT_OUT if len(logs) < n_logs else ''}")
     given = {"drive.speed": log_map.speed, "drive.track": log_map.track}
-    parts = Parts(
-        fit.fitted, fit.numbers, fit.draws, fit.method, tuple(notes), fit.misspecified, evidence=fit.evidence
+    parts = chosen_parts(
+        replace(fit, notes=tuple(notes)), compared, {key: value for key, value in given.items() if value}
     )
-    parts = chosen_parts(parts, compared, {key: value for key, value in given.items() if value})
     observe: Observe = "track" if len(longest.poses) else "encoders"
     arena = log_map.arena or "open"
     made = calibration_of("motion", parts, name, path, log_map.label, observe, (), arena, seed)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,6 @@ from realitygap.calibration import (
     BearingFrom,
     MeasuredFrom,
     TableFrame,
-    bearings_from_heading,
     choose_frame,
     fit_range_table,
     look_up_readings,
@@ -28,7 +28,6 @@ from realitygap.world import Calibration, RobotModel, load_robot, robot_names
 
 from .hold_out import FITTED, NOISE, NOMINAL, TABLE, Compared, HoldOut, chosen_parts
 from .one import calibration_of, measured_at
-from .parts import Parts
 
 BETWEEN = (0.03, 1.0)
 """Readings between these are neither nothing nor full: the sensor tells a distance."""
@@ -88,9 +87,7 @@ def calibrate_from_table(
     seen = _seen(table, hold_out, seed)
     try:
         frame, notes = _frame(table, robot, seen, is_placed=radius is not None)
-        bearing = bearings_from_heading(
-            table.sensor, table.bearing_left(clockwise=frame.clockwise), robot, frame.bearing_from
-        )
+        bearing = frame.bearings(table.sensor, table.bearing_left(clockwise=frame.clockwise), robot)
         fit = fit_range_table(
             table.sensor[seen],
             table.distance[seen],
@@ -109,8 +106,7 @@ def calibrate_from_table(
         fitted = robot.with_numbers(fit.numbers)
         compared = _compare(table, bearing, seen, robot, fitted, frame, hold_out)
     notes = [*table.notes, *notes, *fit.notes]
-    parts = Parts(fit.fitted, fit.numbers, fit.draws, fit.method, tuple(notes), evidence=fit.evidence)
-    parts = chosen_parts(parts, compared, {})
+    parts = chosen_parts(replace(fit, notes=tuple(notes)), compared, {})
     made = calibration_of("sensors", parts, name, str(path), table_map.label, "cells", (), "", seed)
     return made.model_copy(update={"trials": 1, "measured": measured_at(Path(path))})
 

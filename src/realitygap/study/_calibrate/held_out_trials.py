@@ -8,14 +8,13 @@ from functools import partial
 
 import numpy as np
 
-from realitygap.calibration import PREDICTED, Evidence, Floats, Vectors, evidence_of, prediction_errors
+from realitygap.calibration import PREDICTED, Evidence, Fit, Floats, Vectors, evidence_of, prediction_errors
 from realitygap.evolution import Genome
 from realitygap.platforms import SimEnsemble
 from realitygap.records import TrialRecord
 from realitygap.world import Arena
 
 from .hold_out import FITTED, NOMINAL, POSTERIOR, Compared
-from .parts import Parts
 
 SHARE_OF_TRIALS = 0.2
 """Share of the trials that the second fit does not see."""
@@ -46,14 +45,14 @@ def is_held_out(n: int) -> list[bool]:
 
 
 def compare_on_trials(
-    parts: Parts,
+    parts: Fit,
     trials: Sequence[TrialRecord],
     fit: Callable[[Sequence[TrialRecord]], Numbers],
     ensemble: SimEnsemble,
     *,
     kinds: Sequence[str] = PREDICTED,
     seed: int = 0,
-) -> Parts:
+) -> Fit:
     """Return the parts of a fit with the errors on held-out trials, and with a recommendation.
 
     The numbers stay those of the fit to all trials. They are judged by a second fit, which does not see some trials

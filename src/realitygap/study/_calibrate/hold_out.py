@@ -7,10 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
-from realitygap.calibration import DECISIVE, is_better
+from realitygap.calibration import DECISIVE, Fit, is_better
 from realitygap.errors import StudyError
-
-from .parts import Parts
 
 HoldOut = float | Literal["blocks"]
 
@@ -109,7 +107,7 @@ class Compared:
         return min(choices, key=self.errors.__getitem__)
 
 
-def chosen_parts(parts: Parts, compared: Compared | None, given: Mapping[str, float]) -> Parts:
+def chosen_parts(parts: Fit, compared: Compared | None, given: Mapping[str, float]) -> Fit:
     """Return the parts of a fit to a log or a table, without its numbers if the robot file's predict better.
 
     Args:

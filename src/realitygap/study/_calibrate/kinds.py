@@ -14,7 +14,7 @@ from realitygap._wording import significant
 from realitygap.calibration import (
     LEAST_PLACEMENTS,
     MOTION,
-    MotionFit,
+    Fit,
     Moved,
     Placement,
     SensorFit,
@@ -39,7 +39,6 @@ from realitygap.trials import TrialPlan
 from realitygap.world import Arena, Pose, RobotModel, distance_to_segment
 
 from .held_out_trials import Numbers, compare_on_trials
-from .parts import Parts
 from .whole import all_plans, fit_everything
 
 
@@ -55,12 +54,12 @@ class Kind:
     """
 
     plans: Callable[..., Sequence[TrialPlan]]
-    fit: Callable[[Sequence[TrialRecord], RobotModel, Arena, Observe, int], Parts]
+    fit: Callable[[Sequence[TrialRecord], RobotModel, Arena, Observe, int], Fit]
     least: int = 1
     observes: tuple[Observe, ...] = CALIBRATES
 
 
-def _told_of_ends(parts: Parts, *, is_cut: bool) -> Parts:
+def _told_of_ends(parts: Fit, *, is_cut: bool) -> Fit:
     """Add a note on the numbers of the motion that are at an end of what was thought possible.
 
     Noise is left out: a robot without any lies at the lower end, and what `sim` cannot make looks like more of it.
@@ -95,15 +94,10 @@ MOST_TURN = 0.9 * math.pi
 FAR_M = 20.0
 """Nothing stands nearer where a path is simulated [m]."""
 
-_PATH_METHOD = (
-    "Full-speed paths, straight and turning (Rosenzweig & Remy, section 2.2): ways and turns against those of the "
-    "simulated robot; Student's intervals from repeats and from the step to which was read."
-)
-
 
 def _fit_path(
     trials: Sequence[TrialRecord], robot: RobotModel, arena: Arena, observe: Observe, seed: int
-) -> Parts:
+) -> Fit:
     def simulate(trial: TrialRecord) -> Moved:
         return _moved_in_sim(trial, robot, arena)
 
@@ -120,7 +114,7 @@ def _fit_path(
     left_out = (f"{n} of {len(straight)} straight paths ended at a wall, and were left out.",) if n else ()
     notes = (*fit.notes, *left_out)
     return _told_of_ends(
-        Parts(fit.fitted, fit.numbers, fit.draws, _PATH_METHOD, notes, evidence={"path": fit.evidence}),
+        replace(fit, notes=notes, evidence={"path": fit.evidence}),
         is_cut=False,
     )
 
@@ -202,7 +196,7 @@ readings any model is found wrong somewhere."""
 
 def _fit_sensors(
     trials: Sequence[TrialRecord], robot: RobotModel, arena: Arena, observe: Observe, seed: int
-) -> Parts:
+) -> Fit:
     standing = [trial for trial in trials if len(trial.commands) and not np.any(trial.commands)]
     if not standing:
         raise ValueError(
@@ -220,7 +214,7 @@ def _fit_sensors(
     fits = [fit_sensor(robot, k, each, rng) for k, each in enumerate(placements)]
     p = min(1.0, len(fits) * min(fit.p for fit in fits))
     farthest = max(fit.misfit for fit in fits)
-    return Parts(
+    return Fit(
         fitted=tuple(fitted for fit in fits for fitted in fit.fitted),
         numbers={name: value for fit in fits for name, value in fit.numbers.items()},
         draws={name: values for fit in fits for name, values in fit.draws.items()},
@@ -270,27 +264,27 @@ OF_MOTION = ("ahead", "turn", "wheels")
 
 def _fit_motion(
     trials: Sequence[TrialRecord], robot: RobotModel, arena: Arena, observe: Observe, seed: int
-) -> Parts:
+) -> Fit:
     moving = _of_purpose(trials, "motion")
     ensemble = _ensemble(moving, robot, arena)
 
-    def fit(some: Sequence[TrialRecord]) -> MotionFit:
+    def fit(some: Sequence[TrialRecord]) -> Fit:
         return fit_motion(some, ensemble.replay, robot, arena, observe=observe, seed=seed)
 
     def numbers(some: Sequence[TrialRecord]) -> Numbers:
         made = fit(some)
         return made.numbers, made.draws
 
-    parts = _told_of_ends(_parts_of(fit(moving)), is_cut=True)
+    parts = _told_of_ends(fit(moving), is_cut=True)
     return compare_on_trials(parts, moving, numbers, ensemble, kinds=OF_MOTION, seed=seed)
 
 
 def _fit_contact(
     trials: Sequence[TrialRecord], robot: RobotModel, arena: Arena, observe: Observe, seed: int
-) -> Parts:
+) -> Fit:
     met = _of_purpose(trials, "contact")
     simulate = _ensemble(met, robot, arena).replay
-    return _parts_of(fit_contact(met, simulate, robot, arena, observe=observe, seed=seed))
+    return fit_contact(met, simulate, robot, arena, observe=observe, seed=seed)
 
 
 def _of_purpose(trials: Sequence[TrialRecord], purpose: str) -> list[TrialRecord]:
@@ -307,16 +301,12 @@ def _ensemble(trials: Sequence[TrialRecord], robot: RobotModel, arena: Arena) ->
     return SimEnsemble(SimPlatform(robot=robot, step_s=step_s), arena, ranges=ranges)
 
 
-def _parts_of(fit: MotionFit) -> Parts:
-    return Parts(fit.fitted, fit.numbers, fit.draws, fit.method, fit.notes, evidence=fit.evidence)
-
-
 # all
 
 
 def _fit_all(
     trials: Sequence[TrialRecord], robot: RobotModel, arena: Arena, observe: Observe, seed: int
-) -> Parts:
+) -> Fit:
     return fit_everything(trials, robot, arena, seed)
 
 

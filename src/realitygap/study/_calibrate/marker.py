@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from realitygap.calibration import Marker, fit_marker
+from realitygap.calibration import Fit, Marker, fit_marker
 from realitygap.platforms import platform_names, split_spec
 from realitygap.records import Observe, TrialRecord
 from realitygap.world import Arena, RobotModel
-
-from .parts import Parts
 
 
 def is_under_camera(target: str, label: str, observe: Observe) -> bool:
@@ -32,7 +30,7 @@ def without_marker(
     return [trial if marker is None else marker.taken_from(trial) for trial in trials], marker
 
 
-def with_marker(parts: Parts, marker: Marker | None) -> Parts:
+def with_marker(parts: Fit, marker: Marker | None) -> Fit:
     """Return the parts of a fit with the parameters of the marker."""
     if marker is None:
         return parts

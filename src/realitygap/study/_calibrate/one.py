@@ -11,7 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from realitygap.calibration import of_one_length, ruled, step_of
+from realitygap._version import __version__
+from realitygap.calibration import Fit, of_one_length, ruled, step_of
 from realitygap.errors import RecordError, StudyError, did_you_mean
 from realitygap.platforms import DEFAULT_ROBOT, SimPlatform, split_spec
 from realitygap.records import (
@@ -30,7 +31,6 @@ from .._kept_target import PATH, KeptTarget
 from .._targets import open_trials, refuse_more_than_is_seen
 from .kinds import KINDS, Kind
 from .marker import is_under_camera, with_marker, without_marker
-from .parts import SOFTWARE, Parts
 from .whole import ALL_TRIALS, LEAST_TO_CHOOSE, calibrate_all
 
 SEED_STRIDE = 10_000
@@ -134,7 +134,7 @@ def _chosen(
         )
     except ValueError as error:
         raise StudyError(str(error)) from error
-    parts = Parts(
+    parts = Fit(
         made.fitted,
         made.numbers,
         made.draws,
@@ -308,7 +308,7 @@ def _fit(
     observe: Observe,
     seed: int,
     has_marker: bool,
-) -> Parts:
+) -> Fit:
     base = load_robot(robot)
     alike, left_out = (trials, "") if kind == "sensors" else of_one_length(trials)
     marker = None
@@ -330,7 +330,7 @@ def _seen_as(trial: TrialRecord, observe: Observe) -> TrialRecord:
 
 def calibration_of(
     kind: str,
-    parts: Parts,
+    parts: Fit,
     robot: str | Path,
     target: str,
     label: str,
@@ -368,7 +368,7 @@ def calibration_of(
         date=datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
         arena=arena,
         seed=seed,
-        software=SOFTWARE,
+        software=f"realitygap {__version__}",
         method=parts.method,
         fitted=tuple(fitted),
         numbers=numbers,
@@ -382,7 +382,7 @@ def calibration_of(
     )
 
 
-def _still_said(below: Sequence[Fitted], parts: Parts) -> list[Fitted]:
+def _still_said(below: Sequence[Fitted], parts: Fit) -> list[Fitted]:
     """Return the warnings of an earlier calibration about numbers that a later one has not refitted.
 
     `range.amplitude` is that of all sensors together, and `range.0.amplitude` of one; steps of a path follow from
@@ -401,7 +401,7 @@ def _still_said(below: Sequence[Fitted], parts: Parts) -> list[Fitted]:
     ]
 
 
-def _refuse_no_robot(parts: Parts, robot: str | Path, target: str) -> None:
+def _refuse_no_robot(parts: Fit, robot: str | Path, target: str) -> None:
     """Raise an error if no robot can have the fitted numbers.
 
     Raises:

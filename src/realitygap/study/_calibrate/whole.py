@@ -8,6 +8,7 @@ from functools import partial
 
 import numpy as np
 
+from realitygap._version import __version__
 from realitygap._wording import significant
 from realitygap.calibration import (
     CONTACT,
@@ -15,6 +16,7 @@ from realitygap.calibration import (
     MOTION,
     Effort,
     Evidence,
+    Fit,
     Floats,
     Misfit,
     Parameter,
@@ -25,6 +27,7 @@ from realitygap.calibration import (
     fit_from_commands,
     fit_from_poses,
     information_of,
+    is_identified,
     misfits,
     mixed,
     next_trials,
@@ -44,7 +47,6 @@ from realitygap.world import Arena, Calibration, Fitted, RobotModel
 
 from .held_out_trials import compare_on_trials, evidence_in, simulate_evidence
 from .marker import is_under_camera, with_marker, without_marker
-from .parts import SOFTWARE, Parts
 
 METHOD = (
     "Whole trials carried out anew in `sim`: approximate Bayesian computation in rounds (Deistler, Goncalves & Macke "
@@ -56,7 +58,6 @@ METHOD = (
 ALL_TRIALS = 20  # if no budget is given
 LEAST_TO_CHOOSE = 10  # of the budget, for which the last trials are chosen
 STEPS = 100  # of a trial
-IDENTIFIED = 0.5  # of the prior's spread, below which the observations tell a parameter from its prior
 N_CANDIDATES = 12  # of which the next trials are chosen
 N_ASKED = 400  # robots of the posterior that are asked what a trial would tell
 OF_COMMANDS = 3  # draws of given commands for each of whole trials: predicted more than 1 did, on twins
@@ -130,7 +131,7 @@ def calibrate_all(
         date=datetime.now(UTC).isoformat(timespec="seconds"),
         arena=target.arena.name,
         seed=seed,
-        software=SOFTWARE,
+        software=f"realitygap {__version__}",
         method=parts.method,
         fitted=parts.fitted,
         numbers=dict(parts.numbers),
@@ -162,7 +163,7 @@ def fit_everything(
     robot: RobotModel,
     arena: Arena,
     seed: int,
-) -> Parts:
+) -> Fit:
     """Return the fit of all parameters to trials that were recorded; arguments as in `calibrate_all`.
 
     Raises:
@@ -232,7 +233,7 @@ class _Fit:
     def numbers(self, values: Mapping[str, Floats]) -> dict[str, Floats]:
         return numbers_of(self.prior, values, self.robot)
 
-    def parts(self, trials: Sequence[TrialRecord], effort: Effort) -> Parts:
+    def parts(self, trials: Sequence[TrialRecord], effort: Effort) -> Fit:
         """Return all that the trials tell."""
         if not self.evidence(trials):
             return self._as_it_is()
@@ -240,7 +241,7 @@ class _Fit:
         numbers, draws = self.robots(posterior)
         found = misfits(self.evidence(trials), self.simulate, draws, key=self.seed)
         fitted = tuple(_fitted(parameter, posterior) for parameter in self.prior)
-        parts = Parts(
+        parts = Fit(
             fitted=fitted,
             numbers=numbers,
             draws=draws,
@@ -293,11 +294,11 @@ class _Fit:
         trial = TrialRecord((x, y, heading), 0.0, commands, np.zeros((n, s)), np.zeros(n, np.bool_), ())
         return evidence_of([trial], [plan.genome], self.arena.grid.n_cells)
 
-    def _as_it_is(self) -> Parts:
+    def _as_it_is(self) -> Fit:
         """Return the calibration without trials: the robot's own numbers."""
         plain = self.robot.centers()
         numbers = {e.number: plain[e.number] for parameter in self.prior for e in parameter.expand}
-        return Parts(
+        return Fit(
             fitted=(),
             numbers=numbers,
             draws={name: (value,) for name, value in numbers.items()},
@@ -310,7 +311,7 @@ def _fitted(parameter: Parameter, posterior: Posterior) -> Fitted:
     draws = posterior.values[parameter.name]
     low, middle, high = np.quantile(draws, [0.05, 0.5, 0.95])
     spread = float(parameter.scale(draws).std()) / parameter.width
-    identified = spread < IDENTIFIED / np.sqrt(12.0)
+    identified = is_identified(spread, 1.0 / np.sqrt(12.0))
     return Fitted(
         name=parameter.name,
         estimate=float(middle),
@@ -318,7 +319,7 @@ def _fitted(parameter: Parameter, posterior: Posterior) -> Fitted:
         high=float(high),
         prior_low=parameter.prior.lowest,
         prior_high=parameter.prior.highest,
-        identified=bool(identified),
+        identified=identified,
         unit=parameter.unit,
         advice="" if identified else f"To identify it, record {parameter.advice}.",
     )

@@ -16,10 +16,10 @@ from realitygap.calibration import (
     numbers_of,
     ranges_of,
     scribbler_prior,
-    standard_of,
     values_of,
 )
-from realitygap.calibration._abc import _predict
+from realitygap.calibration._all_from_simulation import _predict
+from realitygap.calibration._prior import standard_of
 from realitygap.world import Distribution, load_robot
 
 ROBOT = load_robot("scribbler-s2-fluke2")

@@ -1,4 +1,4 @@
-"""The error of predictions of the part of a recording that no fit used."""
+"""The result of a fit, and the error of its predictions of what it did not see."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from realitygap.world import Fitted
+
+from ._prior import Floats
 
 Choice = Literal["fitted", "nominal"]
 
@@ -53,28 +55,48 @@ class HeldOut:
 
 
 @dataclass(frozen=True)
-class HeldOutFit:
-    """A fit to a recording, with its errors on the part that it did not see.
+class Fit:
+    """The result of a fit: the fields that it adds to a calibration.
 
     Attributes:
         fitted: Parameters with 90 % intervals.
-        numbers: The estimate by the robot's dotted names.
-        draws: (d,) draws of each number, jointly.
-        held_out: Errors on the part that the fit did not see; None if it saw everything.
-        recommended: The numbers to use.
-        method: The method, with its source.
+        numbers: Estimated numbers of the robot, by dotted name.
+        draws: (d,) draws of each number from the joint posterior.
+        method: Method of the fit, with its source.
         notes: Further results in words.
-        evidence: Data for figures.
+        misspecified: True if the simulator cannot reproduce the observations.
+        misspecification_p: P value of that check.
+        evidence: Data of figures.
+        verdict: The numbers to use, fitted or nominal; empty if predictions were not compared.
+        reasons: Reasons of the verdict.
     """
 
     fitted: tuple[Fitted, ...]
-    numbers: dict[str, float]
-    draws: dict[str, tuple[float, ...]]
-    held_out: HeldOut | None
-    recommended: Choice
-    method: str = ""
+    numbers: Mapping[str, float]
+    draws: Mapping[str, Sequence[float] | Floats]
+    method: str
     notes: tuple[str, ...] = ()
+    misspecified: bool = False
+    misspecification_p: float = 1.0
     evidence: dict[str, Any] = field(default_factory=dict)
+    verdict: str = ""
+    reasons: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class HeldOutFit(Fit):
+    """A fit to a recording, with its errors on the part that it did not see.
+
+    Attributes:
+        held_out: Errors on the part that the fit did not see; None if it saw everything.
+    """
+
+    held_out: HeldOut | None = None
+
+    @property
+    def recommended(self) -> Choice:
+        """The numbers to use."""
+        return self.held_out.recommended if self.held_out else "fitted"
 
     @property
     def recommended_numbers(self) -> dict[str, float]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -115,12 +114,7 @@ def sim_scene(platform: SimSettings, arena: Arena, inputs: Sequence[str], noise:
                     "of noise. Leave one of them out."
                 )
         numbers |= {f"range.{k}.noise_uniform": noise for k in range(len(robot.range))}
-    shape = make_sim_shape(
-        **_body_and_drive(robot, numbers, platform.command_s),
-        **_sensors(robot),
-        **_surroundings(arena, numbers),
-        inputs=_inputs(inputs, robot, arena),
-    )
+    shape = _shape_of(robot, arena, numbers, _inputs(inputs, robot, arena), platform.command_s)
     rows = sim_rows(shape)
     return SimScene(
         platform,
@@ -172,7 +166,10 @@ _DRAWN_IN_STEPS = (
 )
 
 
-def _body_and_drive(robot: RobotModel, numbers: Numbers, step_s: float) -> dict[str, Any]:
+def _shape_of(
+    robot: RobotModel, arena: Arena, numbers: Numbers, inputs: list[tuple[str, int]], step_s: float
+) -> SimShape:
+    """Return the structure of robot and arena."""
     most = {name: largest(numbers[name]) for name in IN_PARTS}
     latest = float(_latest(most))
     if latest > MOST_DELAY_STEPS * step_s:
@@ -180,21 +177,51 @@ def _body_and_drive(robot: RobotModel, numbers: Numbers, step_s: float) -> dict[
             f"drive.delay and drive.delay_jitter come to {latest:g} s, expected at most {MOST_DELAY_STEPS} steps of "
             f"{step_s:g} s."
         )
-    drive = robot.drive
+    drive, walls = robot.drive, np.array(arena.walls, np.float64).reshape(-1, 4)
     substeps, late_substeps = parts_of_step(robot, most, step_s)
-    return {
-        "parts": [len(part.corner) for part in robot.body],
-        "contact": robot.contact.model,
-        "mixing": drive.mixing,
-        "ahead": drive.ahead,
-        "levels": drive.levels,
-        "lowest_level": drive.lowest_level,
-        "delay_steps": math.ceil(latest / step_s),
-        "late": latest > 0,
-        "noisy": any(highest(numbers[f"drive.{name}"]) > 0 for name in _DRAWN_IN_STEPS),
-        "substeps": int(substeps),
-        "late_substeps": int(late_substeps),
-    }
+    moving = any(
+        name.startswith("arena.wall.") and isinstance(numbers[name], Distribution) for name in numbers
+    )
+    x, y = arena.start.x, arena.start.y
+    image, grid = _floor_image(arena.floor.image)
+    half = arena.floor.tape_width
+    return make_sim_shape(
+        parts=[len(part.corner) for part in robot.body],
+        contact=robot.contact.model,
+        mixing=drive.mixing,
+        ahead=drive.ahead,
+        levels=drive.levels,
+        lowest_level=drive.lowest_level,
+        delay_steps=math.ceil(latest / step_s),
+        late=latest > 0,
+        noisy=any(highest(numbers[f"drive.{name}"]) > 0 for name in _DRAWN_IN_STEPS),
+        substeps=int(substeps),
+        late_substeps=int(late_substeps),
+        range_response=[sensor.response + "_edges" * sensor.keeps_edge for sensor in robot.range],
+        range_rays=[sensor.rays for sensor in robot.range],
+        range_table=[len(sensor.table) for sensor in robot.range],
+        range_pulses=[sensor.pulses for sensor in robot.range],
+        encoders=robot.encoder is not None,
+        sensors={kind: len(sensors) for kind, sensors in robot.sensors.items() if kind != "range"},
+        light_shadows=robot.shadows,
+        stall=robot.stall.kind,
+        line_levels=[sensor.level for sensor in robot.line],
+        n_walls=len(walls),
+        enclosed=not moving and encloses(walls, arena.start),
+        obstacles=[_n_corners(obstacle, k, numbers) for k, obstacle in enumerate(arena.obstacles)],
+        obstacle_round=[
+            len(obstacle.corners) == 1 or highest(numbers[f"arena.obstacle.{k}.radius"]) > 0
+            for k, obstacle in enumerate(arena.obstacles)
+        ],
+        n_lamps=len(arena.lights),
+        goal=arena.goal is not None,
+        columns=arena.grid.columns,
+        rows=arena.grid.rows,
+        floor=image,
+        floor_grid=(grid[0] - x, grid[1] - y, grid[2]),
+        tapes=[(x1 - x, y1 - y, x2 - x, y2 - y, half, 0.0) for x1, y1, x2, y2 in arena.floor.tape],
+        inputs=inputs,
+    )
 
 
 def parts_of_step(
@@ -256,46 +283,6 @@ def _farthest(most: Mapping[str, ArrayLike], step_s: float) -> NDArray[np.float6
 def largest(value: float | Distribution) -> float:
     """Return the largest magnitude that a number can have."""
     return max(abs(value.lowest), abs(value.highest)) if isinstance(value, Distribution) else abs(value)
-
-
-def _sensors(robot: RobotModel) -> dict[str, Any]:
-    return {
-        "range_response": [sensor.response + "_edges" * sensor.keeps_edge for sensor in robot.range],
-        "range_rays": [sensor.rays for sensor in robot.range],
-        "range_table": [len(sensor.table) for sensor in robot.range],
-        "range_pulses": [sensor.pulses for sensor in robot.range],
-        "encoders": robot.encoder is not None,
-        "sensors": {kind: len(sensors) for kind, sensors in robot.sensors.items() if kind != "range"},
-        "light_shadows": robot.shadows,
-        "stall": robot.stall.kind,
-        "line_levels": [sensor.level for sensor in robot.line],
-    }
-
-
-def _surroundings(arena: Arena, numbers: Numbers) -> dict[str, Any]:
-    walls = np.array(arena.walls, np.float64).reshape(-1, 4)
-    moving = any(
-        name.startswith("arena.wall.") and isinstance(numbers[name], Distribution) for name in numbers
-    )
-    x, y = arena.start.x, arena.start.y
-    image, grid = _floor_image(arena.floor.image)
-    half = arena.floor.tape_width
-    return {
-        "n_walls": len(walls),
-        "enclosed": not moving and encloses(walls, arena.start),
-        "obstacles": [_n_corners(obstacle, k, numbers) for k, obstacle in enumerate(arena.obstacles)],
-        "obstacle_round": [
-            len(obstacle.corners) == 1 or highest(numbers[f"arena.obstacle.{k}.radius"]) > 0
-            for k, obstacle in enumerate(arena.obstacles)
-        ],
-        "n_lamps": len(arena.lights),
-        "goal": arena.goal is not None,
-        "columns": arena.grid.columns,
-        "rows": arena.grid.rows,
-        "floor": image,
-        "floor_grid": (grid[0] - x, grid[1] - y, grid[2]),
-        "tapes": [(x1 - x, y1 - y, x2 - x, y2 - y, half, 0.0) for x1, y1, x2, y2 in arena.floor.tape],
-    }
 
 
 def _n_corners(obstacle: Obstacle, k: int, numbers: Numbers) -> int:

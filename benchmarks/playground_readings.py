@@ -2,7 +2,7 @@
 
     python benchmarks/playground_readings.py FILE --robot thymio-playground
 
-The file has the trials of a calibration with poses, such as `playground-31-track-20.jsonl` in the folder `calibrations`
+The file has the trials of a calibration with poses, such as `playground-31-track-20.sqlite` in `calibrations`, a folder
 of the results of `realitygap closing-the-gap --plan playground`.
 """
 
@@ -22,7 +22,7 @@ from realitygap.study import choose_condition
 def main() -> None:
     """Print a line for each number of rays."""
     parser = argparse.ArgumentParser(description="Readings less those of sim, by the rays that meet a wall.")
-    parser.add_argument("file", type=Path, help="trials with poses (.jsonl)")
+    parser.add_argument("file", type=Path, help="trials with poses")
     parser.add_argument("--robot", default="thymio", help="robot in sim")
     options = parser.parse_args()
     trials = read_observations(options.file).trials

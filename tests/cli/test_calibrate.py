@@ -50,7 +50,7 @@ def test_sensors_of_a_simulation_are_measured_unattended_and_kept(sensors):
     made = load_calibration(sensors / "fit.toml")
     assert (made.kind, made.label, made.trials, made.robot) == ("sensors", "SIM", 6, "scribbler-s2-fluke2")
     assert load_robot(sensors / "fit.toml").range[1].decay == pytest.approx(made.numbers["range.1.decay"])
-    kept = read_observations(sensors / "fit.trials.jsonl")
+    kept = read_observations(sensors / "fit.trials.sqlite")
     assert [trial.purpose for trial in kept.trials] == ["sensors"] * 6
     assert {len(trial.readings) for trial in kept.trials} == {50}
     assert made.n_draws == 500
@@ -58,20 +58,21 @@ def test_sensors_of_a_simulation_are_measured_unattended_and_kept(sensors):
 
 
 def test_the_same_command_takes_up_what_was_kept_and_a_larger_budget_adds_to_it(sensors):
-    before = (sensors / "fit.trials.jsonl").read_bytes()
+    before = read_observations(sensors / "fit.trials.sqlite").trials
     out = json.loads(
         run("sensors", "--robot", "sim", "--budget", 7, "-o", sensors / "fit.toml", "--seed", 3, "--json")
     )
-    after = (sensors / "fit.trials.jsonl").read_bytes()
-    assert after.startswith(before)
-    assert after.count(b"\n") == before.count(b"\n") + 1
+    after = read_observations(sensors / "fit.trials.sqlite").trials
+    assert [trial.number for trial in after[:-1]] == [trial.number for trial in before]
+    assert after[0].raw.tobytes() == before[0].raw.tobytes()
     assert out["trials"] == 7
     assert {each["name"] for each in out["fitted"]} >= {"range.0.amplitude", "range.2.burst"}
 
 
 def test_recorded_trials_alone_give_the_same_fit_and_figure(sensors, tmp_path):
     data = tmp_path / "data.jsonl"
-    data.write_bytes(b"".join((sensors / "fit.trials.jsonl").read_bytes().splitlines(keepends=True)[:7]))
+    kept = read_observations(sensors / "fit.trials.sqlite")
+    write_observations(data, kept.head, kept.trials[:6])
     out = run("sensors", "--from", data, "-o", tmp_path / "again.toml", "--figure", tmp_path / "fit.svg")
     assert "range.0.decay" in out
     assert "Not identified: battery_per_v: Record with a full" in out
@@ -88,7 +89,7 @@ def test_an_emulated_robot_is_measured_with_a_ruler_and_not_seen_otherwise(tmp_p
     out = run("path", "--robot", PORT, "-o", tmp_path / "path.toml", "--budget", 4)
     assert "(EMULATED)" in out
     assert "path.jyro_steps" in out
-    kept = read_observations(tmp_path / "path.trials.jsonl").trials
+    kept = read_observations(tmp_path / "path.trials.sqlite").trials
     assert all(len(trial.poses) == 0 and len(trial.wheels) == 0 for trial in kept)
     assert all(trial.end_pose is not None for trial in kept)
     made = load_calibration(tmp_path / "path.toml")
@@ -145,7 +146,7 @@ def test_a_person_is_led_through_can_stop_and_go_on_and_take_a_trial_back(person
     assert "Run the same command to resume" in out
     assert not (tmp_path / "path.toml").exists()
     assert not first.answers
-    kept = read_observations(tmp_path / "path.trials.jsonl").trials
+    kept = read_observations(tmp_path / "path.trials.sqlite").trials
     assert len(kept) == 2
     ahead, left, heading = kept[0].end_pose
     assert ahead - kept[0].start[0] == pytest.approx(13.75 * 0.0254)
@@ -168,14 +169,14 @@ def test_a_trial_that_was_taken_back_does_not_count_whatever_follows(person, tmp
     command = ("path", "--robot", PORT, "-o", tmp_path / "path.toml", "--budget", 4)
     person(*STRAIGHT, *TURN, "r", "q")
     run(*command)
-    kept = read_observations(tmp_path / "path.trials.jsonl").trials
-    assert [trial.end for trial in kept] == ["step limit", "step limit", "aborted"]
+    kept = read_observations(tmp_path / "path.trials.sqlite").trials
+    assert [trial.end for trial in kept] == ["step limit", "aborted"]
     person("", "285", "", "14", "0", "0", "", "286")
     assert "Trial 1 of 3" in run(*command)
     made = load_calibration(tmp_path / "path.toml")
     turned = [math.radians(285), math.radians(286)]
     assert made.evidence["path"]["turned_rad"] == pytest.approx(turned, rel=1e-6)
-    run("path", "--from", tmp_path / "path.trials.jsonl", "-o", tmp_path / "again.toml")
+    run("path", "--from", tmp_path / "path.trials.sqlite", "-o", tmp_path / "again.toml")
     assert load_calibration(tmp_path / "again.toml").evidence["path"]["turned_rad"] == pytest.approx(turned)
 
 
@@ -215,7 +216,7 @@ def test_a_person_is_told_how_far_from_the_wall_the_robot_has_to_stand(person, t
     assert "Trial 1 of 18: put it square to a wall, its sensors 3 in from it" in out
     assert "Trial 2 of 18: put it square to a wall, its sensors 6 in from it" in out
     assert "50 readings, on average" in out
-    assert len(read_observations(tmp_path / "fit.trials.jsonl").trials) == 2
+    assert len(read_observations(tmp_path / "fit.trials.sqlite").trials) == 2
 
 
 def test_without_a_terminal_nobody_is_led(monkeypatch, tmp_path):
@@ -317,7 +318,7 @@ def test_a_flag_of_misspecification_passes_to_later_calibrations(sensors, tmp_pa
         update={"misspecified": True, "misspecification_p": 0.01, "notes": ("What was said.",)}
     )
     save_calibration(file, flagged)
-    data = sensors / "fit.trials.jsonl"
+    data = sensors / "fit.trials.sqlite"
     run("sensors", "--from", data, "--base", file, "-o", tmp_path / "both.toml")
     made = load_calibration(tmp_path / "both.toml")
     assert (made.misspecified, made.misspecification_p) == (True, 0.01)
@@ -401,7 +402,7 @@ def test_recorded_trials_of_another_robot_or_without_an_arena_are_one_message(tm
 
 
 def test_data_without_what_is_to_be_fitted_is_refused(sensors, tmp_path):
-    data = sensors / "fit.trials.jsonl"
+    data = sensors / "fit.trials.sqlite"
     assert "There is no straight path" in refused("path", "--from", data, "-o", tmp_path / "x.toml")
     other = refused("sensors", "--from", data, "--base", "e-puck", "-o", tmp_path / "x.toml")
     assert "have 3 range sensors and robot 'e-puck' 8" in other
@@ -439,7 +440,7 @@ def test_motion_contact_and_all_are_dispatched_with_what_was_observed(tmp_path, 
 
 def test_less_can_be_used_than_was_recorded_and_not_more(tmp_path):
     run("path", "--robot", "sim", "--observe", "track", "--budget", 4, "-o", tmp_path / "path.toml")
-    data = tmp_path / "path.trials.jsonl"
+    data = tmp_path / "path.trials.sqlite"
     run("path", "--from", data, "--observe", "cells", "-o", tmp_path / "ruled.toml")
     made = [load_calibration(tmp_path / name) for name in ("path.toml", "ruled.toml")]
     ways = [each.evidence["path"]["straight_m"] for each in made]
@@ -447,7 +448,7 @@ def test_less_can_be_used_than_was_recorded_and_not_more(tmp_path):
     assert ways[0] == pytest.approx(ways[1], abs=0.0254 / 16 + 1e-3)
     seen = tmp_path / "cells.toml"
     run("path", "--robot", "sim", "--budget", 4, "-o", seen)
-    said = refused("path", "--from", tmp_path / "cells.trials.jsonl", "--observe", "track", "-o", seen)
+    said = refused("path", "--from", tmp_path / "cells.trials.sqlite", "--observe", "track", "-o", seen)
     assert "has no more than 'cells'" in said
 
 

@@ -8,6 +8,7 @@ import shutil
 import sqlite3
 import threading
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -21,12 +22,23 @@ from realitygap.errors import LedgerError, RealityGapError
 from realitygap.lab import _studies
 from realitygap.lab._counts import Counts
 from realitygap.lab._studies import Studies
-from realitygap.records import LEDGER_NAME, Ledger, ResultsFolder, Score, _ledger_file, ledger_tables
+from realitygap.records import (
+    LEDGER_NAME,
+    Ledger,
+    ResultsFolder,
+    Score,
+    _ledger_file,
+    ledger_tables,
+    open_saved_trials,
+    read_observations,
+)
 from realitygap.report import summarize
 from realitygap.report._driven import describe_driven, driven_paths, read_driven
 from realitygap.study import run_study
-from realitygap.study._trial_export import _driven, _trial
+from realitygap.study._trial_export import _driven_trials
 from tests.commands import run_command
+from tests.records.test_observations_file import HEAD
+from tests.records.test_observations_file import trial as saved_trial
 from tests.study.physical import drive, small_study
 
 TRIALS = get_command(make_app([command for command in COMMANDS if command.name == "trials"]))
@@ -55,7 +67,11 @@ def study(tmp_path_factory) -> Path:
 
 @pytest.fixture(scope="module")
 def rows(study) -> Rows:
-    with contextlib.closing(sqlite3.connect(study / LEDGER_NAME)) as connection:
+    return rows_of(study / LEDGER_NAME)
+
+
+def rows_of(path: Path) -> Rows:
+    with contextlib.closing(sqlite3.connect(path)) as connection:
         connection.row_factory = sqlite3.Row
         return {
             table: [dict(row) for row in connection.execute(f"SELECT * FROM {table}")]
@@ -103,7 +119,7 @@ def write_ledger(path: Path, rows: Rows) -> None:
 def mutants(rows: Rows) -> Iterator[tuple[str, Rows]]:
     """Yield the ledger with one value changed, one row missing, or one row twice."""
     for table, these in rows.items():
-        for place in sorted({0, len(these) - 1}):
+        for place in sorted({0, len(these) - 1}) if these else ():
             yield f"{table}[{place}] missing", rows | {table: these[:place] + these[place + 1 :]}
             for column, before in these[place].items():
                 for value in VALUES:
@@ -130,7 +146,7 @@ def read_everywhere(study: Path) -> None:
         read_report,
         lambda: driven_paths(folder, "robot", 0),
         lambda: summarize(folder),
-        lambda: [_trial(study, number) for number in _driven(study)],
+        lambda: _driven_trials(study, ()),
         lambda: [counts.card(trial.number, "carla", "second") for trial in counts.look()],
     ):
         with contextlib.suppress(RealityGapError):
@@ -165,6 +181,34 @@ def test_changed_ledgers_end_in_one_message_or_are_read(study, rows):
     chosen = random.Random(1).sample(list(mutants(rows)), 40)
     n_refused, n_read = read_mutants(study, chosen)
     assert n_refused > 15
+    assert n_read > 2
+
+
+def test_changed_trials_of_a_command_end_in_one_message_or_are_read(tmp_path):
+    path = tmp_path / "saved.sqlite"
+    with open_saved_trials(path, HEAD) as ledger:
+        for number, end in enumerate(("step limit", "lost", "driven", "running")):
+            ledger.append(replace(saved_trial(number), purpose="controller", genome="{}", end=end))
+        ledger.note("a new pen", "anna", 1)
+    n_refused = n_read = 0
+    for name, these in random.Random(1).sample(list(mutants(rows_of(path))), 60):
+        try:
+            write_ledger(path, these)
+        except sqlite3.Error:
+            continue
+        try:
+            observations = read_observations(path)
+            _driven_trials(path, ())
+            n_read += bool(observations.trials)
+        except RealityGapError:
+            n_refused += 1
+        except Exception as error:
+            raise AssertionError(f"{name}: {type(error).__name__}: {error}") from error
+        for words in (("list",), ("list", "--json"), ("show", "1"), ("agreement",)):
+            done = CliRunner().invoke(TRIALS, ["trials", words[0], str(path), *words[1:]])
+            if done.exception is not None and not isinstance(done.exception, RealityGapError):
+                raise AssertionError(f"{name}: {words}") from done.exception
+    assert n_refused > 10
     assert n_read > 2
 
 

@@ -11,6 +11,7 @@ import pytest
 from realitygap.cli import main
 from realitygap.gap import SHOWN
 from realitygap.gap._result import MEASURES
+from realitygap.records import read_observations
 from tests.cli.test_commands import realitygap
 
 pytestmark = pytest.mark.slow
@@ -37,7 +38,7 @@ def command(monkeypatch, capsys, tmp_path):
 @pytest.fixture(scope="module")
 def printed(tmp_path_factory):
     folder = tmp_path_factory.mktemp("gap")
-    more = ("--margin", "0.05", "--observe", "track", "--report", "gap.html", "-o", "trials.jsonl", "--json")
+    more = ("--margin", "0.05", "--observe", "track", "--report", "gap.html", "-o", "trials.sqlite", "--json")
     done = realitygap(*SMALL, *more, cwd=folder)
     assert done.returncode == 0, done.stderr
     return folder, json.loads(done.stdout)
@@ -56,19 +57,19 @@ def test_json_has_every_measure_with_estimate_low_high_and_n(printed):
 def test_the_page_and_the_trials_are_kept(printed):
     folder, _ = printed
     assert (folder / "gap.html").read_text("utf-8").startswith("<!DOCTYPE html>")
-    assert len((folder / "trials.jsonl").read_text("utf-8").splitlines()) == 1 + 6 * 3
+    assert len(read_observations(folder / "trials.sqlite").trials) == 6 * 3
 
 
 def test_the_same_command_again_takes_the_kept_trials(printed, command):
     folder, found = printed
-    more = ("--margin", "0.05", "--observe", "track", "-o", "trials.jsonl", "--json")
+    more = ("--margin", "0.05", "--observe", "track", "-o", "trials.sqlite", "--json")
     again = json.loads(command(*SMALL, *more, cwd=folder)[1])
     assert {**again, "report": found["report"]} == found
 
 
 def test_kept_trials_say_how_many_the_next_question_takes(printed, command):
     folder, _ = printed
-    code, out, _ = command("plan", "--effect", "0.05", "--from", "trials.jsonl", cwd=folder)
+    code, out, _ = command("plan", "--effect", "0.05", "--from", "trials.sqlite", cwd=folder)
     assert code == 0
     assert "6 controllers, 3 trials each" in out
     assert "Minimum number of trials on the target" in out
@@ -86,7 +87,7 @@ NUMBER = re.compile(r"[-−]?\d\.\d{3}")
 def test_terminal_and_report_state_the_same_estimates_intervals_and_p(printed, command):
     """Each measure has one estimate, one interval, and one p, wherever it is shown."""
     folder, _ = printed
-    out = command(*SMALL, "--margin", "0.05", "--observe", "track", "-o", "trials.jsonl", cwd=folder)[1]
+    out = command(*SMALL, "--margin", "0.05", "--observe", "track", "-o", "trials.sqlite", cwd=folder)[1]
     page = (folder / "gap.html").read_text("utf-8")
     words = html.unescape(re.sub("<[^>]+>", " ", page))
     rows = {line[2:34].strip(): line[34:] for line in out.splitlines() if line.startswith("  ")}

@@ -16,7 +16,7 @@ from realitygap.records import (
     LEDGER_NAME,
     PATH_PARTS,
     Ledger,
-    ObservationsFile,
+    open_saved_trials,
     read_observations,
     write_observations,
 )
@@ -28,7 +28,7 @@ from realitygap.study import (
     parse_study,
     place_trial,
     sample_controllers,
-    trial_of_file,
+    trial_of_ledger,
 )
 from realitygap.study._calibrate.one import calibrate_from
 from realitygap.testing import Film, FilmedCamera, path_through, save_film
@@ -141,7 +141,7 @@ def test_a_video_gives_a_table_an_overlay_and_the_lens(driven, command):
 
 def test_a_trial_of_a_ledger_is_found_scored_and_kept_for_calibrations(driven, command):
     folder, number, path, cells = driven
-    words = ("track", "--camera", "film.mp4", "--study", "out", "--trial", number, "--into", "tracked.jsonl")
+    words = ("track", "--camera", "film.mp4", "--study", "out", "--trial", number, "--into", "tracked.sqlite")
     status, out, err = command(*words, cwd=folder)
     assert (status, err) == (0, "")
     assert "Entered into the ledger of out." in out
@@ -155,14 +155,14 @@ def test_a_trial_of_a_ledger_is_found_scored_and_kept_for_calibrations(driven, c
     assert 1 <= score["n_ends"] <= len(score["cells"])
     off = np.array(score["path"]) - path
     assert np.sqrt((off[:, :2] ** 2).sum(axis=1).mean()) < 0.01
-    (trial,) = read_observations(folder / "tracked.jsonl").trials
+    (trial,) = read_observations(folder / "tracked.sqlite").trials
     assert trial.observe == "track"
     assert trial.poses.shape == (9, 3)
     assert trial.genome
     status, _, err = command(*words, cwd=folder)
     assert status == 1
     assert "is scored; that can be done only while it is driven" in err
-    assert len(read_observations(folder / "tracked.jsonl").trials) == 1
+    assert len(read_observations(folder / "tracked.sqlite").trials) == 1
 
 
 @pytest.mark.skipif(bool(why_not()), reason=why_not() or "-")
@@ -223,16 +223,16 @@ def recorded(tmp_path_factory):
         write_observations(folder / "bare.jsonl", observations_head(target, "cells"), bare)
     rng = np.random.default_rng(5)
     for trial in trials:
-        wanted = trial_of_file(folder / "bare.jsonl", trial.number)
+        wanted = trial_of_ledger(folder / "bare.jsonl", trial.number)
         found = place_trial(wanted, _seen_by_camera(trial, rng), LEAD_S)
-        with ObservationsFile(folder / "tracked.jsonl", wanted.head) as file:
+        with open_saved_trials(folder / "tracked.sqlite", wanted.head) as file:
             file.append(found.trial)
     return folder, trials
 
 
 def test_tracked_trials_have_the_poses_and_cells_of_the_true_ones(recorded):
     folder, trials = recorded
-    for found, trial in zip(read_observations(folder / "tracked.jsonl").trials, trials, strict=True):
+    for found, trial in zip(read_observations(folder / "tracked.sqlite").trials, trials, strict=True):
         assert found.poses[:, :2] == pytest.approx(trial.poses[:, :2], abs=3e-3)
         assert len(set(found.cells) ^ set(trial.cells)) <= 2
         assert (found.genome, found.number) == (trial.genome, trial.number)
@@ -240,14 +240,14 @@ def test_tracked_trials_have_the_poses_and_cells_of_the_true_ones(recorded):
 
 def test_a_calibration_takes_tracked_trials(recorded):
     folder, _ = recorded
-    made = calibrate_from("motion", folder / "tracked.jsonl")
+    made = calibrate_from("motion", folder / "tracked.sqlite")
     assert made.observe == "track"
     assert any(note.startswith("camera: about ") for note in made.notes)
 
 
 def test_a_gap_is_measured_to_tracked_trials_and_their_commands_are_replayed(recorded):
     folder, _ = recorded
-    found = gap_between("sim", f"recorded:{folder / 'tracked.jsonl'}", observe="track").study
+    found = gap_between("sim", f"recorded:{folder / 'tracked.sqlite'}", observe="track").study
     assert found.result.trials == (2, 2)
     assert len(found.controllers) == 5
     assert found.replay is not None
@@ -255,7 +255,7 @@ def test_a_gap_is_measured_to_tracked_trials_and_their_commands_are_replayed(rec
     assert found.replay.distance[:, 0].max() < 1e-6
     with pytest.raises(Exception, match="one more was requested"):
         gap_between(
-            "sim", f"recorded:{folder / 'tracked.jsonl'}", controllers="paper", n_controllers=2, trials=2
+            "sim", f"recorded:{folder / 'tracked.sqlite'}", controllers="paper", n_controllers=2, trials=2
         )
 
 
@@ -281,7 +281,7 @@ def test_tags_are_printed_at_true_scale(command, tmp_path):
         (("--camera", "0", "--overlay", "o.mp4"), "Film first"),
         (("--camera", "x", "--trial", "3"), "--study DIR --trial NUMBER"),
         (("--camera", "x", "--study", "d", "--trials", "f", "--trial", "3"), "exclude each other"),
-        (("--camera", "x", "--into", "f.jsonl"), "Name the trial: --study"),
+        (("--camera", "x", "--into", "f.sqlite"), "Name the trial: --study"),
         (("--camera", "x", "--lens", "no.toml"), "cannot be read as the file of a lens"),
         (("--camera", "x", "--sheet", "--corner-size", "0.1"), "--sheet defines the positions"),
         (("--camera", "x", "--arena", "no"), "no"),

@@ -55,7 +55,7 @@ def test_json_is_the_result_in_the_folder(folder):
 
 def test_a_champion_travels_over_the_wire_and_back(folder, tmp_path):
     champion = folder / "champions" / "select-3-0.json"
-    kept = tmp_path / "wire.jsonl"
+    kept = tmp_path / "wire.sqlite"
     wire = ["try", champion, "--on", "scribbler:emulator://s2?fluke=2&speed=off", "--steps", "20"]
     first = json.loads(run(*wire, "--json", "-o", kept).stdout)
     assert first["label"] == "EMULATED"
@@ -82,8 +82,8 @@ def test_mistakes_are_said_in_words(folder, tmp_path):
 
 def test_wrong_options_are_refused_before_a_trial_is_spent(folder, tmp_path):
     champion, out = folder / "champions" / "select-3-0.json", tmp_path / "travels"
-    run("gap", "sim", "sim", "--n-controllers", "2", "--trials", "2", "-o", tmp_path / "gap.jsonl")
-    recorded = f"recorded:{tmp_path / 'gap.jsonl'}"
+    run("gap", "sim", "sim", "--n-controllers", "2", "--trials", "2", "-o", tmp_path / "gap.sqlite")
+    recorded = f"recorded:{tmp_path / 'gap.sqlite'}"
     calibrated = ("transfer", "sim-paper", "--strategy", "calibrated", *SMALL, "-o", out)
     with pytest.raises(StudyError, match="supports at most 'cells'"):
         run("try", champion, "--on", recorded, "--observe", "track")
@@ -101,7 +101,7 @@ def test_wrong_options_are_refused_before_a_trial_is_spent(folder, tmp_path):
     assert not out.exists()
     with pytest.raises(StudyError, match="sim:e-puck has 8 range sensors and robot"):
         run(*calibrated, "--to", "sim:e-puck")
-    assert not list((out / "calibrations").glob("*.jsonl"))
+    assert not list((out / "calibrations").glob("*.sqlite"))
     for wrong in (("--budget", "5000"), ("--fresh-trials", "5001")):
         others = list(calibrated)
         if wrong[0] in others:

@@ -124,7 +124,7 @@ def test_gap_and_calibrate_drive_the_robot(tmp_path: Path) -> None:
     gap = gap_between("sim:rover", QUICK, n_controllers=3, trials=2, observe="track")
     assert gap.study.result.target == QUICK
     with open_target(QUICK, paper_arena()) as target:
-        fitted = calibrate("path", target, robot="rover", observe="track", trials_file=tmp_path / "a.jsonl")
+        fitted = calibrate("path", target, robot="rover", observe="track", trials_file=tmp_path / "a.sqlite")
     assert fitted.trials > 0
 
 

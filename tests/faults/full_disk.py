@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from realitygap.cli import main
-from realitygap.records import LEDGER_NAME, Ledger, ResultsFolder
+from realitygap.records import LEDGER_NAME, Ledger, ResultsFolder, read_observations, trial_to_dict
 from realitygap.runs import prepare_kernels
 from realitygap.study import load_study
 from tests.study.physical import SMALL, scored
@@ -71,16 +71,12 @@ def _scored(path: Path) -> dict[str, str]:
         return {str(trial.trial): str(trial.cells) for trial in ledger.trials(states=["scored"])}
 
 
-def _whole(name: str) -> Callable[[Path], dict[str, str]]:
-    """Return a function that gives the lines of a file, which may grow and may not change."""
-    return lambda path: (
-        {
-            str(number): line
-            for number, line in enumerate((path / name).read_text("utf-8").splitlines(True)[:-1])
-        }
-        if (path / name).exists()
-        else {}
-    )
+def _trials(path: Path) -> dict[str, str]:
+    """Return the trials of a gap that count."""
+    if not (path / "gap.sqlite").exists():
+        return {}
+    trials = read_observations(path / "gap.sqlite").trials
+    return {f"{trial.number} {trial.genome}": str(trial_to_dict(trial)) for trial in trials}
 
 
 def _without_date(text: str) -> str:
@@ -102,10 +98,12 @@ WRITES = {
         _nothing,
     ),
     "gap": Write(
-        "gap sim jyro --n-controllers 3 --trials 2 -o {}/gap.jsonl", _file("gap.jsonl"), _whole("gap.jsonl")
+        "gap sim jyro --n-controllers 3 --trials 2 -o {}/gap.sqlite",
+        lambda path: str(sorted(_trials(path).items())),
+        _trials,
     ),
     "calibrate": Write(
-        "calibrate path --from measured.trials.jsonl -o {}/path.toml",
+        "calibrate path --from measured.trials.sqlite -o {}/path.toml",
         lambda path: _without_date((path / "path.toml").read_text("utf-8")),
         _nothing,
     ),

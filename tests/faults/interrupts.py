@@ -25,7 +25,7 @@ COMMANDS = {
     "run": "run paper --replicates 300 --out run",
     "run in full": "run paper --replicates 200000 --out full",
     "report": "report whole",
-    "gap": "gap sim jyro --n-controllers 20 --trials 5 -o gap.jsonl",
+    "gap": "gap sim jyro --n-controllers 20 --trials 5 -o gap.sqlite",
     "calibrate": "calibrate path --robot sim -o path.toml",
     "transfer": "transfer sim-paper --to sim:scribbler-s1 --budget 8 --strategy plain --runs 20 -o transfer",
     "closing": "closing-the-gap --small --out closing",

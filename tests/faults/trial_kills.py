@@ -21,7 +21,7 @@ from typing import Any
 from realitygap.emulator import Server, serve_pty
 from realitygap.errors import StudyError
 from realitygap.families.scribbler.emulator import Emulator
-from realitygap.records import NO_LINE, ObservationsFile, TrialRecord, read_observations, those_that_count
+from realitygap.records import NO_LINE, Ledger, TrialRecord, read_observations, those_that_count
 from realitygap.study import (
     calibrate,
     open_target,
@@ -121,14 +121,14 @@ class Ruler(Operator):
 def run_gap(target: Target, person: Person, folder: Path) -> None:
     controllers = sample_controllers("random", 2)
     with open_target("sim", paper_arena()) as source:
-        study_gap(source, target, controllers, trials=2, steps=STEPS, results=folder / "gap.jsonl")
+        study_gap(source, target, controllers, trials=2, steps=STEPS, results=folder / "gap.sqlite")
 
 
 def run_calibrate(target: Target, person: Person, folder: Path) -> None:
     with contextlib.suppress(
         StudyError
     ):  # on a busy machine, commands of trials may last too differently for a fit
-        calibrate("path", target, budget=3, trials_file=folder / "path.jsonl", operator=Ruler(person))
+        calibrate("path", target, budget=3, trials_file=folder / "path.sqlite", operator=Ruler(person))
 
 
 def run_transfer(target: Target, person: Person, folder: Path) -> None:
@@ -138,7 +138,7 @@ def run_transfer(target: Target, person: Person, folder: Path) -> None:
 
 def run_try(target: Target, person: Person, folder: Path) -> None:
     genome = sample_controllers("random", 1)[0].genome
-    try_on(target, genome, trials=4, steps=STEPS, out=folder / "tried.jsonl")
+    try_on(target, genome, trials=4, steps=STEPS, out=folder / "tried.sqlite")
 
 
 WORKS: Mapping[str, Callable[[Target, Person, Path], None]] = {
@@ -152,12 +152,11 @@ WORKS: Mapping[str, Callable[[Target, Person, Path], None]] = {
 def saved(folder: Path) -> tuple[dict[Key, TrialRecord], dict[Key, TrialRecord]]:
     """Return the trials on the disk that count, and those that were driven and wait for a person."""
     count, driven = {}, {}
-    for file in sorted(folder.rglob("*.jsonl")):
-        if file.stat().st_size:
-            observations = read_observations(file)
-            name = str(file.relative_to(folder))
-            count |= {_key(name, trial): trial for trial in those_that_count(observations.trials)}
-            driven |= {_key(name, each): each for each in observations.under_way if each.end == "driven"}
+    for file in sorted(folder.rglob("*.sqlite")):
+        observations = read_observations(file)
+        name = str(file.relative_to(folder))
+        count |= {_key(name, trial): trial for trial in those_that_count(observations.trials)}
+        driven |= {_key(name, each): each for each in observations.under_way if each.end == "driven"}
     return count, driven
 
 
@@ -200,14 +199,14 @@ class _Whole:
 def _work(name: str, port: str, folder: Path, kill_at: int) -> str:
     """Do a work until it ends or is killed. Return the number of its points."""
     point = Countdown(kill_at)
-    append = ObservationsFile.append
+    append = Ledger.append
 
-    def append_between_points(self: ObservationsFile, trial: TrialRecord) -> None:
+    def append_between_points(self: Ledger, trial: TrialRecord) -> None:
         point()
         append(self, trial)
         point()
 
-    ObservationsFile.append = append_between_points  # type: ignore[method-assign]  # in a process of its own
+    Ledger.append = append_between_points  # type: ignore[method-assign]  # in a process of its own
     person = Person(point, folder.with_suffix(".diary"))
     with open_target(
         f"scribbler:{port}",

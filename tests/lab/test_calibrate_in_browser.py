@@ -100,7 +100,7 @@ def test_sensors_of_an_emulated_robot_are_calibrated_with_a_plot(lab, visit):
     assert page.locator(".lab-fitted tr").count() > 0
     made = read_calibration(lab.root / "mine.toml")
     assert made.kind == "sensors"
-    assert n_plotted(page) == len(read_observations(lab.root / "mine.trials.jsonl").trials)
+    assert n_plotted(page) == len(read_observations(lab.root / "mine.trials.sqlite").trials)
 
 
 def test_a_simulation_is_calibrated_too_and_others_see_it(lab, visit):
@@ -140,7 +140,7 @@ def test_somebody_is_led_through_while_the_plot_grows_and_others_watch(lab, visi
         page.get_by_label("Turn to the left").wait_for()
         page.get_by_role("button", name="Stop calibration").click()
         page.get_by_text("Recorded trials are saved").wait_for()
-        assert len(read_observations(lab.root / "led.trials.jsonl").trials) == 2
+        assert len(read_observations(lab.root / "led.trials.sqlite").trials) == 2
         begin(page, "path", Robot=f"scribbler:{server.name}", Name="led")
         page.get_by_text("before you said what you saw").wait_for()
         page.get_by_role("button", name="Use this trial").click()
@@ -149,7 +149,7 @@ def test_somebody_is_led_through_while_the_plot_grows_and_others_watch(lab, visi
         page.locator(".lab-question").get_by_text("Trial 1 of").wait_for()
         page.get_by_role("button", name="Stop calibration").click()
         page.get_by_text("Recorded trials are saved").wait_for()
-    assert len(read_observations(lab.root / "led.trials.jsonl").trials) == 3
+    assert len(read_observations(lab.root / "led.trials.sqlite").trials) == 3
 
 
 def test_no_calibration_is_written_or_read_outside_the_folder(lab, visit):

@@ -51,6 +51,6 @@ def test_somebody_is_led_through_measures_and_stops_for_now(tmp_path: Path, fork
         answer(job, choice="stop")
         wait_for(lambda: job.is_over)
         assert not job.is_failed
-        (kept,) = read_observations(tmp_path / "mine.trials.jsonl").trials
+        (kept,) = read_observations(tmp_path / "mine.trials.sqlite").trials
         assert kept.end_pose is not None
         assert kept.end_pose[0] - kept.start[0] == pytest.approx(13.75 * 0.0254)

@@ -184,7 +184,7 @@ def test_whatever_the_fields_of_a_page_say_it_goes_on(lab, tmp_path, path):
         "by-robot",
         "gaps",
         "my-study",
-        "my-robot.trials.jsonl",
+        "my-robot.trials.sqlite",
     }
 
 

@@ -66,7 +66,7 @@ def test_gap_is_measured_with_its_progress_and_mistakes_are_shown_at_their_field
         read.add(words.inner_text().partition(":")[0])
     assert len(read) >= 6  # from the one at which the pointer was
     page.frame_locator("iframe").get_by_text("jyro").first.wait_for()
-    assert len(read_observations(lab.root / "gaps" / "first.jsonl").trials) == 30
+    assert len(read_observations(lab.root / "gaps" / "first.sqlite").trials) == 30
     assert (lab.root / "gaps" / "first.html").is_file()
 
 

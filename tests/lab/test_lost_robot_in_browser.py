@@ -135,7 +135,7 @@ def test_robot_lost_in_a_gap_keeps_its_trials_and_the_gap_resumes(lab, visit, ro
     is_lost(page, robot)
     resume = page.get_by_role("button", name="Resume")
     assert resume.bounding_box()["y"] < page.get_by_label("Simulator").bounding_box()["y"]
-    kept = lab.root / "gaps" / "gap.jsonl"
+    kept = lab.root / "gaps" / "gap.sqlite"
     before = those_that_count(read_observations(kept).trials)
     assert len(before) == n_done
     resume.click()
@@ -169,7 +169,7 @@ def test_robot_lost_in_a_calibration_keeps_its_trials_and_the_calibration_resume
     page.reload()
     resume = page.get_by_role("button", name="Resume")
     resume.wait_for()
-    kept = lab.root / "my-robot.trials.jsonl"
+    kept = lab.root / "my-robot.trials.sqlite"
     before = those_that_count(read_observations(kept).trials)
     assert len(before) == n_done
     robot.start(speed=100)

@@ -7,7 +7,14 @@ from dataclasses import replace
 import pytest
 
 from realitygap.lab._saved import saved_files
-from realitygap.records import TrialLog, read_observations, write_observations
+from realitygap.records import (
+    LEDGER_NAME,
+    Ledger,
+    open_ledger,
+    open_saved_trials,
+    read_observations,
+    write_observations,
+)
 from tests.records.test_observations_file import HEAD, trial
 
 from .conftest import expect
@@ -16,13 +23,14 @@ pytestmark = pytest.mark.slow
 
 
 def test_saved_trials_are_listed_corrected_voided_and_annotated(lab, visit):
-    file = lab.root / "gaps" / "first one.jsonl"
+    file = lab.root / "gaps" / "first one.sqlite"
     file.parent.mkdir(parents=True)
-    trials = [replace(trial(number), purpose="controller", cells=(13, 14)) for number in range(3)]
-    write_observations(file, HEAD, trials)
+    with open_saved_trials(file, HEAD) as ledger:
+        for number in range(3):
+            ledger.append(replace(trial(number), purpose="controller", cells=(13, 14)))
     page = visit("gap")
     page.get_by_role("link", name="Saved trials").click()
-    page.get_by_role("link", name="gaps/first one.jsonl").click()
+    page.get_by_role("link", name="gaps/first one.sqlite").click()
     page.get_by_text("3 trials", exact=True).wait_for()
     row = page.get_by_role("row").nth(2)
     row.get_by_role("checkbox").click()
@@ -31,7 +39,7 @@ def test_saved_trials_are_listed_corrected_voided_and_annotated(lab, visit):
     page.get_by_label("Your name").fill("anna")
     page.wait_for_function("() => document.cookie.includes('anna')")
     page.get_by_role("button", name="Save cells").click()
-    page.get_by_text("Trial 1: 2 cells saved.").wait_for()
+    page.get_by_text("Trial 2: 2 cells saved.").wait_for()
     page.get_by_label("Note or reason").fill("it was pushed")
     page.get_by_role("button", name="Save note").click()
     page.get_by_text("anna: it was pushed").first.wait_for()
@@ -39,7 +47,7 @@ def test_saved_trials_are_listed_corrected_voided_and_annotated(lab, visit):
     page.get_by_role("button", name="Void trial").click()
     page.get_by_text("void: it was pushed").wait_for()
     expect(page.get_by_role("button", name="Void trial")).to_be_disabled()
-    with TrialLog.open(file, writable=False) as log:
+    with open_ledger(file, writable=False) as log:
         assert [each.state for each in log.trials()] == ["scored", "void", "scored"]
     assert {note["who"] for note in read_observations(file).notes} == {"anna"}
 
@@ -50,7 +58,9 @@ def test_only_plain_files_of_trials_in_the_folder_have_a_page(tmp_path):
     (root / "moved" / "sim").mkdir(parents=True)
     write_observations(elsewhere, HEAD, [])
     write_observations(root / "moved" / "sim" / "select.jsonl", HEAD, [])
-    write_observations(root / "gaps" / "own.jsonl", HEAD, [])
+    for name in ("own.jsonl", "converted.jsonl", "converted.sqlite"):
+        write_observations(root / "gaps" / name, HEAD, [])
+    Ledger.create(root / "moved" / LEDGER_NAME).close()
     (root / "gaps" / "link.jsonl").symlink_to(elsewhere)
     (root / "log.jsonl").write_text("{}\n")
-    assert list(saved_files(root)) == ["gaps/own.jsonl", "moved/sim/select.jsonl"]
+    assert sorted(saved_files(root)) == ["gaps/converted.sqlite", "gaps/own.jsonl", "moved/sim/select.jsonl"]

@@ -94,7 +94,7 @@ def test_package_adds_a_target_for_gap_calibrate_transfer_and_try(tmp_path: Path
     with open_target("toy", paper_arena()) as target:
         (trial,) = try_on(target, one_genome(), steps=10)
         assert len(trial.commands) == 10
-        fitted = calibrate("path", target, observe="track", trials_file=tmp_path / "path.jsonl")
+        fitted = calibrate("path", target, observe="track", trials_file=tmp_path / "path.sqlite")
         assert fitted.trials > 0
         made = transfer(
             "sim-paper", target, "plain", 2, out=tmp_path / "transfer", runs=2, repeats=1, fresh_trials=2

@@ -15,15 +15,16 @@ from realitygap.lab._photos import Photos
 from realitygap.lab._scoring_files import keep_drawn
 from realitygap.records import (
     Ledger,
-    ObservationsFile,
     ObservationsHead,
     ResultsFolder,
+    open_saved_trials,
     refuse_links,
     refuse_links_in,
     write_whole,
 )
 from realitygap.study._closing.plan import SMALL, adopt_plan
 from realitygap.study._transfer.strategies import _adopt
+from realitygap.world import paper_arena
 from tests.formats import FORMATS, transfer_plan
 from tests.records.rows import DESCRIPTION, HASH, make_rows
 from tests.records.test_ledger import new_ledger
@@ -157,22 +158,22 @@ def test_new_ledger_refuses_a_dangling_link(tmp_path, elsewhere):
     refused(lambda: Ledger.create(tmp_path / "ledger.sqlite"), elsewhere)
 
 
-HEAD = ObservationsHead("sim", "SIM", "scribbler-s2-fluke2", {}, 0.5, "cells")
+HEAD = ObservationsHead("sim", "SIM", "scribbler-s2-fluke2", paper_arena().to_dict(), 0.5, "cells")
 
 
 @pytest.mark.parametrize("kind", [*KINDS, "hard link"])
 def test_observations_refuse_a_name_that_is_not_the_users(tmp_path, elsewhere, kind):
     folder = tmp_path / "transfer"
     folder.mkdir()
-    put(kind, folder / "trials.jsonl", elsewhere)
-    refused(lambda: ObservationsFile(folder / "trials.jsonl", HEAD, within=folder), elsewhere)
+    put(kind, folder / "trials.sqlite", elsewhere)
+    refused(lambda: open_saved_trials(folder / "trials.sqlite", HEAD, within=folder), elsewhere)
 
 
 def test_observations_follow_a_link_that_the_user_names(tmp_path):
-    (tmp_path / "named.jsonl").symlink_to(tmp_path / "kept.jsonl")
-    ObservationsFile(tmp_path / "named.jsonl", HEAD).close()
-    assert (tmp_path / "kept.jsonl").stat().st_size
-    assert (tmp_path / "named.jsonl").is_symlink()
+    (tmp_path / "named.sqlite").symlink_to(tmp_path / "kept.sqlite")
+    open_saved_trials(tmp_path / "named.sqlite", HEAD).close()
+    assert (tmp_path / "kept.sqlite").stat().st_size
+    assert (tmp_path / "named.sqlite").is_symlink()
 
 
 def test_output_follows_a_link_that_the_user_names_and_no_other(tmp_path, elsewhere):

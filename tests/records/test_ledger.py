@@ -527,8 +527,8 @@ def test_text_that_is_no_json_is_a_torn_ledger(ledger, changed):
 
 def test_another_format_is_refused(ledger):
     with sqlite3.connect(ledger.path) as other:
-        other.execute("PRAGMA user_version = 2")
-    with pytest.raises(RecordVersionError, match="format 2; this realitygap reads format 1"):
+        other.execute("PRAGMA user_version = 3")
+    with pytest.raises(RecordVersionError, match="format 3; this realitygap reads formats 1 and 2"):
         Ledger.open(ledger.path)
 
 

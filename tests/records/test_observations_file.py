@@ -1,10 +1,11 @@
-"""The file of observed trials."""
+"""Observed trials as lines of JSON."""
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
-import os
+import warnings
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,9 +16,10 @@ from hypothesis import strategies as st
 
 from realitygap.errors import RecordError
 from realitygap.records import (
-    ObservationsFile,
     ObservationsHead,
+    RecordWarning,
     TrialRecord,
+    open_saved_trials,
     read_observations,
     trial_to_dict,
     write_observations,
@@ -76,19 +78,9 @@ def test_trials_come_back_as_they_were(tmp_path: Path) -> None:
     assert found.trials[0].stalled.dtype == bool
 
 
-def test_a_trial_is_on_the_disk_when_append_returns(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    synced: list[int] = []
-    monkeypatch.setattr(os, "fsync", lambda descriptor: synced.append(os.fstat(descriptor).st_size))
-    with ObservationsFile(tmp_path / "one.jsonl", HEAD) as file:
-        for number in range(3):
-            file.append(trial(number))
-            assert synced[-1] == file.path.stat().st_size
-            assert len(read_observations(file.path).trials) == number + 1
-
-
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(cut=st.integers(0, 3000), more=st.booleans())
-def test_a_file_cut_off_anywhere_keeps_all_whole_trials_and_can_be_taken_up(
+def test_a_file_cut_off_anywhere_keeps_all_whole_trials_and_can_be_converted(
     tmp_path: Path, cut: int, more: bool
 ) -> None:
     path = tmp_path / "cut.jsonl"
@@ -106,59 +98,18 @@ def test_a_file_cut_off_anywhere_keeps_all_whole_trials_and_can_be_taken_up(
     else:
         with pytest.raises(RecordError, match="not a file of observed trials"):
             read_observations(path)
-    with ObservationsFile(path, HEAD) as file:
-        assert len(file.trials) == n_whole
+    if cut < ends[0] - 1:
+        return
+    path.with_suffix(".sqlite").unlink(missing_ok=True)
+    with warnings.catch_warnings(), contextlib.ExitStack() as stack:
+        warnings.simplefilter("ignore", RecordWarning)
+        ledger = stack.enter_context(open_saved_trials(path, HEAD))
+        assert len(ledger.observations().trials) == n_whole
         if more:
-            file.append(trial(9, 2))
+            ledger.append(trial(9, 2))
     expected = [*range(n_whole), *([9] if more else [])]
-    again = read_observations(path)
-    assert [each.number for each in again.trials] == expected
-    assert again.problem == ""
-
-
-@pytest.mark.parametrize("n", [0, 2])
-def test_a_line_without_its_end_is_not_run_into_the_next_one(tmp_path: Path, n: int) -> None:
-    path = tmp_path / "cut.jsonl"
-    write_observations(path, HEAD, [trial(number, 2) for number in range(n)])
-    path.write_bytes(path.read_bytes()[:-1])
-    with ObservationsFile(path, HEAD) as file:
-        file.append(trial(9, 2))
-    assert [each.number for each in read_observations(path).trials] == [*range(n), 9]
-
-
-def test_trials_of_something_else_are_not_put_into_a_file(tmp_path: Path) -> None:
-    path = tmp_path / "one.jsonl"
-    write_observations(path, HEAD, [trial(0)])
-    before = path.read_bytes()
-    with pytest.raises(
-        RecordError, match=r"target 'twin:worn.toml' and not 'sim'; observe 'track' and not 'cells'"
-    ):
-        ObservationsFile(path, replace(HEAD, target="sim", observe="cells"))
-    assert path.read_bytes() == before
-
-
-KNOWN = replace(HEAD, identity="s2, Fluke 2, BoxOnWheels")
-
-
-def test_a_target_that_is_known_may_have_another_name_and_not_another_identity(tmp_path: Path) -> None:
-    """An emulator started again, on another port, was taken for something else."""
-    path = tmp_path / "one.jsonl"
-    write_observations(path, KNOWN, [trial(0)])
-    with ObservationsFile(path, replace(KNOWN, target="scribbler:socket://127.0.0.1:7002")) as file:
-        assert len(file.trials) == 1
-    with pytest.raises(RecordError, match="identity 's2, Fluke 2, BoxOnWheels' and not 's1, Fluke 1'"):
-        ObservationsFile(path, replace(KNOWN, identity="s1, Fluke 1"))
-
-
-def test_names_distinguish_targets_if_an_identity_is_unknown(tmp_path: Path) -> None:
-    path = tmp_path / "one.jsonl"
-    write_observations(path, HEAD, [trial(0)])
-    path.write_bytes(path.read_bytes().replace(b',"identity":""', b""))  # as files were before
-    assert read_observations(path).head.identity == ""
-    with ObservationsFile(path, KNOWN) as file:
-        assert len(file.trials) == 1
-    with pytest.raises(RecordError, match=r"target 'twin:worn.toml' and not 'sim'"):
-        ObservationsFile(path, replace(KNOWN, target="sim"))
+    assert [each.number for each in read_observations(ledger.path).trials] == expected
+    assert path.read_bytes() == whole[:cut]
 
 
 @pytest.mark.parametrize(
@@ -176,10 +127,9 @@ def test_another_file_is_refused_and_stays_as_it_is(tmp_path: Path, text: bytes,
     path.write_bytes(text)
     with pytest.raises(RecordError, match=said):
         read_observations(path)
-    if text:
-        with pytest.raises(RecordError, match=said):
-            ObservationsFile(path, HEAD)
-        assert path.read_bytes() == text
+    with pytest.raises(RecordError):
+        open_saved_trials(path, HEAD)
+    assert path.read_bytes() == text
 
 
 @pytest.mark.parametrize(
@@ -209,16 +159,3 @@ def test_damage_before_the_last_line_is_told_with_its_line(
 def test_a_file_that_is_not_there_is_told_in_one_message(tmp_path: Path) -> None:
     with pytest.raises(RecordError, match="There is no file"):
         read_observations(tmp_path / "none.jsonl")
-    with pytest.raises(RecordError, match="Could not write"):
-        ObservationsFile(tmp_path / "no folder" / "one.jsonl", HEAD)
-
-
-def test_a_file_without_a_trial_is_nobodys(tmp_path: Path) -> None:
-    """A command that was refused after its file was begun kept the right one from using the same name."""
-    path = tmp_path / "trials.jsonl"
-    ObservationsFile(path, HEAD).close()
-    with ObservationsFile(path, replace(HEAD, observe="cells")) as file:
-        file.append(trial(0))
-    assert read_observations(path).head.observe == "cells"
-    with pytest.raises(RecordError, match="observe 'cells' and not 'track'"):
-        ObservationsFile(path, HEAD)

@@ -15,6 +15,7 @@ from realitygap.cli import app
 from realitygap.errors import RecordError
 from realitygap.families.thymio import build_enki
 from realitygap.platforms import SimPlatform, SimTarget
+from realitygap.records import read_observations
 from realitygap.report import goal_table, write_closing_page
 from realitygap.study import (
     PLANS,
@@ -198,9 +199,9 @@ def test_a_killed_study_leaves_no_process_behind(tmp_path):
 def test_each_calibration_sees_only_its_budget(right):
     _, folder, _ = right
     budgets = set()
-    for path in (folder / "calibrations").glob("*.jsonl"):
+    for path in (folder / "calibrations").glob("*.sqlite"):
         budget = int(path.stem.rpartition("-")[2])
-        assert len(path.read_text().splitlines()) == 1 + budget  # a head, and a line a trial
+        assert len(read_observations(path).trials) == budget
         budgets.add(budget)
     assert budgets == {2, 4}  # by which the gap is measured, and half of it for transfer
 

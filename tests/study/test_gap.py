@@ -129,7 +129,7 @@ def test_trials_go_round_the_controllers(some):
 
 
 def test_saved_trials_are_not_repeated_and_give_the_same_result(some, tmp_path):
-    path = tmp_path / "trials.jsonl"
+    path = tmp_path / "trials.sqlite"
     whole = run_gap(sim(), sim(), some, trials=3)
     with pytest.raises(RecordError, match="power"):
         run_gap(sim(), Counted(sim(), fails_after=7), some, trials=3, results=path)
@@ -142,7 +142,7 @@ def test_saved_trials_are_not_repeated_and_give_the_same_result(some, tmp_path):
 
 
 def test_a_file_of_another_target_is_refused(some, tmp_path):
-    path = tmp_path / "trials.jsonl"
+    path = tmp_path / "trials.sqlite"
     run_gap(sim(), sim(), some, trials=2, results=path)
     with pytest.raises(RecordError, match="another kind"):
         run_gap(sim(), open_target("jyro", ARENA), some, trials=2, results=path)
@@ -282,7 +282,7 @@ class Interrupted(Counted):
 
 def test_a_trial_that_was_cut_off_does_not_count_and_is_carried_out_again(some, tmp_path):
     """It counted as one that visited nothing."""
-    path = tmp_path / "trials.jsonl"
+    path = tmp_path / "trials.sqlite"
     whole = run_gap(sim(), sim(), some, trials=3)
     with pytest.raises(KeyboardInterrupt):
         run_gap(sim(), Interrupted(sim(), fails_after=7), some, trials=3, results=path)
@@ -291,9 +291,9 @@ def test_a_trial_that_was_cut_off_does_not_count_and_is_carried_out_again(some, 
     again = Counted(sim())
     assert run_gap(sim(), again, some, trials=3, results=path) == whole
     assert len(again.asked) == 18 - 7
-    run_gap(sim(), sim(), some, trials=3, results=tmp_path / "whole.jsonl")
+    run_gap(sim(), sim(), some, trials=3, results=tmp_path / "whole.sqlite")
     assert recorded_spreads(str(path)).noise == pytest.approx(
-        recorded_spreads(str(tmp_path / "whole.jsonl")).noise
+        recorded_spreads(str(tmp_path / "whole.sqlite")).noise
     )
 
 
@@ -306,10 +306,10 @@ def test_a_trial_that_is_lost_for_good_is_no_trial_that_visited_nothing(some, tm
             trials = super().carry_out(plans, observe, told)
             return [replace(trials[0], cells=(), end=str(EndReason.LOST)), *trials[1:]]
 
-    path = tmp_path / "trials.jsonl"
+    path = tmp_path / "trials.sqlite"
     with pytest.raises(RobotError, match="A trial on sim was lost"):
         run_gap(sim(), Skipping(sim()), some, trials=2)
-    with pytest.raises(RobotError, match=r"The others are saved in .*trials.jsonl"):
+    with pytest.raises(RobotError, match=r"The others are saved in .*trials.sqlite"):
         run_gap(sim(), Skipping(sim()), some, trials=2, results=path)
     again = Counted(sim())
     run_gap(sim(), again, some, trials=2, results=path)
@@ -327,7 +327,7 @@ def test_trials_of_a_robot_have_to_be_kept(monkeypatch, tmp_path):
     )
     with pytest.raises(StudyError, match=r"12 trials on robot would not be saved.*-o FILE"):
         gap_between("sim", "robot", n_controllers=6, trials=2, noise=0)
-    file = tmp_path / "trials.jsonl"
+    file = tmp_path / "trials.sqlite"
     found = gap_between("sim", "robot", n_controllers=6, trials=2, noise=0, results=file)
     assert found.study.target.label == "REAL"
     recorded = gap_between("sim", f"recorded:{file}", n_controllers=6, trials=2)
@@ -335,7 +335,7 @@ def test_trials_of_a_robot_have_to_be_kept(monkeypatch, tmp_path):
 
 
 def test_trials_of_one_controller_tell_no_gap(some, tmp_path):
-    path = tmp_path / "one.jsonl"
+    path = tmp_path / "one.sqlite"
     try_on(sim(), some[0].genome, trials=2, out=path)
     with pytest.raises(StudyError, match="of one controller, expected at least 2"):
         gap_between("sim", f"recorded:{path}")
@@ -362,7 +362,7 @@ def test_re_evolved_is_only_what_evolved_there(some):
 
 def test_kept_trials_of_another_simulator_are_not_taken(some, tmp_path):
     """`sim` with other numbers, or another noise, was given the trials of the one before."""
-    path = tmp_path / "trials.jsonl"
+    path = tmp_path / "trials.sqlite"
     run_gap(sim(), sim(), some, trials=1, results=path)
     with pytest.raises(RecordError, match="identity"):
         run_gap(sim(), sim(**{"drive.track": 0.17}), some, trials=1, results=path)

@@ -25,7 +25,7 @@ def test_a_pilot_tells_how_trials_and_controllers_vary():
 
 
 def test_observed_trials_tell_the_same(tmp_path):
-    path, arena = tmp_path / "trials.jsonl", paper_arena()
+    path, arena = tmp_path / "trials.sqlite", paper_arena()
     controllers = sample_controllers("random", 30, 1)
     study_gap(
         open_target("sim", arena, key=1),

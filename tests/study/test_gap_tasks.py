@@ -71,7 +71,7 @@ def test_another_task_scores_controllers_that_were_selected_for_something_else(r
 
 
 def test_trials_that_were_kept_are_scored_anew_by_another_task(tmp_path):
-    kept = tmp_path / "kept.jsonl"
+    kept = tmp_path / "kept.sqlite"
     first = gap_between(
         "sim", "sim", task="avoid", n_controllers=3, trials=2, observe="track", results=kept
     ).study
@@ -103,7 +103,7 @@ def test_tasks_and_controllers_that_cannot_be_scored_are_refused_before_a_trial(
 
 
 def test_a_target_that_shows_too_little_is_refused_with_who_would_see_it(tmp_path):
-    kept = tmp_path / "kept.jsonl"
+    kept = tmp_path / "kept.sqlite"
     gap_between("sim", "sim", n_controllers=2, trials=1, observe="cells", results=kept)
     with pytest.raises(StudyError, match=r"supports at most 'cells'\. Use a camera, or the witness"):
         gap_between("sim", f"recorded:{kept}", task="wall")

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import json
 import os
 import signal
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +13,7 @@ import numpy as np
 import pytest
 
 from realitygap.evolution import Genome, NeatSettings, Population
-from realitygap.records import read_observations
+from realitygap.records import open_ledger, read_observations
 from realitygap.study import calibrate, open_target, try_on, with_ruled_end
 from realitygap.trials import Operator, SheetObserver, TrialPlan
 from realitygap.world import paper_arena
@@ -96,17 +95,16 @@ def killed(work: Callable[[str, Person], None], file: Path, dies: str) -> None:
     assert process.exitcode == -signal.SIGKILL
 
 
-def lines(file: Path) -> Iterator[tuple[int, str]]:
-    """Number and end of each trial in a file, as they were written."""
-    for line in file.read_text().splitlines()[1:]:
-        trial = json.loads(line)
-        yield trial["number"], trial["end"]
+def states(file: Path) -> list[tuple[int, str]]:
+    """Number and state of each trial in a file, in the order in which they began."""
+    with open_ledger(file, writable=False) as ledger:
+        return [(ledger.record(trial.trial).number, trial.state) for trial in ledger.trials()]
 
 
 @pytest.mark.parametrize("verdict", ["void", "driven"])
 @pytest.mark.parametrize(("dies", "state"), [("driving", "running"), ("ruler", "driven")])
 def test_killed_calibration_asks_about_its_trial(tmp_path: Path, dies: str, state: str, verdict: str) -> None:
-    file = tmp_path / "path.trials.jsonl"
+    file = tmp_path / "path.trials.sqlite"
     killed(calibrate_path, file, dies)
     (cut,) = read_observations(file).under_way
     assert (cut.number, cut.end, len(read_observations(file).trials)) == (0, state, 0)
@@ -119,7 +117,7 @@ def test_killed_calibration_asks_about_its_trial(tmp_path: Path, dies: str, stat
     found = read_observations(file)
     assert [trial.number for trial in found.trials if trial.end == "step limit"] == [0, 1]
     assert not found.under_way
-    assert ((0, "aborted") in lines(file)) != counts
+    assert ((0, "void") in states(file)) != counts
     if counts:
         np.testing.assert_array_equal(found.trials[0].raw, cut.raw, "it is the trial that was driven")
         assert found.trials[0].end_pose is not None
@@ -136,7 +134,7 @@ def test_killed_calibration_asks_about_its_trial(tmp_path: Path, dies: str, stat
 def test_killed_trials_of_a_controller_ask_about_theirs(
     tmp_path: Path, dies: str, verdict: str, questions: list[str]
 ) -> None:
-    file = tmp_path / "tried.jsonl"
+    file = tmp_path / "tried.sqlite"
     killed(try_twice, file, dies)
     person = Person(verdict=verdict)
     try_twice(str(file), person)
@@ -144,11 +142,11 @@ def test_killed_trials_of_a_controller_ask_about_theirs(
     found = read_observations(file)
     assert [trial.cells for trial in found.trials if trial.end == "step limit"] == [CELLS, CELLS]
     n_driven = 1 if (dies, verdict) == ("cells", "driven") else 2
-    assert [number for number, end in lines(file) if end == "running"] == [0] * n_driven + [1]
+    assert states(file) == [(0, "void")] * (n_driven - 1) + [(0, "scored"), (1, "scored")]
 
 
 def test_resume_after_the_answer_was_given_asks_no_more(tmp_path: Path) -> None:
-    file = tmp_path / "tried.jsonl"
+    file = tmp_path / "tried.sqlite"
     killed(try_twice, file, "cells")
     try_twice(str(file), Person(verdict="driven"))
     person = Person()

@@ -106,14 +106,14 @@ def test_ledger_locked_as_a_trial_ends_stops_the_study_and_the_trial_is_asked_ab
     assert scored(path) == scored(tmp_path / "whole")
 
 
-def _of_version_2(data: bytes) -> bytes:
-    return data[:60] + (2).to_bytes(4, "big") + data[64:]  # SQLite's user version
+def _of_version_3(data: bytes) -> bytes:
+    return data[:60] + (3).to_bytes(4, "big") + data[64:]  # SQLite's user version
 
 
 @pytest.mark.parametrize(
     ("change", "kind", "said"),
     [
-        (_of_version_2, RecordVersionError, "format 2; this realitygap reads format 1"),
+        (_of_version_3, RecordVersionError, "format 3; this realitygap reads formats 1 and 2"),
         (lambda data: data[: len(data) // 2], LedgerError, "is damaged"),
         (
             lambda data: data[:8192] + random.Random(1).randbytes(4096) + data[12288:],

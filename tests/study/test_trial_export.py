@@ -5,9 +5,16 @@ import pytest
 from typer.testing import CliRunner
 
 from realitygap.cli import app
-from realitygap.errors import LogError, StudyError
+from realitygap.errors import LedgerError, LogError, StudyError
 from realitygap.logs import import_log, mapping_of
-from realitygap.records import LEDGER_NAME, Ledger, TrialLog, read_observations, write_observations
+from realitygap.records import (
+    LEDGER_NAME,
+    Ledger,
+    RecordWarning,
+    open_ledger,
+    read_observations,
+    write_observations,
+)
 from realitygap.study import export_trials
 from tests.logs.test_write_bag import HEAD, trial
 
@@ -35,8 +42,10 @@ def test_each_driven_trial_of_a_file_has_a_bag(trials, tmp_path):
 
 
 def test_void_trial_of_a_file_has_no_bag(trials, tmp_path):
-    with TrialLog.open(trials) as log:
-        log.void(9, "it was pushed")
+    with pytest.warns(RecordWarning, match="converted"):
+        ledger = open_ledger(trials)
+    with ledger:
+        ledger.void(9, "it was pushed")
     (report,) = export_trials(trials, tmp_path / "drive.mcap")
     assert report.bag == tmp_path / "drive.mcap"
 
@@ -63,7 +72,7 @@ def test_trials_of_a_ledger_have_the_path_of_the_witness(tmp_path):
 
 
 def test_missing_trials_and_files_give_one_message(trials, tmp_path):
-    with pytest.raises(StudyError, match="has no trial 8; it has 7, 9"):
+    with pytest.raises(LedgerError, match="has no trial 8"):
         export(trials, "--trial", 8, "-o", tmp_path / "a.mcap")
     with pytest.raises(StudyError, match="with -o: a file"):
         export(trials)

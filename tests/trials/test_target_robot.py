@@ -147,7 +147,7 @@ def test_kept_trials_go_on_with_the_emulator_started_again_and_not_with_another(
     """Its port is another one, and that made them trials of something else."""
     genome = controller().genome
     assert genome is not None
-    kept = tmp_path / "kept.jsonl"
+    kept = tmp_path / "kept.sqlite"
     for fluke, n in (("2", 1), ("2", 2), ("1", 3)):
         with serve_tcp(Emulator("s2", fluke), speed=0, witness=0) as server:  # type: ignore[arg-type]
             spec = f"scribbler:{server.name}"

@@ -96,7 +96,7 @@ def _told_how_to_resume(order: CalibrateOrder) -> Iterator[None]:
         yield
     except (realitygap.study.StoppedByPerson, KeyboardInterrupt) as error:
         is_interrupted = isinstance(error, KeyboardInterrupt)
-        kept = "" if order.out is None else order.out.with_suffix(".trials.jsonl")
+        kept = "" if order.out is None else order.out.with_suffix(".trials.sqlite")
         again = f"Recorded trials are in {kept}. Run the same command to resume."
         echo(f"Interrupted. {again}" if is_interrupted else again, err=True)
         raise typer.Exit(130 if is_interrupted else 0) from None

@@ -17,7 +17,7 @@ from realitygap.errors import StudyError
 def export_trials(
     source: Annotated[
         Path,
-        typer.Argument(metavar="TRIALS", help="File of trials (.jsonl), or folder of results with a ledger."),
+        typer.Argument(metavar="TRIALS", help="File of trials, or folder of results with a ledger."),
     ],
     out: Annotated[
         Path | None,
@@ -51,13 +51,13 @@ def export_trials(
     range sensors Range on /range_0 and so on. A mapping is written next to each bag, so that `realitygap import` reads
     it. Several trials go to separate bags, such as drive-7.mcap. They need the extra 'ros'.
 
-    Example: realitygap export-trials trials.jsonl -o drive.mcap
+    Example: realitygap export-trials trials.sqlite -o drive.mcap
 
     Example: realitygap export-trials results/robot -o steps.parquet
 
     Example: realitygap export-trials results/robot --trial 3 -o bag
 
-    In Python: realitygap.study.export_trials("trials.jsonl", "drive.mcap")
+    In Python: realitygap.study.export_trials("trials.sqlite", "drive.mcap")
     """
     export(source, out, trial or (), wheel_diameter_mm)
 

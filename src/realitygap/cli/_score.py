@@ -185,7 +185,7 @@ def _score_trials(
     as_json: bool,
 ) -> None:
     arena, pens = study_sheet(folder, on_sheet.waiting[0].condition)
-    titles = _Titles(folder)
+    titles = _Titles(ledger)
     data = realitygap.vision.photo_bytes(photo)
     found = realitygap.vision.score_sheet(
         realitygap.vision.read_photo(data), realitygap.vision.SheetLayout.of(arena, pens), on_sheet.pens

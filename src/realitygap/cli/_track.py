@@ -104,9 +104,7 @@ def track(
     ] = None,
     trials: Annotated[
         Path | None,
-        typer.Option(
-            metavar="FILE", help="File of trials (.jsonl), instead of --study.", rich_help_panel=_TRIAL
-        ),
+        typer.Option(metavar="FILE", help="File of trials, instead of --study.", rich_help_panel=_TRIAL),
     ] = None,
     trial: Annotated[
         int | None,
@@ -118,7 +116,7 @@ def track(
         Path | None,
         typer.Option(
             metavar="FILE",
-            help="File that gets the trial with its poses, for calibrate and gap (.jsonl).",
+            help="File that gets the trial with its poses, for calibrate and gap (.sqlite).",
             rich_help_panel=_TRIAL,
         ),
     ] = None,
@@ -144,7 +142,7 @@ def track(
 
     Example: realitygap track --camera trial-12.mp4 --sheet -o trial-12.csv --overlay seen.mp4
 
-    Example: realitygap track --camera trial-12.mp4 --study results/paper-robot --trial 12 --into tracked.jsonl
+    Example: realitygap track --camera trial-12.mp4 --study results/paper-robot --trial 12 --into tracked.sqlite
 
     Example: realitygap track --camera 0 --tag aruco4x4:7 --tag-size 0.05 --lens webcam.toml -o live.csv
 
@@ -273,11 +271,11 @@ def _wanted(
             )
         return None
     if trials is not None and into is None:
-        raise StudyError("No file for the trial with its poses. Name one with --into, such as tracked.jsonl.")
+        raise StudyError(
+            "No file for the trial with its poses. Name one with --into, such as tracked.sqlite."
+        )
 
-    if study is not None:
-        return realitygap.study.trial_of_ledger(study, trial)
-    return realitygap.study.trial_of_file(trials, trial)  # type: ignore[arg-type]
+    return realitygap.study.trial_of_ledger(study or trials or Path(), trial)
 
 
 def _marks(
@@ -302,7 +300,9 @@ def _refuse_outputs(
     out: Path | None, save_lens: Path | None, overlay: Path | None, into: Path | None, camera: str
 ) -> None:
     """Refuse what cannot be written before a video is gone through."""
-    for path, ending in ((out, ".csv"), (save_lens, ".toml"), (overlay, ".mp4"), (into, ".jsonl")):
+    is_converted = into is not None and into.suffix == ".jsonl" and into.exists()
+    endings = (".csv", ".toml", ".mp4", ".jsonl" if is_converted else ".sqlite")
+    for path, ending in zip((out, save_lens, overlay, into), endings, strict=True):
         if path is None:
             continue
         if path.suffix != ending:
@@ -384,7 +384,7 @@ def _enter(
         file = (
             None
             if into is None
-            else stack.enter_context(realitygap.records.ObservationsFile(into, wanted.head))
+            else stack.enter_context(realitygap.records.open_saved_trials(into, wanted.head))
         )
         if study is not None:
             realitygap.study.score_tracked(study, trial, placed, told, role)

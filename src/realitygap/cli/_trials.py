@@ -1,11 +1,11 @@
-"""`realitygap trials`: the trials of a study on a robot, or of a file, their scores, and notes."""
+"""`realitygap trials`: the trials of a study on a robot, or of another command, their scores, and notes."""
 
 from __future__ import annotations
 
 import getpass
 import math
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -21,7 +21,7 @@ from ._grid_editor import pick_cells
 from ._json import print_json
 
 if TYPE_CHECKING:
-    from realitygap.records import Ledger, LoggedTrial, ScoreRole, Trial, TrialLog
+    from realitygap.records import Ledger, ScoreRole, Trial
     from realitygap.world import Arena
 
 _WHAT = ("list", "show", "score", "undo", "void", "note", "export", "agreement")
@@ -42,7 +42,7 @@ def trials(
     ],
     source: Annotated[
         Path,
-        typer.Argument(metavar="TRIALS", help="Folder of results with a ledger, or file of trials (.jsonl)."),
+        typer.Argument(metavar="TRIALS", help="Folder of results with a ledger, or file of trials."),
     ],
     trial: Annotated[
         str | None,
@@ -112,9 +112,8 @@ def trials(
     --correct changes it: reports use the correction, and the evolution does not. If two people counted cells, agreement
     prints Cohen's kappa with its interval.
 
-    A file has one count of each trial, so undo, agreement, --second, and --correct are only for folders. In a file,
-    score replaces the cells. When the command that saved the trials resumes, it uses the new cells, and drives void
-    trials again.
+    When the command that saved the trials resumes, it uses the new cells, and drives void trials again. If you remove
+    a score without a new one, the command asks for it.
 
     Example: realitygap trials list results/paper-robot
 
@@ -124,9 +123,9 @@ def trials(
 
     Example: realitygap trials void results/paper-robot 12 --text "the pen fell out"
 
-    Example: realitygap trials void gap.jsonl 4194305 --text "it was pushed"
+    Example: realitygap trials void gap.sqlite 7 --text "it was pushed"
 
-    Example: realitygap trials show gap.jsonl 4194305
+    Example: realitygap trials show gap.sqlite 7
 
     Example: realitygap trials export results/paper-robot -o trials.parquet
 
@@ -149,7 +148,7 @@ def trials(
     if out is not None and what != "export":
         raise StudyError(f"--out is only for export, not for {what}. Leave it out.")
     name = who or getpass.getuser()
-    with _open(source, writable=what not in _READING) as opened:
+    with realitygap.records.open_ledger(source, writable=what not in _READING) as opened:
         if what == "list":
             _list(opened, as_json=as_json)
         elif what == "show":
@@ -157,7 +156,7 @@ def trials(
         elif what == "export":
             export(source, out, () if trial is None else [_number(opened, trial)])
         elif what == "agreement":
-            _agreement(_of_study(opened, what).path.parent, as_json=as_json)
+            _agreement(source, as_json=as_json)
         elif what == "score":
             role: ScoreRole = "second" if second else "correction" if correct else "score"
             _score(opened, trial, cells, file, name, role)
@@ -166,33 +165,12 @@ def trials(
             echo("Noted.")
         elif what == "undo":
             number = _number(opened, _needed(trial, "a trial"))
-            _of_study(opened, what).undo(number)
+            opened.undo(number)
             echo(f"The score of trial {number} is withdrawn. Enter a new one.")
         else:
             number = _number(opened, _needed(trial, "a trial"))
             opened.void(number, _needed(text, "--text"))
             echo(f"Trial {number} is void; it will be driven again.")
-
-
-def _open(source: Path, *, writable: bool) -> Ledger | TrialLog:
-    """Open the ledger in a folder, or a file of trials."""
-    files = sorted(source.glob("*/*.jsonl")) if source.is_dir() else []
-    if files and not (source / realitygap.records.LEDGER_NAME).exists():
-        raise StudyError(f"{source} has several files of trials. Name one, such as {files[0]}.")
-    if source.is_dir() or not source.exists():
-        return realitygap.records.Ledger.open(source / realitygap.records.LEDGER_NAME, writable=writable)
-    return realitygap.records.TrialLog.open(source, writable=writable)
-
-
-def _of_study(opened: Ledger | TrialLog, what: str) -> Ledger:
-    """Return the ledger of a study.
-
-    Raises:
-        StudyError: It is a file.
-    """
-    if isinstance(opened, realitygap.records.TrialLog):
-        raise StudyError(f"{what} is only for the trials of a study, and {opened.path} is a file of trials.")
-    return opened
 
 
 _LONGEST_NUMBER = 19
@@ -205,15 +183,11 @@ def _needed(value: str | None, what: str) -> str:
     return value
 
 
-def _number(opened: Ledger | TrialLog, text: str) -> int:
+def _number(opened: Ledger, text: str) -> int:
     """Return a trial's number, from itself or its code."""
     if text.isdecimal() and len(text) < _LONGEST_NUMBER:
         return opened.trial(int(text)).trial
-    codes = (
-        {}
-        if isinstance(opened, realitygap.records.TrialLog)
-        else {each.code: each.trial for each in opened.trials()}
-    )
+    codes = {each.code: each.trial for each in opened.trials() if each.code}
     if text.upper() not in codes:
         raise LedgerError(
             f"{opened.path} has no trial {text!r}. `realitygap trials list` shows numbers and codes."
@@ -222,7 +196,7 @@ def _number(opened: Ledger | TrialLog, text: str) -> int:
 
 
 def _score(
-    opened: Ledger | TrialLog,
+    opened: Ledger,
     trial: str | None,
     cells: str | None,
     file: Path | None,
@@ -254,7 +228,7 @@ def _cells(text: str, where: str) -> list[int]:
         raise StudyError(f"{where}: expected numbers of cells such as 0,1,13, got {text!r}.") from None
 
 
-def _read_file(opened: Ledger | TrialLog, path: Path) -> dict[int, list[int]]:
+def _read_file(opened: Ledger, path: Path) -> dict[int, list[int]]:
     """Return the cells of each trial in a file, all of it read before anything is entered."""
     try:
         lines = read_file(path, MOST_TABLE_BYTES).decode("utf-8").splitlines()
@@ -276,7 +250,7 @@ def _read_file(opened: Ledger | TrialLog, path: Path) -> dict[int, list[int]]:
     return found
 
 
-def _pick(opened: Ledger | TrialLog, trial: str | None, role: ScoreRole) -> Iterator[dict[int, list[int]]]:
+def _pick(opened: Ledger, trial: str | None, role: ScoreRole) -> Iterator[dict[int, list[int]]]:
     """Yield cells picked in the terminal, of one trial or, one after the other, of all that wait."""
     if not sys.stdin.isatty():
         raise StudyError("There is no terminal in which to pick cells. Give --cells or --file.")
@@ -289,47 +263,56 @@ def _pick(opened: Ledger | TrialLog, trial: str | None, role: ScoreRole) -> Iter
 
 
 def _waiting(
-    opened: Ledger | TrialLog, trial: str | None, role: ScoreRole
+    opened: Ledger, trial: str | None, role: ScoreRole
 ) -> Iterator[tuple[int, str, Arena, tuple[int, ...]]]:
     """Yield number, title, arena, and cells of before of the trial that is named, or of all that wait."""
     number = None
     if trial is not None or role == "correction":
         number = _number(opened, _needed(trial, "a trial"))
-    if isinstance(opened, realitygap.records.TrialLog):
-        for logged in opened.trials(states=("driven",)) if number is None else [opened.trial(number)]:
-            yield logged.trial, logged.name, opened.arena, ()
-        return
     if number is not None:
         waiting = [opened.trial(number)]
     else:
         seconded = {row["trial"] for row in opened.scores() if row["role"] == role and row["undone"] is None}
         states: tuple[Any, ...] = ("driven",) if role == "score" else ("driven", "scored")
         waiting = [each for each in opened.trials(states=states) if each.trial not in seconded]
-    titles = _Titles(opened.path.parent)
+    titles = _Titles(opened)
     for each in waiting:
-        title = f"{each.code if titles.blind else each.name}, sheet {each.sheet}, {titles.pen(each)}"
-        yield each.trial, title, titles.arena(each), each.cells or () if role == "correction" else ()
+        yield (
+            each.trial,
+            titles.title(each),
+            titles.arena(each),
+            each.cells or () if role == "correction" else (),
+        )
 
 
 class _Titles:
-    """Names that the list of a folder's trials shows."""
+    """Names and arenas of trials; those of a study are in its description."""
 
-    def __init__(self, folder: Path) -> None:
-        self._description = realitygap.records.ResultsFolder.open(folder).description
+    def __init__(self, opened: Ledger) -> None:
+        self._opened = opened
+        folder = opened.path.parent
+        self._description: Mapping[str, Any] = {}
+        if opened.conditions() and (folder / "study.json").exists():
+            self._description = realitygap.records.ResultsFolder.open(folder).description
         settings = self._description.get("trials") or {}
         self.blind = bool(settings.get("blind"))
         self._pens = settings.get("pens") or []
 
-    def pen(self, trial: Trial) -> str:
-        return f"pen: {self._pens[trial.pen % len(self._pens)]}" if self._pens else f"pen {trial.pen}"
+    def title(self, trial: Trial) -> str:
+        if not trial.condition:
+            return trial.name
+        pen = f"pen: {self._pens[trial.pen % len(self._pens)]}" if self._pens else f"pen {trial.pen}"
+        return f"{trial.code if self.blind else trial.name}, sheet {trial.sheet}, {pen}"
 
-    def arena(self, trial: Trial) -> Any:
+    def arena(self, trial: Trial) -> Arena:
+        if not trial.condition:
+            return self._opened.arena
         settings = realitygap.records.settings_of_condition(self._description, trial.condition)
         return realitygap.runs.Condition.from_settings(trial.condition, settings).arena.arena()
 
 
-def _list(opened: Ledger | TrialLog, *, as_json: bool) -> None:
-    trials: Sequence[Trial | LoggedTrial] = opened.trials()
+def _list(opened: Ledger, *, as_json: bool) -> None:
+    trials = opened.trials()
     hidden = _hidden(opened)
     if as_json:
         rows = [
@@ -347,17 +330,14 @@ def _list(opened: Ledger | TrialLog, *, as_json: bool) -> None:
     from ._tables import wide_console
 
     table = Table(box=None, padding=(0, 2, 0, 0))
-    more = ("code", "sheet") if any(isinstance(trial, realitygap.records.Trial) for trial in trials) else ()
+    more = ("code", "sheet") if any(trial.code for trial in trials) else ()
     for head in ("trial", *more, "state", "cells", "description"):
         table.add_column(head, no_wrap=head not in ("code", "description"), overflow="fold")
     for trial in trials:
-        on_sheet: tuple[str, ...] = ()
-        problem = ""
-        if isinstance(trial, realitygap.records.Trial):
-            on_sheet, problem = (trial.code, str(trial.sheet)), trial.problem or ""
+        on_sheet = (trial.code, str(trial.sheet)) if more else ()
         parts = [
             "" if trial.trial in hidden else trial.name,
-            trial.reason or problem,
+            trial.reason or trial.problem or "",
             *(f"note: {note['text']}" for note in opened.notes(trial.trial)),
         ]
         table.add_row(
@@ -373,7 +353,7 @@ def _list(opened: Ledger | TrialLog, *, as_json: bool) -> None:
     echo(f"{len(trials)} trials: {counts}." if trials else "No trial is planned yet.")
 
 
-def _show(opened: Ledger | TrialLog, number: int, *, as_json: bool) -> None:
+def _show(opened: Ledger, number: int, *, as_json: bool) -> None:
     """Print the facts of a trial, or as JSON all that was recorded."""
     trial, record, notes = opened.trial(number), opened.record(number), opened.notes(number)
     is_hidden = number in _hidden(opened)
@@ -405,16 +385,15 @@ def _show(opened: Ledger | TrialLog, number: int, *, as_json: bool) -> None:
 _BLINDED = ("condition", "replicate", "generation", "individual")
 
 
-def _hidden(opened: Ledger | TrialLog) -> set[int]:
+def _hidden(opened: Ledger) -> set[int]:
     """Return the trials of a blind study whose conditions are not shown yet."""
-    if isinstance(opened, realitygap.records.TrialLog) or not (opened.path.parent / "study.json").exists():
+    if not _Titles(opened).blind:
         return set()
-    is_blind = _Titles(opened.path.parent).blind
-    return {trial.trial for trial in opened.trials() if is_blind and not trial.is_closed}
+    return {trial.trial for trial in opened.trials() if not trial.is_closed}
 
 
-def _agreement(folder: Path, *, as_json: bool) -> None:
-    found = realitygap.report.measure_agreement(folder)
+def _agreement(source: Path, *, as_json: bool) -> None:
+    found = realitygap.report.measure_agreement(source)
     if as_json:
         print_json(found.to_dict())
         return

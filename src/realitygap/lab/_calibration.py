@@ -14,7 +14,7 @@ import numpy as np
 from realitygap.errors import StudyError
 from realitygap.orders import CalibrateOrder
 from realitygap.platforms import class_of, platform_of
-from realitygap.records import NO_LINE, TrialRecord, read_observations, those_that_count
+from realitygap.records import NO_LINE, TrialRecord, existing_trials, read_observations, those_that_count
 from realitygap.report import save_sensor_figure
 from realitygap.study import (
     StoppedByPerson,
@@ -46,7 +46,7 @@ def calibration_mistakes(root: Path, values: Mapping[str, Any]) -> Mistakes:
         with mistakes.in_field("name"):
             check_name(values["name"])
             out = root / f"{values['name']}.toml"
-            if out.exists() and not out.with_suffix(".trials.jsonl").exists():
+            if out.exists() and not existing_trials(out.with_suffix(".trials.sqlite")).exists():
                 raise StudyError(f"There is another file {out.name}. Choose another name.")
     mistakes.in_order(CalibrateOrder, values, root)
     return mistakes
@@ -132,7 +132,7 @@ def calibrate(channel: Channel, work: messages.CalibrationWork) -> None:
     out, platform = order.out or Path(), order.robot or ""
     arena, robot = load_arena(order.arena), load_robot(order.base or class_of(platform).base_robot)
     is_led = order.witness is None and platform_of(platform).needs_person
-    growing = _Growing(channel, out.with_suffix(".trials.jsonl"), arena, robot)
+    growing = _Growing(channel, out.with_suffix(".trials.sqlite"), arena, robot)
     try:
         made = make_calibration(
             order,

@@ -9,7 +9,7 @@ from typing import Any
 
 from realitygap.errors import StudyError
 from realitygap.orders import CalibrateOrder, GapOrder
-from realitygap.records import refuse_links
+from realitygap.records import existing_trials, refuse_links
 
 from ._calibration import CalibrationJob, calibration_mistakes
 from ._checks import Checks
@@ -247,9 +247,9 @@ class Lab:
         with self._lock:
             if self.gap is not None and not self.gap.is_over:
                 raise StudyError("A gap is being measured. Wait until it is complete, or stop it.")
-            trials = page.with_suffix(".jsonl")
+            trials = page.with_suffix(".sqlite")
             refuse_links(self.root, page, trials)
-            order = GapOrder(**values, results=trials)
+            order = GapOrder(**values, results=existing_trials(trials))
             self.robot.take_for(order.target, visitor)
             page.parent.mkdir(exist_ok=True)
             self.gap = GapJob(order, page, self.root, self.changed)
@@ -279,7 +279,7 @@ class Lab:
         """
         calibration_mistakes(self.root, {**values, "name": name}).refuse()
         out = self.root / f"{name}.toml"
-        refuse_links(self.root, out, out.with_suffix(".trials.jsonl"), out.with_suffix(".svg"))
+        refuse_links(self.root, out, out.with_suffix(".trials.sqlite"), out.with_suffix(".svg"))
         with self._lock:
             if self.calibration is not None and not self.calibration.is_over:
                 raise StudyError("A calibration is running. Wait until it is complete, or stop it.")

@@ -6,12 +6,13 @@ import contextlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from realitygap.errors import RecordError
-from realitygap.records import LoggedTrial, Score, TrialLog, is_observations
+from realitygap.records import LEDGER_NAME, Ledger, Score, Trial, is_observations, ledger_stamp, open_ledger
 from realitygap.world import Arena
 
-from ._files import last_change, plain_files
+from ._files import plain_files
 
 LONGEST_TEXT = 1000
 """Largest length of a reason or note [letters]."""
@@ -25,9 +26,10 @@ def saved_files(root: Path) -> dict[str, Path]:
     folders = _folders(root)
     files: dict[str, Path] = {}
     for folder in (root, *folders, *(path for parent in folders for path in _folders(parent))):
-        for path in plain_files(folder, (".jsonl",)):
+        for path in plain_files(folder, (".jsonl", ".sqlite")):
+            is_converted = path.suffix == ".jsonl" and path.with_suffix(".sqlite").exists()
             with contextlib.suppress(RecordError):
-                if is_observations(path):
+                if path.name != LEDGER_NAME and not is_converted and is_observations(path):
                     files[path.relative_to(root).as_posix()] = path
     return files
 
@@ -45,10 +47,10 @@ class SavedTrials:
     """The trials of a file at one moment, and the notes on each by its number."""
 
     arena: Arena
-    trials: tuple[LoggedTrial, ...]
+    trials: tuple[Trial, ...]
     notes: Mapping[int, str]
 
-    def trial(self, number: int | None) -> LoggedTrial | None:
+    def trial(self, number: int | None) -> Trial | None:
         """Return a trial by its number."""
         return next((trial for trial in self.trials if trial.trial == number), None)
 
@@ -62,41 +64,49 @@ class SavedFile:
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        self.changed_s: float | None = None
+        self.stamp: tuple[Any, ...] = ()
 
     def read(self) -> SavedTrials:
         """Return the trials."""
-        self.changed_s = last_change(self._path)
-        with TrialLog.open(self._path, writable=False) as log:
-            trials = tuple(log.trials())
+        self.stamp = ledger_stamp(self._path)
+        with self._open(writable=False) as ledger:
+            trials = tuple(ledger.trials())
             notes = {
-                trial.trial: "; ".join(f"{note['who']}: {note['text']}" for note in log.notes(trial.trial))
+                trial.trial: "; ".join(f"{note['who']}: {note['text']}" for note in ledger.notes(trial.trial))
                 for trial in trials
             }
-            return SavedTrials(log.arena, trials, notes)
+            return SavedTrials(ledger.arena, trials, notes)
+
+    def _open(self, *, writable: bool = True) -> Ledger:
+        """Open the trials. Lines of JSON are converted before they are changed; then the new file has them."""
+        ledger = open_ledger(self._path, writable=writable)
+        self._path = ledger.path
+        return ledger
 
     def has_changed(self) -> bool:
         """Return whether the file has changed since it was read."""
-        return last_change(self._path) != self.changed_s
+        return ledger_stamp(self._path) != self.stamp
 
     def score(self, number: int, cells: Sequence[int], who: str) -> None:
         """Enter the cells of a trial in place of those of before."""
         who = _named(who)
-        with TrialLog.open(self._path) as log:
-            log.score_all({number: Score(cells, who)})
+        with self._open() as ledger:
+            if ledger.trial(number).state == "scored":
+                ledger.undo(number)
+            ledger.score(number, Score(cells, who))
 
     def void(self, number: int, reason: str, who: str) -> None:
         """Declare a trial void; its command drives it again."""
         who = _named(who)
-        with TrialLog.open(self._path) as log:
-            log.void(number, reason[:LONGEST_TEXT])
-            log.note("void", who, number)
+        with self._open() as ledger:
+            ledger.void(number, reason[:LONGEST_TEXT])
+            ledger.note("void", who, number)
 
     def note(self, number: int, text: str, who: str) -> None:
         """Save a note about a trial."""
         who = _named(who)
-        with TrialLog.open(self._path) as log:
-            log.note(text[:LONGEST_TEXT], who, number)
+        with self._open() as ledger:
+            ledger.note(text[:LONGEST_TEXT], who, number)
 
 
 def _named(who: str) -> str:

@@ -35,7 +35,7 @@ class CalibrateOrder(Order):
 
     Example: realitygap calibrate all --robot twin:worn.toml --observe track --budget 20 -o worn-fit.toml
 
-    Example: realitygap calibrate sensors --from sensors.trials.jsonl -o sensors.toml
+    Example: realitygap calibrate sensors --from sensors.trials.sqlite -o sensors.toml
 
     With --from, a log or a table of another program is fitted, too. A log has commands, and poses or encoders
     (motion). A table has readings by distance and bearing of a wall (sensors). The error of the fit on the part that

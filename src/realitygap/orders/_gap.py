@@ -26,7 +26,7 @@ class GapOrder(Order):
 
     Example: realitygap gap sim twin:worn-1.toml --controllers avoid
 
-    Example: realitygap gap sim:fit.toml recorded:tracked.jsonl --observe track
+    Example: realitygap gap sim:fit.toml recorded:tracked.sqlite --observe track
 
     Example: realitygap gap sim:fit.toml twin:worn-1.toml --randomize posterior
 
@@ -101,7 +101,7 @@ class GapOrder(Order):
     )
     results: Path | None = option(
         None,
-        help="File to save the target's trials in (.jsonl). Run the command again to resume.",
+        help="File to save the target's trials in (.sqlite). Run the command again to resume.",
         metavar="FILE",
         names=("-o", "--out"),
         is_output=True,

@@ -49,7 +49,7 @@ class PlanOrder(Order):
     )
     data: Path | None = option(
         None,
-        help="Recorded trials to estimate the noise from (.jsonl).",
+        help="Recorded trials to estimate the noise from.",
         default_is="a pilot on sim",
         metavar="FILE",
         names=("--from",),

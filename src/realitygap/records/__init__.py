@@ -47,19 +47,22 @@ from realitygap.records._ledger_schema import ledger_tables
 from realitygap.records._listing import LEDGER_NAME
 from realitygap.records._observations_file import (
     Observations,
-    ObservationsFile,
     ObservationsHead,
-    is_observations,
     not_compared,
-    read_observations,
     trial_from_dict,
     trial_to_dict,
     write_observations,
 )
 from realitygap.records._output import is_special, refuse_results, write_whole
 from realitygap.records._published_results import PublishedResults
-from realitygap.records._trial_log import LoggedTrial, TrialLog
 from realitygap.records._trial_record import CALIBRATES, NO_LINE, OBSERVATIONS, Observe, TrialRecord, sees
+from realitygap.records._trial_store import (
+    existing_trials,
+    is_observations,
+    open_ledger,
+    open_saved_trials,
+    read_observations,
+)
 from realitygap.records._version import RESULTS_VERSION, RecordWarning
 
 wake_on_ctrl_c()
@@ -117,10 +120,10 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     "ROBOT",
     "sees",
     "Observations",
-    "ObservationsFile",
     "ObservationsHead",
-    "TrialLog",
-    "LoggedTrial",
+    "open_ledger",
+    "open_saved_trials",
+    "existing_trials",
     "is_observations",
     "not_compared",
     "read_observations",

@@ -1,4 +1,4 @@
-"""A ledger of physical trials: what was planned, driven, scored and void, from which nothing is ever deleted."""
+"""A ledger of trials that cost something: planned, driven, scored, and void ones. Nothing is ever deleted from it."""
 
 from __future__ import annotations
 
@@ -7,13 +7,15 @@ import datetime
 import json
 import sqlite3
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any, Literal, Self
 
 from realitygap.errors import LedgerError
+from realitygap.records._ending import UNDER_WAY, EndReason, is_taken_back, is_whole
 from realitygap.records._ledger_file import create_file, speaking
 from realitygap.records._ledger_kinds import (
+    OBSERVER,
     ROBOT,
     Generation,
     Score,
@@ -23,13 +25,20 @@ from realitygap.records._ledger_kinds import (
     Turn,
     checked_cells,
 )
-from realitygap.records._ledger_reader import LedgerReader
-from realitygap.records._trial_record import TrialRecord
+from realitygap.records._ledger_reader import LedgerReader, arena_of
+from realitygap.records._lock import FolderLock
+from realitygap.records._observations_file import (
+    Observations,
+    ObservationsHead,
+    not_compared,
+    trial_to_dict,
+)
+from realitygap.records._trial_record import NO_LINE, TrialRecord
 from realitygap.records._version import RESULTS_VERSION
 
 
 class Ledger(LedgerReader):
-    """The ledger of a study's physical trials.
+    """The ledger of a study's physical trials, or of those that `gap`, `calibrate`, `transfer`, or `try` saved.
 
     Each method that writes is one transaction, and what it wrote survives a crash once it returns. Several
     programs may have the ledger open at a time.
@@ -39,11 +48,78 @@ class Ledger(LedgerReader):
             asked; what was written before is safe.
     """
 
+    lock: FolderLock | None = None
+    """Lock that keeps out other commands that would save trials; it is released when the ledger is closed."""
+    _begun = 0
+    """Number of the trial of a command that is under way in this program; 0 if there is none."""
+
     @classmethod
     def create(cls, path: str | Path) -> Self:
         """Create a ledger; raise an error if the file exists."""
         create_file(Path(path))
         return cls.open(path)
+
+    def close(self) -> None:
+        """Let go of the file; safe to call twice."""
+        super().close()
+        lock, self.lock = self.lock, None
+        if lock is not None:
+            lock.release()
+
+    # trials of a command
+
+    def begin(
+        self, head: ObservationsHead, observations: Observations | None = None, origin: str = ""
+    ) -> None:
+        """Make an empty ledger that of a command.
+
+        Args:
+            head: What its trials have in common.
+            observations: Its first trials and notes, which were saved elsewhere.
+            origin: SHA-256 of the file that had them.
+        """
+        n_cells = arena_of(head.arena, self.path).grid.n_cells
+        with self._writing():
+            self._run(
+                "INSERT INTO head VALUES (1, ?, ?, ?, ?)",
+                *(_now(), n_cells, _json(head.to_dict()), origin or None),
+            )
+            if observations is not None:
+                self._take_over(observations)
+
+    def adopt(self, head: ObservationsHead) -> None:
+        """Raise an error if the trials of the ledger are of another target, arena, robot, or observation level.
+
+        A target whose identity is known on both sides may have another name, such as another port. Without trials,
+        the ledger gets the new head.
+
+        Raises:
+            LedgerError: They are.
+        """
+        there, wanted = self.head().to_dict(), head.to_dict()
+        of_no_matter = not_compared(there, wanted)
+        others = [name for name in wanted if name != of_no_matter and there[name] != wanted[name]]
+        if not others:
+            return
+        with self._writing():
+            if self._one("SELECT id FROM trials") is not None:
+                what = "; ".join(
+                    f"{name} {_short(there[name])} and not {_short(wanted[name])}" for name in others
+                )
+                raise LedgerError(
+                    f"{self.path} has trials of another kind: {what}. They cannot be combined. Name another file."
+                )
+            n_cells = arena_of(head.arena, self.path).grid.n_cells
+            self._run("UPDATE head SET n_cells = ?, head = ?", n_cells, _json(wanted))
+
+    def append(self, trial: TrialRecord) -> None:
+        """Save the state of a command's trial by its end: as it begins, when it was driven, when it counts, or is void.
+
+        A state continues the last trial of the same purpose, number, and controller that is not void, unless that one
+        is complete: then it is another trial.
+        """
+        with self._writing():
+            self._append(trial, _now())
 
     # conditions and sittings
 
@@ -215,7 +291,7 @@ class Ledger(LedgerReader):
     def settle(self, number: int, verdict: Literal["void", "driven"], reason: str) -> None:
         """Say what becomes of a running trial that was cut off: void, to be driven again, or driven."""
         with self._writing():
-            self._require(number, "running")
+            self._require(number, "running", "driven")
             if verdict == "void":
                 self._void(number, reason)
             else:
@@ -244,7 +320,7 @@ class Ledger(LedgerReader):
             self._note_event(number, "undone", {})
 
     def void(self, number: int, reason: str) -> None:
-        """Void a trial, and plan another attempt in its place.
+        """Void a trial. A study plans another attempt in its place; a command drives one when it resumes.
 
         Raises:
             LedgerError: its generation is closed, it is void already, or no reason is given.
@@ -287,6 +363,84 @@ class Ledger(LedgerReader):
         """Run a command. Return the number of the inserted row."""
         return int(self._connection.execute(command, values).lastrowid or 0)
 
+    def _take_over(self, observations: Observations) -> None:
+        """Take in trials and notes that were saved elsewhere."""
+        trials = (*observations.trials, *observations.under_way)
+        free = 1 + max((trial.number for trial in trials), default=0)  # then each number means what it did
+        for trial in trials:
+            is_free = (
+                trial.number >= 0 and self._one("SELECT id FROM trials WHERE id = ?", trial.number) is None
+            )
+            self._append(trial, None, trial.number if is_free else free)
+            free += not is_free
+        for note in observations.notes:
+            row = self._one("SELECT max(id) AS id FROM trials WHERE number = ?", note["trial"])
+            number = None if row is None else row["id"]
+            self._run(
+                "INSERT INTO notes (trial, text, who, time) VALUES (?, ?, ?, ?)",
+                *(number, note["text"], note["who"], note["time"]),
+            )
+
+    def _append(self, trial: TrialRecord, time: str | None, new: int | None = None) -> None:
+        """Save the state of a trial, at a time if that is known, under a new number if it is another trial."""
+        key = (trial.purpose, trial.number, self._controller(trial.genome))
+        rows = self._all(
+            "SELECT id, state FROM trials WHERE purpose = ? AND number = ? AND controller IS ? ORDER BY place",
+            *key,
+        )
+        row = rows[-1] if rows else None
+        is_withdrawn = row is not None and (row["id"], row["state"]) == (
+            self._begun,
+            "void",
+        )  # by a person, meanwhile
+        is_new = (
+            row is None or trial.end == EndReason.RUNNING or (row["state"] == "void" and not is_withdrawn)
+        )
+        if row is not None and row["state"] == "scored" and not is_taken_back(trial):
+            is_new = True
+            if is_whole(trial) and self.record(row["id"]).start == trial.start:
+                self._void(row["id"], "another record replaced it")
+        elif row is not None and is_new and row["state"] in ("running", "driven"):
+            self._void(row["id"], "it did not end, and was driven again")
+        if row is None or is_new:
+            (place,) = self._one("SELECT coalesce(max(place), 0) + 1 FROM trials") or (1,)
+            number = self._run(
+                "INSERT INTO trials (id, attempt, place, state, end, started, purpose, number, controller, record) "
+                "VALUES (?, ?, ?, 'running', 'running', ?, ?, ?, ?, '{}')",
+                *(new, len(rows), place, time, *key),
+            )
+            self._note_event(number, "running", {})
+        else:
+            number = row["id"]
+        values = trial_to_dict(trial)
+        del values["genome"]
+        self._run(
+            "UPDATE trials SET end = ?, problem = ?, n_steps = ?, stalls = ?, record = ? WHERE id = ?",
+            *(trial.end, trial.problem or None, len(trial.commands), trial.n_stalls),
+            *(json.dumps(values, separators=(",", ":"), allow_nan=False), number),
+        )
+        self._begun = number if trial.end in UNDER_WAY else 0
+        if trial.end == EndReason.RUNNING or (is_withdrawn and not is_new):
+            return
+        if trial.end != EndReason.DRIVEN and not is_whole(trial):
+            self._void(number, trial.problem or trial.end)
+            return
+        self._run("UPDATE trials SET state = 'driven', driven = ? WHERE id = ?", time, number)
+        self._note_event(number, "driven", {"end": trial.end})
+        if is_whole(trial):
+            self._enter(number, Score(trial.cells, OBSERVER if trial.cells else ROBOT), "score")
+
+    def _controller(self, genome: str) -> int | None:
+        """Return the number of a controller; None if there is none."""
+        if not genome:
+            return None
+        row = self._one("SELECT id FROM controllers WHERE genome = ?", genome)
+        return (
+            self._run("INSERT INTO controllers (genome) VALUES (?)", genome)
+            if row is None
+            else int(row["id"])
+        )
+
     def _insert_trial(self, turn: Turn, attempt: int, place: int | None = None) -> int:
         if place is None:
             (most,) = self._one("SELECT coalesce(max(place), 0) FROM trials") or (0,)
@@ -328,27 +482,32 @@ class Ledger(LedgerReader):
 
     def _score(self, number: int, score: Score, role: ScoreRole) -> None:
         cells = [] if score.who == ROBOT else self._checked(number, score.cells)
+        trial = self._require(number, *(("driven",) if role == "score" else ("driven", "scored")))
         if role == "score":
-            self._refuse_closed(self._require(number, "driven"))
+            self._refuse_closed(trial)
+        if role == "correction" and not trial.is_closed:
+            raise LedgerError(
+                f"The generation of trial {number} is not closed yet: withdraw its score (undo) and enter a new one."
+                if trial.condition
+                else f"Trial {number} of a command needs no correction: withdraw its score (undo) and enter a new one."
+            )
+        if role == "second" and score.who in self._counters(number):
+            raise LedgerError(
+                f"{score.who!r} already counted the cells of trial {number}. A second count must be by "
+                "another person: name them (--who NAME). Nothing was entered."
+            )
+        self._enter(number, replace(score, cells=cells), role)
+
+    def _enter(self, number: int, score: Score, role: ScoreRole) -> None:
+        """Enter a score, which was checked."""
+        if role == "score":
             self._run("UPDATE trials SET state = 'scored' WHERE id = ?", number)
-        else:
-            trial = self._require(number, "driven", "scored")
-            if role == "correction" and not trial.is_closed:
-                raise LedgerError(
-                    f"The generation of trial {number} is not closed yet: withdraw its score (undo) and enter "
-                    "a new one."
-                )
-            if role == "second" and score.who in self._counters(number):
-                raise LedgerError(
-                    f"{score.who!r} already counted the cells of trial {number}. A second count must be by "
-                    "another person: name them (--who NAME). Nothing was entered."
-                )
         self._run(
             "INSERT INTO scores (trial, cells, n_ends, path, role, who, time) VALUES (?, ?, ?, ?, ?, ?, ?)",
-            *(number, _json(cells), score.n_ends, None if score.path is None else _json(score.path)),
-            *(role, score.who, _now()),
+            *(number, _json(list(score.cells)), score.n_ends),
+            *(None if score.path is None else _json(score.path), role, score.who, _now()),
         )
-        details: dict[str, Any] = {"who": score.who, "n_cells": len(cells)}
+        details: dict[str, Any] = {"who": score.who, "n_cells": len(score.cells)}
         if score.photo is not None:
             details["photo"] = asdict(score.photo)
         self._note_event(number, {"score": "scored"}.get(role, role), details)
@@ -370,14 +529,17 @@ class Ledger(LedgerReader):
 
     def _checked(self, number: int, cells: Sequence[int]) -> list[int]:
         """Return cells of a trial, each at most once, all within its grid, and at least the one it starts in."""
-        row = self._one(
-            "SELECT n_cells FROM conditions JOIN trials ON trials.condition = conditions.name WHERE trials.id = ?",
-            number,
+        trial = self.trial(number)
+        if trial.purpose in NO_LINE or (not trial.condition and self.head().observe == "readings"):
+            raise LedgerError(
+                f"The cells of trial {number} ({trial.name}) are not counted. Nothing was entered."
+            )
+        (n_cells,) = (
+            self._one("SELECT n_cells FROM conditions WHERE name = ?", trial.condition)
+            or self._one("SELECT n_cells FROM head")
+            or (0,)
         )
-        if row is None:
-            self.trial(number)
-            return []
-        return checked_cells(cells, row["n_cells"])
+        return checked_cells(cells, n_cells)
 
     def _void(self, number: int, reason: str) -> None:
         if not reason.strip():
@@ -385,6 +547,8 @@ class Ledger(LedgerReader):
         trial = self.trial(number)
         self._run("UPDATE trials SET state = 'void', reason = ? WHERE id = ?", reason, number)
         self._note_event(number, "void", {"reason": reason, "was": trial.state})
+        if not trial.condition:
+            return
         turn = Turn(
             trial.condition, trial.replicate, trial.generation, trial.individual,
             trial.sheet, trial.pen, f"{trial.code.split('-')[0]}-{trial.attempt + 2}",
@@ -424,3 +588,9 @@ def _json(value: Any) -> str:
 
 def _now() -> str:
     return datetime.datetime.now(datetime.UTC).isoformat(timespec="milliseconds")
+
+
+def _short(value: Any) -> str:
+    if isinstance(value, Mapping):
+        return f"{value.get('name', '...')!r}"
+    return repr(value)

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from realitygap._limits import parse_json
 from realitygap.errors import LedgerError, RecordVersionError
-from realitygap.records._ledger_schema import APPLICATION, LEDGER_FORMAT, SCHEMA, TABLE_NAMES
+from realitygap.records._ledger_schema import APPLICATION, LEDGER_FORMAT, SCHEMA, SCHEMA_1, TABLE_NAMES
 from realitygap.settings import shown
 
 _COMMENT_OR_SPACE = re.compile(r"('[^']*')|(?:--[^\n]*|[ \t\n\f\r])+")
@@ -33,6 +33,8 @@ _KEYS = {
     "sittings": ("id",),
     "generations": ("condition", "replicate", "generation"),
     "individuals": ("condition", "replicate", "generation", "individual"),
+    "head": ("id",),
+    "controllers": ("id",),
     "trials": ("id",),
     "steps": ("trial", "step"),
     "scores": ("id",),
@@ -44,6 +46,8 @@ _JSON = {
     "conditions": ("settings",),
     "sittings": ("robot", "preflight"),
     "individuals": ("parents", "genome"),
+    "head": ("head",),
+    "trials": ("record",),
     "steps": ("raw", "readings"),
     "scores": ("cells", "path"),
     "events": ("details",),
@@ -68,11 +72,11 @@ class _Rule:
     broken: str
 
 
-def check_ledger(connection: sqlite3.Connection, path: Path) -> None:
-    """Raise an error unless the ledger is one that this program could have written.
+def check_origin(connection: sqlite3.Connection, path: Path) -> int:
+    """Return the format of a ledger, whose schema is ours: only then its rows may be read.
 
     Raises:
-        LedgerError: The file is foreign, or damaged; the message names the first row that does not fit.
+        LedgerError: The file is foreign, or its schema is.
         RecordVersionError: It has another format.
         sqlite3.Error: SQLite cannot read it.
     """
@@ -83,11 +87,23 @@ def check_ledger(connection: sqlite3.Connection, path: Path) -> None:
             f"{path} is {'empty' if not path.stat().st_size else 'not a ledger of realitygap'}, and was not "
             "changed. Restore the ledger from a copy, or move the file elsewhere."
         )
-    if version != LEDGER_FORMAT:
+    if version not in (1, LEDGER_FORMAT):
         raise RecordVersionError(
-            f"{path} is a ledger of format {version}; this realitygap reads format {LEDGER_FORMAT}. Use the version "
-            "that wrote it."
+            f"{path} is a ledger of format {version}; this realitygap reads formats 1 and {LEDGER_FORMAT}. Use the "
+            "version that wrote it."
         )
+    for problem in _foreign_schema(connection, SCHEMA_1 if version == 1 else SCHEMA):
+        raise LedgerError(damaged(path, problem))
+    return int(version)
+
+
+def check_ledger(connection: sqlite3.Connection, path: Path) -> None:
+    """Raise an error unless the rows of a ledger of our schema are such as this program could have written.
+
+    Raises:
+        LedgerError: It is damaged; the message names the first row that does not fit.
+        sqlite3.Error: SQLite cannot read it.
+    """
     for problem in _problems(connection):
         raise LedgerError(damaged(path, problem))
 
@@ -102,7 +118,6 @@ def damaged(path: Path, problem: str) -> str:
 
 def _problems(connection: sqlite3.Connection) -> Iterator[str]:
     """Yield what is wrong. Each check relies on those before it."""
-    yield from _foreign_schema(connection)
     (message,) = connection.execute("PRAGMA quick_check(1)").fetchone()
     if message != "ok":
         yield str(message)
@@ -130,9 +145,9 @@ def _problems(connection: sqlite3.Connection) -> Iterator[str]:
             yield f"table conditions, name {shown(name)}: settings: {error}"
 
 
-def _foreign_schema(connection: sqlite3.Connection) -> Iterator[str]:
+def _foreign_schema(connection: sqlite3.Connection, schema: str) -> Iterator[str]:
     """Yield the first entry of the schema that is not ours, or that is missing."""
-    ours = _schema()
+    ours = _entries(schema)
     found = set()
     for kind, name, table, sql in connection.execute("SELECT type, name, tbl_name, sql FROM sqlite_schema"):
         entry = (kind, name, table, None if sql is None else _plain(sql))
@@ -149,10 +164,10 @@ def _plain(sql: str) -> str:
 
 
 @functools.cache
-def _schema() -> frozenset[tuple[str, str, str, str | None]]:
+def _entries(schema: str) -> frozenset[tuple[str, str, str, str | None]]:
     """Return the schema of an empty ledger, as SQLite keeps it."""
     with contextlib.closing(sqlite3.connect(":memory:")) as connection:
-        connection.executescript(SCHEMA)
+        connection.executescript(schema)
         rows = connection.execute("SELECT type, name, tbl_name, sql FROM sqlite_schema").fetchall()
     return frozenset(
         (kind, name, table, None if sql is None else _plain(sql)) for kind, name, table, sql in rows
@@ -232,8 +247,8 @@ _GENOME = {
 _RUN = "condition = own.condition AND replicate = own.replicate"
 _GENERATION = f"{_RUN} AND generation = own.generation"
 _N_CELLS = (
-    "(SELECT n_cells FROM trials JOIN conditions ON conditions.name = trials.condition "
-    "WHERE trials.id = own.trial)"
+    "coalesce((SELECT n_cells FROM trials JOIN conditions ON conditions.name = trials.condition "
+    "WHERE trials.id = own.trial), (SELECT n_cells FROM head))"
 )
 
 _RULES = (
@@ -272,7 +287,20 @@ _RULES = (
         "own.key GLOB '*[^0-9]*' OR length(own.key) NOT BETWEEN 1 AND 20 "
         f"OR (length(own.key) = 20 AND own.key > '{2**64 - 1}')",
     ),
-    *(_whole("trials", name) for name in ("id", "attempt", "place", "sheet", "pen", "n_steps", "stalls")),
+    _whole("head", "n_cells", 1),
+    _json_of("head", "head", "object"),
+    *(
+        _whole("trials", name)
+        for name in ("id", "attempt", "place", "sheet", "pen", "n_steps", "stalls")
+    ),
+    _json_of("trials", "record", "object"),
+    _Rule(
+        "trials", "condition", "one, or else a purpose, a number, a record, and a head",
+        "CASE WHEN own.condition IS NOT NULL THEN own.replicate IS NULL OR own.generation IS NULL "
+        "OR own.individual IS NULL OR own.sheet IS NULL OR own.pen IS NULL OR own.code IS NULL "
+        "OR own.purpose IS NOT NULL ELSE own.purpose IS NULL OR own.number IS NULL OR own.end IS NULL "
+        "OR own.record IS NULL OR NOT EXISTS (SELECT 1 FROM head) END",
+    ),
     _whole("steps", "step"),
     _finite("steps", "time", 0.0, 1e9),
     _finite("steps", "move", -1.0, 1.0),
@@ -337,7 +365,7 @@ _RULES = (
     ),
     _Rule(
         "trials", "sitting", "the sitting in which it was driven",
-        "own.state IN ('driven', 'scored') AND own.sitting IS NULL",
+        "own.state IN ('driven', 'scored') AND own.condition IS NOT NULL AND own.sitting IS NULL",
     ),
     _Rule(
         "conditions", "label", "EMULATED or REAL, because trials were driven",
@@ -345,6 +373,7 @@ _RULES = (
     ),
     _Rule(
         "trials", "n_steps", "the number of its rows in steps, at most one less",
+        "own.record IS NULL AND "
         "(SELECT count(*) FROM steps WHERE trial = own.id) - coalesce(own.n_steps, 0) NOT BETWEEN 0 AND 1",
     ),
     _Rule(

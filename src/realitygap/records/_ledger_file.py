@@ -7,7 +7,7 @@ import os
 import secrets
 import sqlite3
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +15,8 @@ from realitygap._limits import MOST_TEXT_BYTES
 from realitygap.errors import LedgerError
 from realitygap.records._files import sync_folder
 from realitygap.records._inside import refuse_links, refuse_other_names
-from realitygap.records._ledger_check import check_ledger, damaged
-from realitygap.records._ledger_schema import APPLICATION, LEDGER_FORMAT, SCHEMA
+from realitygap.records._ledger_check import check_ledger, check_origin, damaged
+from realitygap.records._ledger_schema import APPLICATION, FROM_1, LEDGER_FORMAT, SCHEMA
 
 _ENDINGS = ("", "-wal", "-shm", "-journal")
 """Endings of the names of a ledger and of the files that SQLite writes next to it."""
@@ -36,15 +36,19 @@ _SETTLED_S = 2.0
 _INDEX_HEAD = 48
 """Bytes at the beginning of the index of recent writes, which differ after each change."""
 
-_checked: dict[Path, tuple[tuple[Any, ...], LedgerError | None]] = {}
-"""Result of the last check of each ledger, with the state of its files."""
+_checked: dict[Path, tuple[tuple[Any, ...], LedgerError | int]] = {}
+"""Result of the last check of each ledger, an error or its format, with the state of its files."""
 
 SYNCHRONOUS = "FULL"
 """Time at which SQLite waits for the disk: at every commit."""
 
 
-def create_file(path: Path) -> None:
-    """Make an empty ledger in a temporary file first, so that its path never has an incomplete one.
+def create_file(path: Path, fill: Callable[[sqlite3.Connection], None] = lambda _: None) -> None:
+    """Make a ledger in a temporary file first, so that its path never has an incomplete one.
+
+    Args:
+        path: Path of the ledger.
+        fill: Writes the first rows.
 
     Raises:
         LedgerError: something is there, or it cannot be written.
@@ -55,13 +59,11 @@ def create_file(path: Path) -> None:
     try:
         with speaking(path):
             if path.exists():
-                raise LedgerError(f"{path} exists already. A ledger is never replaced. Name another folder.")
+                raise LedgerError(f"{path} exists already. A ledger is never replaced. Name another file.")
             connection = sqlite3.connect(temporary, isolation_level=None)
             try:
-                connection.executescript(
-                    f"PRAGMA synchronous = {SYNCHRONOUS}; PRAGMA application_id = {APPLICATION}; "
-                    f"PRAGMA user_version = {LEDGER_FORMAT};\nBEGIN;{SCHEMA}COMMIT;"
-                )
+                make_empty(connection)
+                fill(connection)
                 connection.execute("PRAGMA journal_mode = WAL")
             finally:
                 connection.close()
@@ -73,8 +75,17 @@ def create_file(path: Path) -> None:
                 temporary.with_name(temporary.name + ending).unlink(missing_ok=True)
 
 
+def make_empty(connection: sqlite3.Connection) -> None:
+    """Make the tables of a ledger."""
+    connection.row_factory = sqlite3.Row
+    connection.executescript(
+        f"PRAGMA synchronous = {SYNCHRONOUS}; PRAGMA application_id = {APPLICATION}; "
+        f"PRAGMA user_version = {LEDGER_FORMAT};\nBEGIN;{SCHEMA}COMMIT;"
+    )
+
+
 def connect(path: Path, *, writable: bool) -> sqlite3.Connection:
-    """Return a connection to a ledger that is whole.
+    """Return a connection to a ledger that is whole. One of format 1 is converted; if it is only read, a copy is.
 
     Raises:
         LedgerError: it is missing, torn, foreign or locked.
@@ -92,16 +103,29 @@ def connect(path: Path, *, writable: bool) -> sqlite3.Connection:
             _address(path, writable=writable), uri=True, isolation_level=None, timeout=_PATIENCE_S
         )
         try:
-            connection.row_factory = sqlite3.Row
             connection.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, MOST_TEXT_BYTES)
             connection.execute("PRAGMA trusted_schema = OFF")
-            _check_once(connection, path)
+            if _check_once(connection, path) == 1:
+                if writable:
+                    connection.executescript(FROM_1)
+                else:
+                    with contextlib.closing(connection) as old:
+                        connection = _converted(old)
+            connection.row_factory = sqlite3.Row
             connection.execute("PRAGMA foreign_keys = ON")
             connection.execute(f"PRAGMA synchronous = {SYNCHRONOUS}")
         except BaseException:
             connection.close()
             raise
     return connection
+
+
+def _converted(old: sqlite3.Connection) -> sqlite3.Connection:
+    """Return a copy, in memory, of a ledger of format 1 in the present format."""
+    copy = sqlite3.connect(":memory:", isolation_level=None)
+    old.backup(copy)
+    copy.executescript(FROM_1)
+    return copy
 
 
 def ledger_stamp(path: Path) -> tuple[Any, ...]:
@@ -121,27 +145,38 @@ def ledger_stamp(path: Path) -> tuple[Any, ...]:
     return tuple(found)
 
 
-def _check_once(connection: sqlite3.Connection, path: Path) -> None:
-    """Check a ledger unless this program has checked it since its last change.
+def _check_once(connection: sqlite3.Connection, path: Path) -> int:
+    """Return the format of a ledger; check it unless this program has checked it since its last change.
 
     Raises:
         LedgerError: It is foreign or damaged, or its checks take too long.
     """
     stamp = ledger_stamp(path)
-    known, error = _checked.get(path, ((), None))
+    known, result = _checked.get(path, ((), LEDGER_FORMAT))
     if known != stamp:
-        error = None
         try:
-            with speaking(path, connection):
-                check_ledger(connection, path)
-        except LedgerError as raised:
-            if isinstance(raised.__cause__, sqlite3.Error):  # such as a lock, which may be gone the next time
+            result = _check(connection, path)
+        except LedgerError as error:
+            if isinstance(error.__cause__, sqlite3.Error):  # such as a lock, which may be gone the next time
                 raise
-            error = raised
+            result = error
         if time.time() - path.stat().st_mtime > _SETTLED_S:
-            _checked[path] = (stamp, error)
-    if error is not None:
-        raise type(error)(str(error))
+            _checked[path] = (stamp, result)
+    if isinstance(result, LedgerError):
+        raise type(result)(str(result))
+    return result
+
+
+def _check(connection: sqlite3.Connection, path: Path) -> int:
+    """Return the format of a ledger, all of which is checked."""
+    with speaking(path, connection):
+        version = check_origin(connection, path)
+        if version == LEDGER_FORMAT:
+            check_ledger(connection, path)
+            return version
+        with contextlib.closing(_converted(connection)) as copy, speaking(path, copy):
+            check_ledger(copy, path)
+    return version
 
 
 def _address(path: Path, *, writable: bool) -> str:

@@ -63,10 +63,13 @@ class Trial(ShownAsCard):
     """A trial as the ledger has it; `trial` is its number.
 
     Attributes:
+        condition: Condition of a study; empty if a command drove the trial, which has a purpose instead.
         place: Place in the order of trials, ascending.
         attempt: 0, and one more for each trial of the individual that was void.
         cells: Cells as entered and not undone; None before.
         is_closed: True if its generation is closed, so that its score is frozen.
+        purpose: Purpose of a trial of a command, as in `TrialRecord`; empty in a study.
+        controller: Number of its controller in the ledger, from 1 on; None in a study, or if commands were given.
     """
 
     trial: int
@@ -87,6 +90,8 @@ class Trial(ShownAsCard):
     stalls: int | None
     cells: tuple[int, ...] | None
     is_closed: bool
+    purpose: str = ""
+    controller: int | None = None
 
     def __repr__(self) -> str:
         cells = "" if self.cells is None else f", {len(self.cells)} cells"
@@ -96,6 +101,9 @@ class Trial(ShownAsCard):
     def name(self) -> str:
         """Name of the trial in words."""
         again = f" (attempt {self.attempt + 1})" if self.attempt else ""
+        if not self.condition:
+            controller = "" if self.controller is None else f", controller {self.controller}"
+            return f"{self.purpose}{controller}{again}"
         run = f"{self.condition}, run {self.replicate}"
         return f"{run}, generation {self.generation}, individual {self.individual}{again}"
 
@@ -124,6 +132,9 @@ PATH_PARTS = 4
 
 ROBOT = "robot"
 """Name of the scorer if no person counted cells, because the robot's own readings score the task."""
+
+OBSERVER = "observer"
+"""Name of the scorer if the cells are those of the person, camera, or witness that observed a trial of a command."""
 
 
 @dataclass(frozen=True)

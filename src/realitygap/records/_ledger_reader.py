@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import sqlite3
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Self
 
@@ -13,6 +14,7 @@ from realitygap._closed_on_exit import ClosedOnExit
 from realitygap._limits import parse_json
 from realitygap.drawing import ShownAsCard
 from realitygap.errors import LedgerError
+from realitygap.records._ending import UNDER_WAY, EndReason
 from realitygap.records._ledger_file import connect, speaking
 from realitygap.records._ledger_kinds import (
     PATH_PARTS,
@@ -20,16 +22,39 @@ from realitygap.records._ledger_kinds import (
     Trial,
     TrialState,
 )
+from realitygap.records._observations_file import (
+    Note,
+    Observations,
+    ObservationsHead,
+    head_from_dict,
+    trial_from_dict,
+)
 from realitygap.records._trial_record import TrialRecord
 from realitygap.settings import shown
+from realitygap.world import Arena
 
 _TRIALS = """
-SELECT trials.*, generations.closed IS NOT NULL AS is_closed, counted.cells
-FROM trials JOIN generations USING (condition, replicate, generation)
+SELECT trials.id, condition, replicate, generation, individual, attempt, place, sheet, pen, code, state, reason, end,
+    problem, n_steps, stalls, purpose, controller, generations.closed IS NOT NULL AS is_closed, counted.cells
+FROM trials LEFT JOIN generations USING (condition, replicate, generation)
     LEFT JOIN (
         SELECT trial, cells, max(id) FROM scores WHERE role = 'score' AND undone IS NULL GROUP BY trial
     ) AS counted ON counted.trial = trials.id
 """
+
+_OBSERVED = """
+SELECT trials.id, state, reason, end, problem, record, genome, (
+    SELECT cells FROM scores WHERE trial = trials.id AND role = 'score' AND undone IS NULL
+) AS cells, EXISTS (SELECT 1 FROM scores WHERE trial = trials.id AND role = 'score') AS was_counted
+FROM trials LEFT JOIN controllers ON controllers.id = trials.controller
+"""
+
+_ENDS: Mapping[str, EndReason] = {
+    "running": EndReason.RUNNING,
+    "driven": EndReason.DRIVEN,
+    "scored": EndReason.STEP_LIMIT,
+}
+"""Ends of trials of commands that are not void, by their state."""
 
 
 class LedgerReader(ClosedOnExit, ShownAsCard):
@@ -42,6 +67,7 @@ class LedgerReader(ClosedOnExit, ShownAsCard):
     def __init__(self, path: Path, connection: sqlite3.Connection) -> None:
         self.path = path
         self._connection = connection
+        (self._version,) = connection.execute("PRAGMA data_version").fetchone()
 
     @classmethod
     def open(cls, path: str | Path, *, writable: bool = True) -> Self:
@@ -57,10 +83,9 @@ class LedgerReader(ClosedOnExit, ShownAsCard):
             return f"{where}, damaged or closed)"
         labels = dict.fromkeys(str(about["label"]) for about in conditions.values() if about["label"])
         n_scored, n_whole = states.count("scored"), len(states) - states.count("void")
-        shown = [
-            f"{len(conditions)} condition{'s' * (len(conditions) != 1)}",
-            f"{n_scored:,}/{n_whole:,} trials scored",
-        ]
+        shown = [f"{n_scored:,}/{n_whole:,} trials scored"]
+        if conditions:
+            shown.insert(0, f"{len(conditions)} condition{'s' * (len(conditions) != 1)}")
         return ", ".join([where, *shown, *(["+".join(labels)] if labels else [])]) + ")"
 
     def close(self) -> None:
@@ -144,13 +169,83 @@ class LedgerReader(ClosedOnExit, ShownAsCard):
         where, values = ("", ()) if number is None else ("WHERE trial = ? ", (number,))
         return [dict(row) for row in self._all(f"SELECT * FROM notes {where}ORDER BY id", *values)]
 
+    # trials of a command
+
+    def head(self) -> ObservationsHead:
+        """Return what the trials of a command have in common.
+
+        Raises:
+            LedgerError: The ledger is that of a study.
+        """
+        row = self._one("SELECT head FROM head")
+        if row is None:
+            raise LedgerError(
+                f"{self.path} has the trials of a study. Name its folder, or a file in which a command saved trials."
+            )
+        try:
+            return head_from_dict(self._value(row["head"]))
+        except ValueError as error:
+            raise LedgerError(f"{self.path} is damaged: its head {error}.") from None
+
+    def origin(self) -> str:
+        """Return the SHA-256 of the file from which the trials of a command were converted; empty if there is none."""
+        row = self._one("SELECT origin FROM head")
+        return "" if row is None else str(row["origin"] or "")
+
+    @property
+    def arena(self) -> Arena:
+        """Arena of the trials of a command.
+
+        Raises:
+            LedgerError: The ledger is that of a study, or has no arena that can be read.
+        """
+        return arena_of(self.head().arena, self.path)
+
+    def has_changed(self) -> bool:
+        """Return whether another program has changed the ledger since the last call, or since it was opened."""
+        (version,) = self._all("PRAGMA data_version")[0]
+        before, self._version = self._version, version
+        return bool(version != before)
+
+    def observations(self) -> Observations:
+        """Return the trials of a command, in the order in which they began, and its notes.
+
+        Raises:
+            LedgerError: The ledger is that of a study.
+        """
+        head = self.head()
+        records = [self._observed(row) for row in self._all(f"{_OBSERVED}ORDER BY place")]
+        under_way = tuple(record for record in records if record.end in UNDER_WAY)
+        ended = tuple(record for record in records if record.end not in UNDER_WAY)
+        notes = tuple(
+            Note(trial=note["trial"], text=note["text"], who=note["who"], time=note["time"])
+            for note in self.notes()
+        )
+        return Observations(head, ended, "", under_way, notes)
+
+    def _observed(self, row: sqlite3.Row) -> TrialRecord:
+        """Return a trial of a command with the cells that count; one that a person declared void is aborted."""
+        try:
+            record = trial_from_dict({**self._value(row["record"]), "genome": row["genome"] or ""})
+        except ValueError as error:
+            raise LedgerError(f"{self.path} is damaged: trial {row['id']} is {error}.") from None
+        end, problem = _ENDS.get(row["state"]), row["problem"] or ""
+        if row["state"] == "void":
+            is_cut_off = row["end"] not in _ENDS.values()
+            end = row["end"] if is_cut_off else EndReason.ABORTED
+            problem = problem if is_cut_off else row["reason"] or ""
+        cells = self._numbers(row["cells"] or "[]") if row["was_counted"] else record.cells
+        return replace(record, end=str(end), problem=problem, cells=cells)
+
     def record(self, number: int) -> TrialRecord:
         """Return a trial as it was driven and observed.
 
-        It has poses if the driven path was recorded, and a last look if the robot had one. `step_s` is the median of
-        the times between commands. A trial that was not driven has no commands.
+        In a study, it has poses if the driven path was recorded, and a last look if the robot had one. `step_s` is
+        the median of the times between commands. A trial that was not driven has no commands.
         """
         trial, score = self.trial(number), self.counted_score(number)
+        if not trial.condition:
+            return self._observed(self._all(f"{_OBSERVED}WHERE trials.id = ?", number)[0])
         rows = self._all("SELECT * FROM steps WHERE trial = ? ORDER BY step", number)
         readings = [self._numbers(row["readings"]) for row in rows]
         raw = [self._numbers(row["raw"]) for row in rows]
@@ -203,7 +298,7 @@ class LedgerReader(ClosedOnExit, ShownAsCard):
 
     def used_codes(self) -> set[str]:
         """Return the codes that are names of trials."""
-        return {row["code"] for row in self._all("SELECT code FROM trials")}
+        return {row["code"] for row in self._all("SELECT code FROM trials WHERE code IS NOT NULL")}
 
     def last_sheet(self) -> int:
         """Return the highest number of a sheet of paper; 0 before the first."""
@@ -226,22 +321,13 @@ class LedgerReader(ClosedOnExit, ShownAsCard):
             return self._connection.execute(query, values).fetchall()
 
     def _trial(self, row: sqlite3.Row) -> Trial:
-        names = (
-            *(
-                "condition",
-                "replicate",
-                "generation",
-                "individual",
-                "attempt",
-                "place",
-                "sheet",
-                "pen",
-                "code",
-            ),
-            *("state", "reason", "end", "problem", "n_steps", "stalls"),
-        )
+        values = {name: row[name] for name in row.keys() if name not in ("id", "cells", "is_closed")}  # noqa: SIM118
         cells = None if row["cells"] is None else self._numbers(row["cells"])
-        given = {name: row[name] for name in names}
+        texts = {name: values[name] or "" for name in ("condition", "code", "purpose")}
+        numbers = {
+            name: values[name] or 0 for name in ("replicate", "generation", "individual", "sheet", "pen")
+        }
+        given = {**values, **texts, **numbers}
         return Trial(trial=row["id"], cells=cells, is_closed=bool(row["is_closed"]), **given)
 
     def _decoded(self, row: sqlite3.Row, *names: str) -> dict[str, Any]:
@@ -259,3 +345,15 @@ class LedgerReader(ClosedOnExit, ShownAsCard):
         if not isinstance(values, list) or not all(isinstance(each, int | float) for each in values):
             raise LedgerError(f"{self.path} is damaged: {shown(text)} is no list of numbers.")
         return tuple(values)
+
+
+def arena_of(values: Mapping[str, Any], path: Path) -> Arena:
+    """Return the arena of a head.
+
+    Raises:
+        LedgerError: The head of the trials in this file has none that can be read.
+    """
+    try:
+        return Arena.from_dict(dict(values))
+    except (KeyError, TypeError, ValueError) as error:
+        raise LedgerError(f"{path} is damaged: its head has no arena that can be read ({error}).") from None

@@ -1,9 +1,11 @@
-"""The schema of a ledger of physical trials."""
+"""The schema of a ledger: the trials of a study on a robot, or those that a command saved."""
 
 from __future__ import annotations
 
-LEDGER_FORMAT = 1
-"""Raised whenever the tables change; a ledger of another format is refused."""
+from collections.abc import Iterable
+
+LEDGER_FORMAT = 2
+"""Raised whenever the tables change. Format 1 is converted by `FROM_1`; a later one is refused."""
 
 APPLICATION = 0x52474C31
 """Marks the file as a ledger of ours ("RGL1"), in SQLite's `application_id`."""
@@ -52,17 +54,28 @@ CREATE TABLE individuals (
     PRIMARY KEY (condition, replicate, generation, individual),
     FOREIGN KEY (condition, replicate, generation) REFERENCES generations(condition, replicate, generation)
 );
+CREATE TABLE head (  -- what the trials of a command have in common; no row in a study
+    id INTEGER PRIMARY KEY CHECK (id = 1),
+    began TEXT NOT NULL,  -- UTC
+    n_cells INTEGER NOT NULL,  -- of the arena's grid
+    head TEXT NOT NULL,  -- JSON: target, label, robot, arena, step_s, observe, identity
+    origin TEXT  -- SHA-256 of the JSON lines that were converted
+);
+CREATE TABLE controllers (  -- that a command drove
+    id INTEGER PRIMARY KEY,
+    genome TEXT NOT NULL UNIQUE  -- JSON
+);
 CREATE TABLE trials (
     id INTEGER PRIMARY KEY,
-    condition TEXT NOT NULL,
-    replicate INTEGER NOT NULL,
-    generation INTEGER NOT NULL,
-    individual INTEGER NOT NULL,
+    condition TEXT,  -- this and the next three: of a study
+    replicate INTEGER,
+    generation INTEGER,
+    individual INTEGER,
     attempt INTEGER NOT NULL,  -- 0, and one more for each trial that was void
     place INTEGER NOT NULL,  -- when its turn comes: ascending
-    sheet INTEGER NOT NULL,  -- of paper
-    pen INTEGER NOT NULL,  -- on the sheet
-    code TEXT NOT NULL UNIQUE,  -- what the operator knows it by when scoring is blind
+    sheet INTEGER,  -- of paper, in a study
+    pen INTEGER,  -- on the sheet
+    code TEXT UNIQUE,  -- what the operator knows it by when scoring is blind
     state TEXT NOT NULL CHECK (state IN ('planned', 'running', 'driven', 'scored', 'void')),
     reason TEXT,  -- why it is void
     end TEXT,  -- why it ended
@@ -72,6 +85,10 @@ CREATE TABLE trials (
     sitting INTEGER REFERENCES sittings(id),
     started TEXT,  -- UTC
     driven TEXT,  -- UTC
+    purpose TEXT,  -- this and the next three: of a command
+    number INTEGER,  -- on its platform, which selects its noise
+    controller INTEGER REFERENCES controllers(id),  -- NULL if commands were given
+    record TEXT,  -- JSON: the trial as driven and observed, without its controller
     UNIQUE (condition, replicate, generation, individual, attempt),
     FOREIGN KEY (condition, replicate, generation, individual)
         REFERENCES individuals(condition, replicate, generation, individual)
@@ -114,15 +131,28 @@ CREATE TABLE events (  -- everything that changed a trial, in order
 );
 """
 
+_NEW_NAMES = ("head", "controllers", "trials")
+"""Tables that format 1 lacks, or has in another form."""
+
 TABLE_NAMES = (
-    "conditions", "sittings", "generations", "individuals", "trials", "steps", "scores", "notes", "events"
+    "conditions", "sittings", "generations", "individuals", "head", "controllers", "trials", "steps", "scores", "notes",
+    "events",
 )  # fmt: skip
 
-NO_DELETING = "".join(
-    f"CREATE TRIGGER {name}_stay BEFORE DELETE ON {name} "
-    "BEGIN SELECT RAISE(ABORT, 'nothing is ever deleted from a ledger'); END;\n"
-    for name in TABLE_NAMES
-)
+
+def _no_deleting(names: Iterable[str]) -> str:
+    return "".join(
+        f"CREATE TRIGGER {name}_stay BEFORE DELETE ON {name} "
+        "BEGIN SELECT RAISE(ABORT, 'nothing is ever deleted from a ledger'); END;\n"
+        for name in names
+    )
+
+
+def ledger_tables() -> dict[str, str]:
+    """Return the SQL of each table, with remarks on columns that need one."""
+    parts = [part.strip() + ";" for part in TABLES.split(";\n") if part.strip()]
+    return {part.split()[2]: part for part in parts}
+
 
 FROZEN = """
 CREATE TRIGGER closed_generations_stay BEFORE UPDATE ON generations WHEN OLD.closed IS NOT NULL
@@ -131,11 +161,38 @@ CREATE TRIGGER closed_individuals_stay BEFORE UPDATE ON individuals WHEN OLD.fit
 BEGIN SELECT RAISE(ABORT, 'the generation is closed'); END;
 """
 
-SCHEMA = TABLES + NO_DELETING + FROZEN
+SCHEMA = TABLES + _no_deleting(TABLE_NAMES) + FROZEN
 """SQL that makes an empty ledger."""
 
+_TRIALS_1 = """
+CREATE TABLE trials ( id INTEGER PRIMARY KEY, condition TEXT NOT NULL, replicate INTEGER NOT NULL,
+generation INTEGER NOT NULL, individual INTEGER NOT NULL, attempt INTEGER NOT NULL, place INTEGER NOT NULL,
+sheet INTEGER NOT NULL, pen INTEGER NOT NULL, code TEXT NOT NULL UNIQUE,
+state TEXT NOT NULL CHECK (state IN ('planned', 'running', 'driven', 'scored', 'void')), reason TEXT, end TEXT,
+problem TEXT, n_steps INTEGER, stalls INTEGER, sitting INTEGER REFERENCES sittings(id), started TEXT, driven TEXT,
+UNIQUE (condition, replicate, generation, individual, attempt),
+FOREIGN KEY (condition, replicate, generation, individual)
+REFERENCES individuals(condition, replicate, generation, individual) );
+"""
 
-def ledger_tables() -> dict[str, str]:
-    """Return the SQL of each table, with remarks on columns that need one."""
-    parts = [part.strip() + ";" for part in TABLES.split(";\n") if part.strip()]
-    return {part.split()[2]: part for part in parts}
+SCHEMA_1 = (
+    "\n".join(sql for name, sql in ledger_tables().items() if name not in _NEW_NAMES)
+    + _TRIALS_1
+    + _no_deleting(name for name in TABLE_NAMES if name not in _NEW_NAMES[:2])
+    + FROZEN
+)
+"""SQL that made an empty ledger of format 1."""
+
+FROM_1 = f"""
+PRAGMA legacy_alter_table = ON;  -- other tables go on referring to trials
+BEGIN IMMEDIATE;
+ALTER TABLE trials RENAME TO trials_of_format_1;
+{"".join(ledger_tables()[name] for name in _NEW_NAMES)}
+INSERT INTO trials SELECT *, NULL, NULL, NULL, NULL FROM trials_of_format_1;
+DROP TABLE trials_of_format_1;
+{_no_deleting(_NEW_NAMES)}
+PRAGMA user_version = {LEDGER_FORMAT};
+COMMIT;
+PRAGMA legacy_alter_table = OFF;
+"""
+"""SQL that converts a ledger of format 1: as a whole or not at all."""

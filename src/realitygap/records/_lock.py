@@ -1,4 +1,4 @@
-"""A lock that admits one writer at a time to a folder of results."""
+"""A lock that admits one writer at a time to a folder of results, or to the trials of a command."""
 
 from __future__ import annotations
 
@@ -20,15 +20,19 @@ LOCK_NAME = ".lock"
 
 
 class FolderLock:
-    """A lock on a folder which the operating system releases when the holder dies, however it dies.
+    """A lock on a folder, or a file, which the operating system releases when the holder dies, however it dies.
 
-    The holder may take it again, also from other threads; it is released with the last of them. The file
-    stays where it is: removing it would let two writers lock two different files of one name.
+    The holder may take it again, also from other threads; it is released with the last of them. The lock's own file
+    stays in a folder; next to a file it is removed, and whoever locked a removed one takes the lock again.
+
+    Args:
+        folder: Folder of the lock.
+        file: Name of the locked file in the folder. Default: the folder is locked.
     """
 
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
-        self._path = folder / LOCK_NAME
+    def __init__(self, folder: Path, file: str = "") -> None:
+        self._folder, self._locked = folder, folder / file
+        self._path = folder / (f".{file}{LOCK_NAME}" if file else LOCK_NAME)
         self._mutex = threading.Lock()
         self._depth = 0
         self._descriptor = -1
@@ -61,25 +65,40 @@ class FolderLock:
             descriptor = open_inside(self._folder, self._path, os.O_RDWR | os.O_CREAT)
         try:
             lock_descriptor(descriptor)
+            if not self._is_there(descriptor):
+                os.close(descriptor)
+                self._take()
+                return
         except (BlockingIOError, PermissionError) as error:
             holder = _read_holder(descriptor)
             os.close(descriptor)
             raise RecordError(
-                f"{self._folder} is in use: {holder} writes to it. "
-                "Wait until it ends, stop it, or name another folder."
+                f"{self._locked} is in use: {holder} writes to it. Wait until it ends, stop it, or name another "
+                f"{'folder' if self._locked == self._folder else 'file'}."
             ) from error
         except OSError as error:
             warnings.warn(
-                f"{self._folder}: this file system cannot lock files ({error.strerror}). "
-                "Make sure yourself that only one process at a time writes to this folder.",
+                f"{self._locked}: this file system cannot lock files ({error.strerror}). "
+                "Make sure yourself that only one process at a time writes to it.",
                 RecordWarning,
                 stacklevel=5,
             )
         self._descriptor = descriptor
         _write_holder(descriptor, f"process {os.getpid()} on {socket.gethostname()}")
 
+    def _is_there(self, descriptor: int) -> bool:
+        """Return whether the open file is still the one at the path."""
+        try:
+            return os.path.samestat(os.fstat(descriptor), self._path.stat())
+        except FileNotFoundError:
+            return False
+
     def _drop(self) -> None:
-        _write_holder(self._descriptor, "")
+        if self._locked == self._folder:
+            _write_holder(self._descriptor, "")
+        else:
+            with contextlib.suppress(OSError):  # Windows removes no file that is open
+                self._path.unlink()
         os.close(self._descriptor)
         self._descriptor = -1
 

@@ -1,16 +1,13 @@
-"""A file of observed trials, one line of JSON for each, which are stored as they end.
+"""Observed trials as lines of JSON, for other programs. The first line says of what, where and how much was observed.
 
-The first line says of what, where and how much was observed. A trial is on the disk when `append` returns; a crash in
-the midst of a line costs that trial and no other. A robot's trial has a line when it begins and, if a person has to say
-what they saw, one when the robot has driven: after a crash the file says which trial was under way.
+Commands of realitygap 0.1 saved their trials in such files: a robot's trial has a line when it begins and, if a person
+has to say what they saw, one when the robot has driven. A crash in the midst of a line costs that trial and no other.
 """
 
 from __future__ import annotations
 
-import datetime
 import json
 import math
-import os
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -19,16 +16,13 @@ from typing import Any, TypedDict
 import numpy as np
 from numpy.typing import NDArray
 
-from realitygap._closed_on_exit import ClosedOnExit
 from realitygap._limits import MOST_LINES_BYTES, LimitError, parse_json, read_file
 from realitygap._version import __version__
 from realitygap.errors import RecordError
 
 from ._ending import UNDER_WAY
 from ._files import reading
-from ._inside import open_inside
-from ._lock import lock_descriptor
-from ._output import refuse_results, write_whole
+from ._output import write_whole
 from ._trial_record import OBSERVATIONS, Observe, TrialRecord
 
 OBSERVATIONS_FORMAT = "realitygap observations 1"
@@ -174,132 +168,6 @@ def _table(name: str, values: Mapping[str, Any]) -> NDArray[np.float64]:
     return table
 
 
-class ObservationsFile(ClosedOnExit):
-    """A file to which trials are added as they end.
-
-    An existing file is extended. An incomplete last line is cut off and described in `problem`. A target whose identity
-    is known on both sides may have another name, such as another port.
-
-    Args:
-        path: Path of the file. It is made if it does not exist.
-        head: Common values of its trials.
-        within: The folder that the user named, if the name of the file in it is not the user's.
-
-    Attributes:
-        trials: Trials in the file when it was opened.
-        under_way: Trials that never ended, by purpose, number, and controller; `append` adds and removes them.
-        problem: Description of what was cut off; empty if nothing was.
-
-    Raises:
-        RecordError: It is another file, of another target, damaged, or cannot be written.
-    """
-
-    def __init__(self, path: Path | str, head: ObservationsHead, *, within: Path | None = None) -> None:
-        self.path = Path(path)
-        if within is None and self.path.is_symlink():  # the user named it
-            self.path = self.path.resolve()
-        self._within = self.path.parent if within is None else within
-        self.head = head
-        self.trials: tuple[TrialRecord, ...] = ()
-        self.under_way: dict[tuple[str, int, str], TrialRecord] = {}
-        self.problem = ""
-        refuse_results(self.path)
-        held = self._take_up()
-        try:
-            descriptor = open_inside(self._within, self.path, os.O_RDWR | os.O_CREAT)
-            self._file = os.fdopen(descriptor, "r+b", buffering=0)
-            self._lock()
-            self._file.truncate(held)
-            self._file.seek(max(held - 1, 0))
-            if not held:
-                self._write(_first_line(head))
-            elif self._file.read(1) != b"\n":
-                self._write(b"\n")  # the last line is whole, and only its end was cut off
-        except OSError as error:
-            raise self._cannot(error) from error
-
-    def _take_up(self) -> int:
-        """Return the number of existing bytes to keep."""
-        if not self.path.exists():
-            return 0
-        with reading(self.path):
-            data = read_file(self.path, MOST_LINES_BYTES, plain=True)
-        if b"\n" not in data and _first_line(self.head).startswith(data):
-            return 0  # a crash while the first line was written
-        found, held = _parse(self.path, data)
-        there, wanted = found.head.to_dict(), self.head.to_dict()
-        of_no_matter = not_compared(there, wanted)
-        other = [name for name in wanted if name != of_no_matter and there[name] != wanted[name]]
-        if other and not found.trials and not found.under_way:
-            return 0  # it has no trials, so it may be rewritten
-        if other:
-            what = "; ".join(f"{name} {_short(there[name])} and not {_short(wanted[name])}" for name in other)
-            raise RecordError(
-                f"{self.path} has trials of another kind: {what}. They cannot be combined. Name another file."
-            )
-        self.trials, self.problem = found.trials, found.problem
-        for trial in found.under_way:
-            _keep_under_way(self.under_way, trial)
-        return held
-
-    def append(self, trial: TrialRecord) -> None:
-        """Keep a trial; it is on the disk when this returns.
-
-        Raises:
-            RecordError: It cannot be written; what was kept before is safe.
-        """
-        try:
-            self._write(_line(trial_to_dict(trial)))
-        except OSError as error:
-            raise self._cannot(error) from error
-        _keep_under_way(self.under_way, trial)
-
-    def _lock(self) -> None:
-        """Keep other programs from writing to the file until it is closed.
-
-        Raises:
-            RecordError: Another program writes to it.
-        """
-        try:
-            lock_descriptor(self._file.fileno())
-        except (BlockingIOError, PermissionError) as error:
-            self._file.close()
-            raise RecordError(
-                f"{self.path} is in use: another program saves trials in it. Wait until it ends, or name another "
-                "file."
-            ) from error
-        except OSError:  # this file system cannot lock files
-            pass
-
-    def note(self, text: str, who: str, trial: int | None = None) -> None:
-        """Keep a remark on a trial or on the whole file.
-
-        Raises:
-            RecordError: It cannot be written.
-        """
-        time = datetime.datetime.now(datetime.UTC).isoformat(timespec="milliseconds")
-        try:
-            self._write(_line({"note": text, "trial": trial, "who": who, "time": time}))
-        except OSError as error:
-            raise self._cannot(error) from error
-
-    def _write(self, line: bytes) -> None:
-        n = self._file.write(line)
-        os.fsync(self._file.fileno())
-        if n != len(line):
-            raise OSError(0, "it is full")
-
-    def _cannot(self, error: OSError) -> RecordError:
-        return RecordError(
-            f"Could not write {self.path}: {error.strerror or error}. Earlier trials are safe. Make room, or "
-            "name a file that can be written."
-        )
-
-    def close(self) -> None:
-        """Let go of it; safe to call twice."""
-        self._file.close()
-
-
 def write_observations(path: Path | str, head: ObservationsHead, trials: Iterable[TrialRecord]) -> None:
     """Write trials into a new file; an existing one is replaced.
 
@@ -309,37 +177,19 @@ def write_observations(path: Path | str, head: ObservationsHead, trials: Iterabl
     write_whole(Path(path), [_first_line(head), *(_line(trial_to_dict(trial)) for trial in trials)])
 
 
-def is_observations(path: Path | str) -> bool:
-    """Return whether a file begins as one with observed trials does, of this version or another."""
-    path = Path(path)
-    if not path.is_file():
-        return False
-    with reading(path), path.open("rb") as file:
-        return b"realitygap observations" in file.read(200)
-
-
-def read_observations(path: Path | str) -> Observations:
-    """Read the trials of a file; a torn last line is left out, and `problem` says so.
+def read_lines(path: Path) -> Observations:
+    """Read the trials of a file of JSON lines; a torn last line is left out, and `problem` says so.
 
     Raises:
-        RecordError: There is none, it is of another format, or damaged before its last line.
+        RecordError: It is of another format, or damaged before its last line.
     """
-    path = Path(path)
-    if not path.exists():
-        raise RecordError(f"There is no file {path}. Name one with observed trials.")
     with reading(path):
         data = read_file(path, MOST_LINES_BYTES)
-    return _parse(path, data)[0]
-
-
-def _parse(path: Path, data: bytes) -> tuple[Observations, int]:
-    """Return the content of a file, and the number of its bytes that are complete."""
-    first, newline, rest = data.partition(b"\n")
+    first, _, rest = data.partition(b"\n")
     head = _head(path, first)
     trials: list[TrialRecord] = []
     under_way: dict[tuple[str, int, str], TrialRecord] = {}
     notes: list[Note] = []
-    held = len(first) + len(newline)
     problem = ""
     lines = rest.split(b"\n")
     for number, line in enumerate(lines, 2):
@@ -358,20 +208,14 @@ def _parse(path: Path, data: bytes) -> tuple[Observations, int]:
                 f"{path}: the last line, {len(line)} bytes, was cut off in a crash, and its trial is lost."
             )
         else:
-            held += len(line) + (not is_last)
             if trial is not None:
-                _keep_under_way(under_way, trial)
-                if trial.end not in UNDER_WAY:
+                key = trial.purpose, trial.number, trial.genome
+                under_way.pop(key, None)
+                if trial.end in UNDER_WAY:
+                    under_way[key] = trial
+                else:
                     trials.append(trial)
-    return Observations(head, tuple(trials), problem, tuple(under_way.values()), tuple(notes)), held
-
-
-def _keep_under_way(under_way: dict[tuple[str, int, str], TrialRecord], trial: TrialRecord) -> None:
-    """Keep the trials that have not ended, by purpose, number, and controller."""
-    key = trial.purpose, trial.number, trial.genome
-    under_way.pop(key, None)
-    if trial.end in UNDER_WAY:
-        under_way[key] = trial
+    return Observations(head, tuple(trials), problem, tuple(under_way.values()), tuple(notes))
 
 
 def _note_from_dict(values: Mapping[str, Any]) -> Note:
@@ -404,12 +248,23 @@ def _head(path: Path, line: bytes) -> ObservationsHead:
             f"{path} is not a file of observed trials, or of another version: its first line does not say "
             f"{OBSERVATIONS_FORMAT!r}. Name one that this realitygap ({__version__}) wrote."
         )
-    values.setdefault("identity", "")
+    try:
+        return head_from_dict(values)
+    except ValueError as error:
+        raise RecordError(f"{path} is damaged: its first line {error}.") from None
+
+
+def head_from_dict(values: Mapping[str, Any]) -> ObservationsHead:
+    """Return the head that `ObservationsHead.to_dict` described.
+
+    Raises:
+        ValueError: Something is missing, or there is no such observation level.
+    """
+    values = {"identity": "", **values}
     names = ObservationsHead.__dataclass_fields__
     missing = [name for name in names if name not in values]
     if missing or values["observe"] not in OBSERVATIONS:
-        what = f"has no {', '.join(missing)}" if missing else f"says observe {values['observe']!r}"
-        raise RecordError(f"{path} is damaged: its first line {what}.")
+        raise ValueError(f"has no {', '.join(missing)}" if missing else f"says observe {values['observe']!r}")
     return ObservationsHead(**{name: values[name] for name in names})
 
 
@@ -419,9 +274,3 @@ def _first_line(head: ObservationsHead) -> bytes:
 
 def _line(values: Mapping[str, Any]) -> bytes:
     return json.dumps(values, separators=(",", ":"), allow_nan=False).encode() + b"\n"
-
-
-def _short(value: Any) -> str:
-    if isinstance(value, Mapping):
-        return f"{value.get('name', '...')!r}"
-    return repr(value)

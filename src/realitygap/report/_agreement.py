@@ -13,7 +13,7 @@ import scipy
 
 from realitygap._wording import between, counted
 from realitygap.errors import LedgerError
-from realitygap.records import LEDGER_NAME, Ledger
+from realitygap.records import Ledger, open_ledger
 from realitygap.stats import BCA_SMALLEST_N, CONFIDENCE, RESAMPLES, SEED, Estimate
 
 
@@ -57,7 +57,7 @@ def measure_agreement(folder: str | Path) -> Agreement:
     """Measure how well the second counts of trials agree with the first ones.
 
     Args:
-        folder: Folder of results with a ledger.
+        folder: Folder of results with a ledger, or a file in which a command saved trials.
 
     Raises:
         LedgerError: there is none, or no trial was counted by two.
@@ -65,15 +65,17 @@ def measure_agreement(folder: str | Path) -> Agreement:
     Source: Cohen (1960), Educational and Psychological Measurement 20(1). Cells of one line depend on each other, so
     the interval comes from a bootstrap (BCa) that resamples whole trials.
     """
-    with Ledger.open(Path(folder) / LEDGER_NAME, writable=False) as ledger:
+    with open_ledger(folder, writable=False) as ledger:
         first, second = _counted(ledger, "score"), _counted(ledger, "second")
         sizes = {name: about["n_cells"] for name, about in ledger.conditions().items()}
+        if not sizes:
+            sizes[""] = ledger.arena.grid.n_cells
         n_cells = {trial.trial: sizes[trial.condition] for trial in ledger.trials() if trial.state != "void"}
     both = sorted(first.keys() & second.keys() & n_cells.keys())
     if not both:
         raise LedgerError(
             f"{folder}: no trial was counted by two people yet. The second one enters what they see by `realitygap "
-            "trials score DIR --second`."
+            "trials score TRIALS --second`."
         )
     tables = np.array([_table(first[trial], second[trial], n_cells[trial]) for trial in both], np.float64)
     kappa = float(_kappa(*tables.T))

@@ -38,7 +38,6 @@ from ._tracked import (
     note_of_track,
     place_trial,
     score_tracked,
-    trial_of_file,
     trial_of_ledger,
 )
 from ._transfer.ordered import run_transfer
@@ -121,7 +120,6 @@ __all__ = [
     "task_named",
     "task_settings",
     "transfer",
-    "trial_of_file",
     "trial_of_ledger",
     "try_genome",
     "try_on",

@@ -13,7 +13,7 @@ from realitygap.calibration import ruled
 from realitygap.errors import RecordError, RobotError, StudyError
 from realitygap.records import (
     EndReason,
-    ObservationsFile,
+    Ledger,
     Observe,
     TrialRecord,
     is_taken_back,
@@ -56,7 +56,7 @@ class KeptTarget(ClosedOnExit):
     def __init__(
         self,
         target: Target,
-        file: ObservationsFile | None = None,
+        file: Ledger | None = None,
         *,
         operator: Operator | None = None,
         budget: int | None = None,
@@ -71,9 +71,11 @@ class KeptTarget(ClosedOnExit):
         self.budget, self.spent = budget, 0
         self._file, self._operator = file, operator
         self._first_number, self._is_exclusive = first_number, is_exclusive
-        counted = () if file is None else those_that_count(file.trials)
-        self._saved: dict[Key, TrialRecord] = {_key_of_trial(trial): trial for trial in counted}
-        self._by_number = {trial.number: trial for trial in counted}
+        self._saved: dict[Key, TrialRecord] = {}
+        self._under_way: dict[tuple[str, int, str], TrialRecord] = {}
+        if file is not None:
+            self._read(file)
+        self._by_number = {trial.number: trial for trial in self._saved.values()}
 
     def carry_out(
         self, plans: Sequence[TrialPlan], observe: Observe, tell: TellTrial | None = None
@@ -112,16 +114,27 @@ class KeptTarget(ClosedOnExit):
             for k, key in enumerate(keys):
                 if key in self._saved:
                     tell(k, self._saved[key])
-        if self._file is not None and self._file.under_way:
-            for k, plan in enumerate(numbered):
-                name = plan.purpose, plan.number, _genome_of(plan)
-                if (trial := self._file.under_way.get(name)) is not None:
-                    save(k, self.settle(plan, trial) or taken_back(trial, "void: the program ended in it"))
+        for k, plan in enumerate(numbered):
+            name = plan.purpose, plan.number, _genome_of(plan)
+            if (trial := self._under_way.pop(name, None)) is not None:
+                save(k, self.settle(plan, trial) or taken_back(trial, "the program ended in it"))
         missing = [k for k, key in enumerate(keys) if key not in self._saved]
         if missing:
             self._drive([numbered[k] for k in missing], observe, lambda i, trial: save(missing[i], trial))
+        if (
+            self._file is not None and self._file.has_changed()
+        ):  # a person has scored or voided trials meanwhile
+            self._read(self._file)
         self._refuse_lost(sum(key not in self._saved for key in keys))
         return [self._saved[key] for key in keys]
+
+    def _read(self, file: Ledger) -> None:
+        """Take note of the trials that count, and of those that were under way."""
+        observations = file.observations()
+        self._saved = {_key_of_trial(trial): trial for trial in those_that_count(observations.trials)}
+        self._under_way = {
+            (trial.purpose, trial.number, trial.genome): trial for trial in observations.under_way
+        }
 
     def settle(self, plan: TrialPlan, trial: TrialRecord) -> TrialRecord | None:
         """Settle a trial like `Target.settle`. If an operator measures trials, one that counts is measured now."""

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from realitygap.errors import StudyError
 from realitygap.platforms import DEFAULT_ROBOT, platform_class, platform_names, split_spec
-from realitygap.records import OBSERVATIONS, ObservationsFile, ObservationsHead, Observe, sees
+from realitygap.records import OBSERVATIONS, Ledger, ObservationsHead, Observe, open_saved_trials, sees
 from realitygap.tasks import Task
 from realitygap.trials import Target
 from realitygap.world import Arena
@@ -28,7 +28,7 @@ def open_trials(
     *,
     robot: str | None = None,
     within: Path | None = None,
-) -> ObservationsFile:
+) -> Ledger:
     """Open the file of a target's trials, or make it.
 
     Args:
@@ -41,7 +41,7 @@ def open_trials(
     Raises:
         RecordError: It is another file, of another target, damaged, or cannot be written.
     """
-    return ObservationsFile(path, observations_head(target, observe, robot), within=within)
+    return open_saved_trials(path, observations_head(target, observe, robot), within=within)
 
 
 def refuse_more_than_is_seen(target: Target, observe: Observe) -> None:

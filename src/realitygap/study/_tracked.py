@@ -21,7 +21,7 @@ from realitygap.records import (
     Score,
     ScoreRole,
     TrialRecord,
-    read_observations,
+    open_ledger,
     settings_of_condition,
 )
 from realitygap.runs import Condition, genome_of
@@ -40,12 +40,14 @@ class TrialToTrack:
         trial: Trial as observed, without poses.
         times: (t + 1,) when each command began, and when the last ended, since the trial's beginning [s].
         arena: Arena of the trial.
+        number: Number of the trial in its ledger.
     """
 
     head: ObservationsHead
     trial: TrialRecord
     times: Floats
     arena: Arena
+    number: int
 
 
 @dataclass(frozen=True)
@@ -65,24 +67,37 @@ class TrackedTrial:
     seen: float
 
 
-def trial_of_ledger(folder: str | Path, number: int) -> TrialToTrack:
-    """Return a driven trial of a study, with its commands step by step.
+def trial_of_ledger(source: str | Path, number: int) -> TrialToTrack:
+    """Return a driven trial with its commands step by step.
+
+    Args:
+        source: Folder of a study, or file of trials.
+        number: Number of the trial, as in `realitygap trials list`.
 
     Raises:
         StudyError: It was not driven, or has no commands.
-        RecordError: There is no such study or trial.
+        RecordError: There is no such study, file, or trial.
     """
-    with Ledger.open(Path(folder) / LEDGER_NAME, writable=False) as ledger:
-        trial, record = ledger.trial(number), ledger.record(number)
-        individuals = ledger.individuals(trial.condition, trial.replicate, trial.generation)
-        sittings = ledger.sittings()
-        label = ledger.conditions()[trial.condition]["label"]
+    with open_ledger(source, writable=False) as ledger:
+        found = trial_in(ledger, source, number)
+    return replace(found, head=replace(found.head, observe="track"))
+
+
+def trial_in(ledger: Ledger, source: str | Path, number: int) -> TrialToTrack:
+    """Return a driven trial of an open ledger, as `trial_of_ledger`."""
+    trial, record = ledger.trial(number), ledger.record(number)
     if trial.state not in ("driven", "scored") or not len(record.commands):
         raise StudyError(
-            f"Trial {number} of {folder} is {trial.state}, expected one that was driven. See: realitygap trials list "
-            f"{folder}"
+            f"Trial {number} of {source} is {trial.state}, expected one that was driven. See: realitygap trials list "
+            f"{source}"
         )
-    settings = settings_of_condition(ResultsFolder.open(folder).description, trial.condition)
+    if not trial.condition:
+        times = np.arange(len(record.commands) + 1, dtype=np.float64) * record.step_s
+        return TrialToTrack(ledger.head(), record, times, ledger.arena, number)
+    individuals = ledger.individuals(trial.condition, trial.replicate, trial.generation)
+    sittings = ledger.sittings()
+    label = ledger.conditions()[trial.condition]["label"]
+    settings = settings_of_condition(ResultsFolder.open(source).description, trial.condition)
     condition = Condition.from_settings(trial.condition, settings)
     arena = condition.arena.arena()
     t = len(record.commands)
@@ -100,7 +115,7 @@ def trial_of_ledger(folder: str | Path, number: int) -> TrialToTrack:
     head = ObservationsHead(
         platform.spec, label or "REAL", platform.base_robot, arena.to_dict(), condition.on.command_s, "track"
     )
-    return TrialToTrack(head, observed, times, arena)
+    return TrialToTrack(head, observed, times, arena, number)
 
 
 def _times(began: Floats) -> Floats:
@@ -108,24 +123,6 @@ def _times(began: Floats) -> Floats:
     usual = float(np.median(np.diff(began))) if len(began) > 1 else 0.5
     times: Floats = np.append(began, began[-1] + usual) - began[0]
     return times
-
-
-def trial_of_file(path: str | Path, number: int) -> TrialToTrack:
-    """Return a trial of a file of observed trials, the last one with its number.
-
-    Raises:
-        StudyError: There is none with this number.
-        RecordError: The file cannot be read.
-    """
-    observations = read_observations(path)
-    trials = {trial.number: trial for trial in observations.trials if len(trial.commands)}
-    if number not in trials:
-        has = ", ".join(map(str, sorted(trials))) or "none"
-        raise StudyError(f"{path} has no trial {number}; it has {has}.")
-    trial = trials[number]
-    times = np.arange(len(trial.commands) + 1, dtype=np.float64) * trial.step_s
-    head = replace(observations.head, observe="track")
-    return TrialToTrack(head, trial, times, Arena.from_dict(dict(observations.head.arena)))
 
 
 def place_trial(

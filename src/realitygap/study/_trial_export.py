@@ -17,15 +17,13 @@ from realitygap.records import (
     OBSERVATIONS,
     Ledger,
     ObservationsHead,
-    TrialRecord,
-    read_observations,
+    open_ledger,
     refuse_results,
-    those_that_count,
     write_observations,
     write_whole,
 )
 
-from ._tracked import TrialToTrack, trial_of_file, trial_of_ledger
+from ._tracked import TrialToTrack, trial_in
 
 
 def export_trials(
@@ -38,7 +36,7 @@ def export_trials(
     """Write driven trials as bags of ROS 2 or as MCAP files, each with a mapping for `realitygap import`.
 
     Args:
-        source: A file of observed trials (.jsonl), or a folder of results with a ledger.
+        source: A folder of results with a ledger, or a file of trials.
         out: A file that ends in .mcap, or a new folder without an ending. If there are several trials, their numbers
             are added to the name: out-7.mcap.
         trials: Numbers of trials. If empty, all driven trials.
@@ -53,12 +51,11 @@ def export_trials(
         RecordError: The source cannot be read, or a bag cannot be written.
         StudyError: The source has no such trial, or none that was driven.
     """
-    source, out = Path(source), Path(out)
-    numbers = list(trials) or _driven(source)
-    for number in numbers:
-        name = out if len(numbers) == 1 else out.with_name(f"{out.stem}-{number}{out.suffix}")
-        found = _trial(source, number)
-        yield write_bag(found.trial, found.head, name, times=found.times, wheel_diameter_mm=wheel_diameter_mm)
+    out = Path(out)
+    found = _driven_trials(Path(source), trials)
+    for each in found:
+        name = out if len(found) == 1 else out.with_name(f"{out.stem}-{each.number}{out.suffix}")
+        yield write_bag(each.trial, each.head, name, times=each.times, wheel_diameter_mm=wheel_diameter_mm)
 
 
 _POSE = ("x", "y", "heading")
@@ -74,7 +71,7 @@ def write_trials(source: str | Path, out: str | Path, trials: Sequence[int] = ()
     """Write driven trials into one new file of JSON lines or Parquet.
 
     Args:
-        source: A file of observed trials (.jsonl), or a folder of results with a ledger.
+        source: A folder of results with a ledger, or a file of trials.
         out: A file that ends in .jsonl, with a line for each trial, or in .parquet, with a row for each command.
         trials: Numbers of trials. If empty, all driven trials that count.
 
@@ -89,39 +86,34 @@ def write_trials(source: str | Path, out: str | Path, trials: Sequence[int] = ()
     refuse_results(out)
     if out.exists():
         raise RecordError(f"{out} exists already, and was not changed. Name another file.")
-    head, written = _records(source, trials)
+    found = _driven_trials(source, trials)
+    written = [each.trial for each in found]
     if out.suffix == ".parquet":
         buffer = io.BytesIO()
-        pl.concat([_steps(trial) for trial in written]).write_parquet(buffer)
+        pl.concat([_steps(each) for each in found]).write_parquet(buffer)
         write_whole(out, buffer.getvalue())
     else:
-        write_observations(out, head, written)
+        write_observations(out, _common_head(source, found), written)
     return len(written)
 
 
-def _records(source: Path, numbers: Sequence[int]) -> tuple[ObservationsHead, list[TrialRecord]]:
-    """Return the common head of trials, and the trials."""
-    if not source.is_dir():
-        if not numbers:
-            _driven(source)  # raises if there is none
-        found = read_observations(source)
-        driven = [trial for trial in those_that_count(found.trials) if len(trial.commands)]
-        chosen = [trial_of_file(source, number).trial for number in numbers]
-        return found.head, chosen or driven
-    trials = [_trial(source, number) for number in numbers or _driven(source)]
-    observe = min((found.trial.observe for found in trials), key=OBSERVATIONS.index)
-    heads = [replace(found.head, observe=observe) for found in trials]
+def _common_head(source: Path, found: Sequence[TrialToTrack]) -> ObservationsHead:
+    """Return the head of trials of one kind, which says how much all of them have."""
+    levels = [level for each in found for level in (each.head.observe, each.trial.observe)]
+    observe = min(levels, key=OBSERVATIONS.index)
+    heads = [replace(each.head, observe=observe) for each in found]
     for head in heads[1:]:
         if head != heads[0]:
             raise StudyError(
                 f"Trials of {source} are of several kinds, such as on {heads[0].target} and {head.target}, or in "
                 "several arenas. A file has one kind. Name trials of one condition."
             )
-    return heads[0], [found.trial for found in trials]
+    return heads[0]
 
 
-def _steps(trial: TrialRecord) -> pl.DataFrame:
+def _steps(driven: TrialToTrack) -> pl.DataFrame:
     """Return a row for each command of a trial, and one for the look after the last."""
+    trial = driven.trial
     t = len(trial.commands)
     n = max(t + (len(trial.last_readings) > 0), len(trial.wheels), len(trial.poses))
     times = trial.times if len(trial.times) >= n else np.arange(n) * trial.step_s
@@ -134,7 +126,7 @@ def _steps(trial: TrialRecord) -> pl.DataFrame:
 
     return pl.DataFrame(
         {
-            "trial": [trial.number] * n, "purpose": [trial.purpose] * n, "step": range(n), "time": times[:n],
+            "trial": [driven.number] * n, "purpose": [trial.purpose] * n, "step": range(n), "time": times[:n],
             "move": column(trial.commands, 0), "turn": column(trial.commands, 1),
             "readings": readings[:n], "stalled": stalled[:n],
             "left": column(trial.wheels, 0), "right": column(trial.wheels, 1),
@@ -144,36 +136,34 @@ def _steps(trial: TrialRecord) -> pl.DataFrame:
     )  # fmt: skip
 
 
-def _driven(source: Path) -> list[int]:
-    """Return the numbers of all trials that were driven."""
-    if source.is_dir():
-        if not (source / LEDGER_NAME).exists():
-            raise StudyError(
-                f"{source} has no trials of a robot. For those of a simulation, save a network (realitygap export), "
-                "and drive it: realitygap try champion.json --on sim --observe track -o trials.jsonl"
-            )
-        with Ledger.open(source / LEDGER_NAME, writable=False) as ledger:
-            numbers = [trial.trial for trial in ledger.trials(states=("driven", "scored"))]
-    else:
-        found = those_that_count(read_observations(source).trials)
-        numbers = list(dict.fromkeys(trial.number for trial in found if len(trial.commands)))
-    if not numbers:
-        raise StudyError(f"{source} has no trial that was driven. Drive one first.")
-    return numbers
+def _driven_trials(source: Path, numbers: Sequence[int]) -> list[TrialToTrack]:
+    """Return driven trials with the times of a robot, and with their poses; all that count if none is named."""
+    if source.is_dir() and not (source / LEDGER_NAME).exists():
+        raise StudyError(
+            f"{source} has no trials of a robot. For those of a simulation, save a network (realitygap export), "
+            "and drive it: realitygap try champion.json --on sim --observe track -o trials.sqlite"
+        )
+    with open_ledger(source, writable=False) as ledger:
+        if not numbers:
+            trials = ledger.trials(states=("driven", "scored"))
+            numbers = [
+                trial.trial
+                for trial in trials
+                if trial.n_steps and (trial.condition or trial.state == "scored")
+            ]
+        if not numbers:
+            raise StudyError(f"{source} has no trial that was driven. Drive one first.")
+        return [_with_times_and_poses(ledger, source, number) for number in numbers]
 
 
-def _trial(source: Path, number: int) -> TrialToTrack:
-    """Return a trial with the times of a robot, and with the poses that the ledger has of it."""
-    if source.is_dir():
-        found = trial_of_ledger(source, number)
-        with Ledger.open(source / LEDGER_NAME, writable=False) as ledger:
-            poses = ledger.record(number).poses
-        is_whole = len(poses) == len(found.trial.commands) + 1
-        return replace(found, trial=replace(found.trial, poses=poses)) if is_whole else found
-    found = trial_of_file(source, number)
+def _with_times_and_poses(ledger: Ledger, source: Path, number: int) -> TrialToTrack:
+    found = trial_in(ledger, source, number)
     times, t = found.trial.times, len(found.trial.commands)
+    if ledger.trial(number).condition:
+        poses = ledger.record(number).poses
+        return replace(found, trial=replace(found.trial, poses=poses)) if len(poses) == t + 1 else found
     # an emulated robot may be faster than the clock that measured these times
-    if len(times) < t or abs(np.median(np.diff(times)) - found.trial.step_s) > found.trial.step_s / 2:
+    if len(times) < max(t, 2) or abs(np.median(np.diff(times)) - found.trial.step_s) > found.trial.step_s / 2:
         return found
     ends = times if len(times) > t else np.append(times, times[-1] + found.trial.step_s)
     return replace(found, times=ends - ends[0])

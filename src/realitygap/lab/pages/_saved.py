@@ -81,7 +81,7 @@ class _Page:
         try:
             saved = await run.io_bound(self._file.read)
         except RealityGapError:  # it is being written; the next look reads it again
-            self._file.changed_s = None
+            self._file.stamp = ()
             return
         if saved is not None:
             self._saved = saved

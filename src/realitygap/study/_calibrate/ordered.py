@@ -7,7 +7,7 @@ from pathlib import Path
 from realitygap.errors import DescriptionError, StudyError
 from realitygap.orders import CalibrateOrder, takes_order
 from realitygap.platforms import class_of, open_target
-from realitygap.records import is_observations, refuse_links
+from realitygap.records import existing_trials, is_observations, refuse_links
 from realitygap.trials import Operator, PortObserver, Pulse
 from realitygap.world import Calibration, load_arena, read_calibration
 
@@ -77,7 +77,7 @@ def _checked(order: CalibrateOrder) -> Path:
         _refuse_other_files(out)
     if not out.resolve().parent.is_dir():
         raise StudyError(f"There is no folder {out.parent} for {out.name}. Make it, or name another file.")
-    refuse_links(out.parent, out.with_suffix(".trials.jsonl"))
+    refuse_links(out.parent, out.with_suffix(".trials.sqlite"))
     return out
 
 
@@ -161,7 +161,7 @@ def _measured(
             observe=order.observe or "cells",
             budget=order.budget,
             seed=order.seed,
-            trials_file=out.with_suffix(".trials.jsonl"),
+            trials_file=existing_trials(out.with_suffix(".trials.sqlite")),
             choose=order.choose,
             operator=operator,
             tell=tell,

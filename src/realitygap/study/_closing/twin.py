@@ -170,7 +170,7 @@ class ClosingTwin:
         path = place.with_suffix(".toml")
         if not path.exists():
             with allow_trials(
-                target, place.with_suffix(".jsonl"), budget, CALIBRATING, observe=observe
+                target, place.with_suffix(".sqlite"), budget, CALIBRATING, observe=observe
             ) as kept:
                 calibration = self.calibrate(
                     kept,

@@ -111,7 +111,7 @@ def gap_between(
         if costly.label == "REAL" and order.results is None and not isinstance(costly, RecordedTarget):
             raise StudyError(
                 f"{setting.n_controllers * setting.trials} trials on {order.target} would not be saved. Name a file "
-                "for them (-o FILE.jsonl), so that the same command can resume."
+                "for them (-o FILE.sqlite), so that the same command can resume."
             )
         gap = study_gap(
             source,

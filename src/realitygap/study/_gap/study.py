@@ -20,7 +20,7 @@ from realitygap.gap import (
     replay_error,
 )
 from realitygap.platforms import SimTarget, split_spec
-from realitygap.records import OBSERVATIONS, ObservationsFile, Observe, TrialRecord
+from realitygap.records import OBSERVATIONS, Ledger, Observe, TrialRecord
 from realitygap.stats import Estimate, difference_interval, mean_interval, range_of_differences
 from realitygap.tasks import CoverageTask, Task, score_observed
 from realitygap.trials import Target, TrialPlan
@@ -228,7 +228,7 @@ def _carry_out(
     plans: Sequence[TrialPlan],
     observe: Observe,
     tell: Tell | None,
-    file: ObservationsFile | None = None,
+    file: Ledger | None = None,
 ) -> list[TrialRecord]:
     """Return trials in the order of their plans: those in the file, and the others, saved as they end."""
     done: set[int] = set()

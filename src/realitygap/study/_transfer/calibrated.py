@@ -139,7 +139,7 @@ class Calibrating:
         if path.exists():
             return load_calibration(path)
         self.tell(f"calibrating by {n} trials, {self.observe} observed")
-        trials = self.folder / f"{name}.jsonl"
+        trials = self.folder / f"{name}.sqlite"
         with allow_trials(self.target, trials, n, self.first_number, observe=self.observe) as kept:
             try:
                 calibration = calibrate_all(

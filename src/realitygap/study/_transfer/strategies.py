@@ -298,7 +298,7 @@ class _Work:
         name = f"{strategy}-{budget if spends else 0}-{replicate}"
         self.tell(f"{strategy}, {budget} trials, replicate {replicate + 1} of {self.plan.order.replicates}")
         first = replicate * NUMBERS
-        path = self.folder / "trials" / f"{name}.jsonl"
+        path = self.folder / "trials" / f"{name}.sqlite"
         observe = self._looks_at(strategy)
         with allow_trials(self.target, path, budget, first, observe=observe) as kept:
             attempt = Attempt(
@@ -319,8 +319,11 @@ class _Work:
 
     def known(self) -> list[float]:
         """Return the mean scores of all champions that were tried in this folder, by this call or an earlier one."""
-        files = sorted((self.folder / "fresh").glob("*.jsonl"))
-        tried = [those_that_count(read_observations(file).trials) for file in files]
+        fresh = self.folder / "fresh"
+        files = {
+            path.stem: path for ending in ("jsonl", "sqlite") for path in sorted(fresh.glob(f"*.{ending}"))
+        }
+        tried = [those_that_count(read_observations(file).trials) for _, file in sorted(files.items())]
         return [
             float(np.mean(score_observed(self.condition.task_of_trials, trials, self.target.arena)))
             for trials in tried
@@ -345,7 +348,7 @@ class _Work:
     def _fresh(self, genome: Genome, name: str, first: int) -> tuple[float, ...]:
         """Return the scores of a champion in fresh trials."""
         n, task = self.plan.order.fresh_trials, self.condition.task_of_trials
-        path = self.folder / "fresh" / f"{name}.jsonl"
+        path = self.folder / "fresh" / f"{name}.sqlite"
         with allow_trials(self.target, path, n, first, observe=task.observe) as fresh:
             trials = fresh.carry_out(plans_of(self.condition, [genome] * n, 0, "fresh"), task.observe)
         return tuple(score_observed(task, trials, self.target.arena).tolist())

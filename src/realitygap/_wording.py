@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:  # the help of a command needs no NumPy
-    from realitygap.stats import Estimate
+    from realitygap.stats import Ends, Estimate
 
 
 @dataclass(frozen=True)
@@ -147,6 +147,11 @@ def bracketed(estimate: Estimate, digits: int = 3, missing: str = "") -> str:
         if estimate.ends is None
         else "[" + ", ".join(f"{end:.{digits}f}" for end in estimate.ends) + "]"
     )
+
+
+def within(ends: Ends | None, digits: int = 3) -> str:
+    """Return the ends of an interval in brackets after its number, such as ` [0.100, 0.200]`; empty without one."""
+    return "" if ends is None else f" [{ends[0]:.{digits}f}, {ends[1]:.{digits}f}]"
 
 
 def p_in_words(p: float) -> str:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from realitygap._wording import count_range
+from realitygap._wording import count_range, within
 from realitygap.drawing import Ink
 from realitygap.report._tally import DescribedCondition, Results, Tally, label_of, read_tally
 from realitygap.report.charts.house import Drawing, draw_wide, shorten
@@ -98,9 +98,7 @@ def _series(
     for index, (row, offsets) in enumerate(zip(rows, positions, strict=True)):
         if not len(row.values):
             continue
-        interval = row.interval
-        within = "" if interval is None else f" [{interval[0]:.3f}, {interval[1]:.3f}]"
-        text = f"{{name}}: median {{x}}{within}, n = {len(row.values):,}, {row.label}"
+        text = f"{{name}}: median {{x}}{within(row.interval)}, n = {len(row.values):,}, {row.label}"
         series.append(Series(text, np.array([[row.median, float(index)]]), row.name))
         runs = row.replicates[: row.n_drawn]
         linked = next((k for k, run in enumerate(runs) if (row.name, run) in links), 0)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from realitygap._wording import count_range, counted_range
+from realitygap._wording import count_range, counted_range, signed, within
 from realitygap.drawing import Ink
 from realitygap.report._tally import DescribedCondition, Results, Tally, label_of, read_tally, settings_of
 from realitygap.report.charts.house import Drawing, draw_wide, shorten, wrap
@@ -186,12 +186,12 @@ def _marks_of_group(group: _Group) -> Iterator[Series]:
     for choice, y in zip(group.choices, group.places, strict=True):
         if math.isnan(choice.median):
             continue
-        interval = choice.interval
-        within = "" if interval is None else f" [{interval[0]:.3f}, {interval[1]:.3f}]"
         effect = (
             "" if choice is group.choices[0] else f", {choice.effect:+.3f} to the baseline".replace("-", "−")
         )
-        shown = [(choice.median, f"median {choice.median:.3f}{within}{effect}, n = {choice.n:,}")]
+        shown = [
+            (choice.median, f"median {choice.median:.3f}{within(choice.interval)}{effect}, n = {choice.n:,}")
+        ]
         if choice.other_median is not None:
             shown.append((choice.other_median, f"median as its selection counts {choice.other_median:.3f}"))
         shown += [(value, f"a run of the paper {value:.3f}") for value in choice.published]
@@ -292,13 +292,10 @@ def _draw_choice(axes: Axes, choice: Choice, y: float, reference: Choice, reach:
 
 def _numbers(choice: Choice, group: _Group) -> list[tuple[str, float, TextStyle]]:
     """The numbers on the right of a row: each with its distance from the axes [points] and its style."""
-    effect = f"{choice.effect:+.3f}".replace("-", "−")
-    effect = (
-        "no runs" if math.isnan(choice.effect) else "±0.000" if effect in ("+0.000", "−0.000") else effect
-    )
+    effect = "no runs" if math.isnan(choice.effect) else signed(choice.effect)
     middle = "" if math.isnan(choice.median) else f"{choice.median:.3f}"
-    if group.is_wide and choice.interval is not None:
-        middle += f" [{choice.interval[0]:.3f}, {choice.interval[1]:.3f}]"
+    if group.is_wide:
+        middle += within(choice.interval)
     shown: list[tuple[str, float, TextStyle]] = []
     if group.is_wide or choice is group.choices[0]:
         shown.append((middle, 6.0, {"va": "center", "color": Ink.MUTED}))

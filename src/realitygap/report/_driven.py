@@ -17,7 +17,7 @@ Paths = dict[tuple[int, int], npt.NDArray[np.float64]]
 
 
 @dataclass(frozen=True)
-class Driven:
+class DrivenCondition:
     """The state of one condition, as recorded in the ledger.
 
     Attributes:
@@ -37,7 +37,7 @@ class Driven:
     n_corrected: int
 
 
-def read_driven(folder: ResultsFolder) -> dict[str, Driven]:
+def read_driven(folder: ResultsFolder) -> dict[str, DrivenCondition]:
     """Return the state of each condition in a folder's ledger; empty without a ledger."""
     if not (folder.path / LEDGER_NAME).exists():
         return {}
@@ -45,7 +45,7 @@ def read_driven(folder: ResultsFolder) -> dict[str, Driven]:
         return {name: _of(ledger, name, about) for name, about in ledger.conditions().items()}
 
 
-def _of(ledger: Ledger, name: str, about: Mapping[str, Any]) -> Driven:
+def _of(ledger: Ledger, name: str, about: Mapping[str, Any]) -> DrivenCondition:
     trials = ledger.trials(name)
     complete = set(complete_runs(ledger, name))
     unfinished = []
@@ -53,7 +53,7 @@ def _of(ledger: Ledger, name: str, about: Mapping[str, Any]) -> Driven:
         unfinished.append((replicate, sum(closed for _, closed in ledger.generations(name, replicate))))
     own = {trial.trial for trial in trials}
     corrected = {row["trial"] for row in ledger.scores() if row["role"] == "correction"} & own
-    return Driven(
+    return DrivenCondition(
         label=about["label"],
         n_driven=sum(trial.state in ("driven", "scored") for trial in trials),
         n_void=sum(trial.state == "void" for trial in trials),
@@ -63,7 +63,7 @@ def _of(ledger: Ledger, name: str, about: Mapping[str, Any]) -> Driven:
     )
 
 
-def describe_driven(name: str, driven: Driven) -> str:
+def describe_driven(name: str, driven: DrivenCondition) -> str:
     """Return the description in a sentence or two."""
     parts = [
         f"{name} ({driven.label or 'not driven yet'}): {driven.n_driven:,} trials that count, {driven.n_void} void"

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 import numpy.typing as npt
 
+from realitygap._wording import within
 from realitygap.drawing import Ink
 from realitygap.errors import RealityGapError
 from realitygap.records import ResultsFolder
@@ -29,8 +30,7 @@ from realitygap.report._tally import (
 )
 from realitygap.report.charts.house import Drawing, draw_wide, letters_in, wrap
 from realitygap.report.charts.lines import area_key, draw_rings, head, hollow, line_key, mark_key, write
-from realitygap.report.charts.marks import MOST_MARKS, Series, decimals_for
-from realitygap.report.charts.marks import Panel as MarkedPanel
+from realitygap.report.charts.marks import MOST_MARKS, Panel, Series, decimals_for
 from realitygap.report.charts.sheet import IS_WIDE, Sheet, grid
 from realitygap.runs import Condition
 from realitygap.stats import MEDIAN_SMALLEST_N, median_interval, quartiles
@@ -67,7 +67,7 @@ class Axis:
 
 
 @dataclass(frozen=True)
-class Panel:
+class RunsPanel:
     """The runs of one condition.
 
     Attributes:
@@ -102,7 +102,7 @@ def draw_coverage(folder: Results, *, points: Points | None = None) -> Drawing:
     """
     tally = read_tally(folder)
     points = points or _points_of(tally.description)
-    panels = [_panel(tally, condition, points) for condition in tally.conditions]
+    panels = [_coverage_panel(tally, condition, points) for condition in tally.conditions]
     caption = _caption(tally, panels, points)
     alt = (
         f"Best coverage by generation in {len(panels)} panels, one per condition: a line for each run, the "
@@ -130,23 +130,15 @@ def draw_scores(folder: ResultsFolder | str | Path) -> list[Drawing]:
         RecordError: there is no such folder, or a file in it is damaged.
     """
     folder = folder if isinstance(folder, ResultsFolder) else ResultsFolder.open(folder)
-    panels: dict[tuple[str, float, float], list[Panel]] = {}
+    panels: dict[tuple[str, float, float], list[RunsPanel]] = {}
     labels: dict[tuple[str, float, float], set[str]] = {}
     for condition in labeled_conditions(folder):
         score = _score_of(condition)
         if score is not None and len(values := bests_of(folder, condition["name"])):
-            label = label_of(condition)
-            labels.setdefault(score, set()).add(label)
+            labels.setdefault(score, set()).add(label_of(condition))
+            replicates = replicates_of(folder, condition["name"])
             panels.setdefault(score, []).append(
-                Panel(
-                    title=condition["name"],
-                    note=f"{label}, n = {len(values)}",
-                    values=values,
-                    n_drawn=_count_drawable(values),
-                    run_bests=values.max(axis=1),
-                    published=(),
-                    replicates=replicates_of(folder, condition["name"]),
-                )
+                _panel(condition, values, values.max(axis=1), replicates, published=())
             )
     return [
         _draw_score(score, group, sorted(labels[score]), f"scores-{number}")
@@ -167,7 +159,7 @@ def _score_of(condition: DescribedCondition) -> tuple[str, float, float] | None:
 
 
 def _draw_score(
-    of: tuple[str, float, float], panels: list[Panel], labels: Sequence[str], name: str
+    of: tuple[str, float, float], panels: list[RunsPanel], labels: Sequence[str], name: str
 ) -> Drawing:
     score, least, greatest = of
     axis = _score_axis(score, panels, least, greatest)
@@ -189,22 +181,28 @@ def _points_of(description: DescribedStudy) -> Points:
     return "best-so-far" if points == "best-so-far" else "best-of-generation"
 
 
-def _panel(tally: Tally, condition: DescribedCondition, points: Points) -> Panel:
+def _coverage_panel(tally: Tally, condition: DescribedCondition, points: Points) -> RunsPanel:
     name = condition["name"]
     values = tally.generation_bests(name, tally.measure)
     if points == "best-so-far":
         values = (
             np.where(np.isnan(values), np.nan, np.fmax.accumulate(values, axis=1)) if values.size else values
         )
-    return Panel(
-        title=name,
-        note=f"{label_of(condition)}, n = {len(values)}",
-        values=values,
-        n_drawn=_count_drawable(values),
-        run_bests=tally.run_bests(name, tally.measure),
-        published=tuple(condition.get("published") or ()),
-        replicates=tuple(int(run) for run in tally.replicates(name)),
-    )
+    replicates = tuple(int(run) for run in tally.replicates(name))
+    bests = tally.run_bests(name, tally.measure)
+    return _panel(condition, values, bests, replicates, tuple(condition.get("published") or ()))
+
+
+def _panel(
+    condition: DescribedCondition,
+    values: npt.NDArray[np.float64],
+    run_bests: npt.NDArray[np.float64],
+    replicates: tuple[int, ...],
+    published: tuple[float, ...],
+) -> RunsPanel:
+    note = f"{label_of(condition)}, n = {len(values)}"
+    n_drawn = _count_drawable(values)
+    return RunsPanel(condition["name"], note, values, n_drawn, run_bests, published, replicates)
 
 
 def _count_drawable(values: npt.NDArray[np.float64]) -> int:
@@ -226,27 +224,25 @@ def _segments(values: npt.NDArray[np.float64]) -> list[tuple[npt.NDArray[np.floa
     return panels
 
 
-def _marks_of(panels: Sequence[Panel], decimals: int) -> tuple[MarkedPanel, ...]:
+def _marks_of(panels: Sequence[RunsPanel], decimals: int) -> tuple[Panel, ...]:
     """Return what a page shows on hover: the median with its interval, and the first runs of each panel."""
     n_marks = sum(panel.values.shape[1] for panel in panels)
     n_runs = max(1, MOST_MARKS // max(1, n_marks))
     return tuple(
-        MarkedPanel(f"panel-{index}", _series(panel, n_runs, decimals), (0, decimals))
+        Panel(f"panel-{index}", _series(panel, n_runs, decimals), (0, decimals))
         for index, panel in enumerate(panels)
     )
 
 
-def _series(panel: Panel, n_runs: int, decimals: int) -> tuple[Series, ...]:
+def _series(panel: RunsPanel, n_runs: int, decimals: int) -> tuple[Series, ...]:
     if not len(panel.values):
         return ()
     medians = []
     notes = []
     for values in panel.values.T:
         known = values[np.isfinite(values)]
-        interval = median_interval(known).ends
-        within = "" if interval is None else f" [{interval[0]:.{decimals}f}, {interval[1]:.{decimals}f}]"
         medians.append(float(np.median(known)))
-        notes.append(f"{within}, n = {len(known):,}")
+        notes.append(f"{within(median_interval(known).ends, decimals)}, n = {len(known):,}")
     text = f"{panel.title}, generation {{x}}: median {{y}}{{label}}"
     series = [Series(text, np.column_stack([np.arange(len(medians)), medians]), labels=tuple(notes))]
     for run, values in zip(panel.replicates[:n_runs], panel.values[:n_runs], strict=True):
@@ -259,7 +255,7 @@ def _series(panel: Panel, n_runs: int, decimals: int) -> tuple[Series, ...]:
 # drawing
 
 
-def _draw_panels(panels: list[Panel], width: float, axis: Axis) -> Sheet:
+def _draw_panels(panels: list[RunsPanel], width: float, axis: Axis) -> Sheet:
     """Return a figure of this width [in] with a panel for each condition, and a legend."""
     n_columns = (
         min(len(panels), 1 if width < IS_WIDE else 3) if len(panels) <= 9 else 2 if width < IS_WIDE else 4
@@ -293,7 +289,7 @@ def _draw_panels(panels: list[Panel], width: float, axis: Axis) -> Sheet:
     return sheet
 
 
-def _coverage_axis(panels: list[Panel]) -> Axis:
+def _coverage_axis(panels: list[RunsPanel]) -> Axis:
     """Set the axis from 0 to the next tenth above all values."""
     highest = max([0.1, *(float(p.run_bests.max()) for p in panels if len(p.run_bests))])
     highest = max([highest, *(value for panel in panels for value in panel.published)])
@@ -302,7 +298,7 @@ def _coverage_axis(panels: list[Panel]) -> Axis:
     return Axis("coverage", 0.0, top, tuple(ticks.tolist()), 1)
 
 
-def _score_axis(score: str, panels: Sequence[Panel], least: float, greatest: float) -> Axis:
+def _score_axis(score: str, panels: Sequence[RunsPanel], least: float, greatest: float) -> Axis:
     """An axis with round numbers around everything shown, and no value that a score cannot have."""
     from matplotlib.ticker import MaxNLocator
 
@@ -319,7 +315,7 @@ def _score_axis(score: str, panels: Sequence[Panel], least: float, greatest: flo
     )
 
 
-def _draw_panel(axes: Axes, panel: Panel, axis: Axis) -> None:
+def _draw_panel(axes: Axes, panel: RunsPanel, axis: Axis) -> None:
     n_generations = max(1, panel.values.shape[1])
     step = max(1.0, 0.2 * n_generations)
     side = n_generations - 1 + step  # the place of the best of whole runs
@@ -404,11 +400,10 @@ def _draw_best_of_runs(axes: Axes, bests: npt.NDArray[np.float64], x: float) -> 
 # words
 
 
-def _caption(tally: Tally, panels: list[Panel], points: Points) -> str:
-    labels = sorted({label_of(condition) for condition in tally.conditions})
+def _caption(tally: Tally, panels: list[RunsPanel], points: Points) -> str:
     each = "Best coverage of each generation" if points == "best-of-generation" else "Best coverage so far"
     parts = [
-        f"{each}, counted {tally.counted}, by generation (from 0). {' and '.join(labels)}.",
+        f"{each}, counted {tally.counted}, by generation (from 0). {' and '.join(tally.labels)}.",
         _say_runs(panels),
         f"Blue: the median over the runs{_say_interval(panels)}.",
         "Gray column, “run”: the best of whole runs, with its median, interval and quartiles"
@@ -420,7 +415,7 @@ def _caption(tally: Tally, panels: list[Panel], points: Points) -> str:
     return " ".join(parts)
 
 
-def _say_runs(panels: list[Panel]) -> str:
+def _say_runs(panels: list[RunsPanel]) -> str:
     """Return a sentence on which lines are runs, and whether some are left out."""
     cut = [panel for panel in panels if panel.n_drawn < len(panel.values)]
     if cut:
@@ -432,7 +427,7 @@ def _say_runs(panels: list[Panel]) -> str:
     return "Gray: every run. Lines are more opaque where runs overlap."
 
 
-def _say_interval(panels: list[Panel]) -> str:
+def _say_interval(panels: list[RunsPanel]) -> str:
     """Return a sentence on the intervals of the medians."""
     counts = [len(panel.values) for panel in panels]
     if max(counts) < MEDIAN_SMALLEST_N:

@@ -16,6 +16,7 @@ from realitygap.report._tally import Results, read_tally
 from realitygap.report._trial_figure import ChosenTrial, choose_trial
 from realitygap.report.charts.house import Drawing, draw_wide, shorten
 from realitygap.report.charts.lines import (
+    SPECIES_PENS,
     Dash,
     LineStyle,
     TextStyle,
@@ -30,9 +31,6 @@ from realitygap.report.charts.sheet import IS_WIDE, Sheet
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-_PENS = (Ink.PEN1, Ink.PEN2, Ink.PEN3, Ink.PEN5, Ink.PEN4, Ink.PEN6, Ink.PEN7, Ink.PEN0)
-"""Pens of species, as in the figure of species. The number of the species is also in each dot."""
 
 _MOST_LABELED = 12
 """Generations up to which each ancestor has its numbers, and all individuals are shown; half of it on a phone."""
@@ -285,7 +283,7 @@ def _draw_dots(
 def _by_color(ancestors: list[Ancestor]) -> dict[str, list[Ancestor]]:
     """The ancestors by the color of their species."""
     numbers = sorted({each.species for each in ancestors})
-    colors = {number: str(_PENS[k % len(_PENS)]) for k, number in enumerate(numbers)}
+    colors = {number: str(SPECIES_PENS[k % len(SPECIES_PENS)]) for k, number in enumerate(numbers)}
     members: dict[str, list[Ancestor]] = {}
     for each in ancestors:
         members.setdefault(colors[each.species], []).append(each)

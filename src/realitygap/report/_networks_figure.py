@@ -12,7 +12,7 @@ from realitygap._wording import counted
 from realitygap.drawing import Picture
 from realitygap.errors import RealityGapError
 from realitygap.evolution import network_picture
-from realitygap.report._structures import Individual, Structures, count_structures
+from realitygap.report._structures import Example, Structures, count_structures
 from realitygap.report._tally import Results, Tally, label_of, read_tally
 from realitygap.report.charts.house import Drawing, draw_wide
 from realitygap.report.charts.lines import head
@@ -94,7 +94,7 @@ def _best_of_last(tally: Tally, condition: str, replicate: int) -> Mapping[str, 
     return last.row(int(last[tally.score_column(condition)].arg_max() or 0), named=True)
 
 
-def _row_of(tally: Tally, of: Individual) -> Mapping[str, Any]:
+def _row_of(tally: Tally, of: Example) -> Mapping[str, Any]:
     rows = tally.folder.read(of.condition, [of.replicate])
     is_it = (rows["generation"] == of.generation) & (rows["individual"] == of.individual)
     return rows.row(int(is_it.arg_max() or 0), named=True)

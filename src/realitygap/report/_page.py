@@ -47,7 +47,6 @@ from realitygap.report._table import Cell, Column, Part, Row, TableOnPage, numbe
 from realitygap.report._tally import (
     DescribedStudy,
     Tally,
-    label_of,
     read_tally,
     score_text,
     selection_of,
@@ -460,8 +459,7 @@ def _robot_steps(tally: Tally) -> int | None:
 
 
 def _labels(tally: Tally) -> list[tuple[str, str]]:
-    labels = sorted({label_of(condition) for condition in tally.conditions})
-    return [(label, LABELS.get(label, "as the records say")) for label in labels]
+    return [(label, LABELS.get(label, "as the records say")) for label in tally.labels]
 
 
 def _published_sources(tally: Tally) -> list[str]:
@@ -488,7 +486,7 @@ def _interval_notes(summary: pl.DataFrame) -> list[str]:
     return notes
 
 
-class _Command(NamedTuple):
+class _CommandLine(NamedTuple):
     """The command that runs a study again, also in Python, and whether the study comes with realitygap."""
 
     built_in: bool
@@ -496,7 +494,7 @@ class _Command(NamedTuple):
     python: str
 
 
-def _command(tally: Tally) -> _Command:
+def _command(tally: Tally) -> _CommandLine:
     description = tally.description
     name = str(description.get("name") or "")
     built_in = _is_built_in(description)
@@ -505,7 +503,7 @@ def _command(tally: Tally) -> _Command:
     command, function, port = "realitygap run", "run_study", ""
     if all(is_physical(settings_of(condition)) for condition in description["conditions"]):
         command, function, port = "realitygap drive", "drive_study", "PORT"
-    return _Command(
+    return _CommandLine(
         built_in,
         f"{command} {study}{port and f' --port {port}'} --seed {seed} --replicates {replicates} --out DIR",
         f"{function}({study!r}, {port and f'{port!r}, '}'DIR', seed={seed}, replicates={replicates})",

@@ -49,7 +49,7 @@ _DRAWS = 20_000
 
 
 @dataclass(frozen=True)
-class Finding:
+class Inconsistency:
     """Something printed in the paper that does not follow from the rest of it.
 
     Attributes:
@@ -65,7 +65,7 @@ class Finding:
     bearing: str
 
 
-def audit_paper() -> list[Finding]:
+def audit_paper() -> list[Inconsistency]:
     """Return the inconsistencies in Rosenzweig & Remy, computed from the values that they print."""
     return [
         *_path_length(),
@@ -96,14 +96,14 @@ def inches(meters: Fraction | float) -> float:
     return float(meters) / INCH_M
 
 
-def _path_length() -> list[Finding]:
+def _path_length() -> list[Inconsistency]:
     moves = CALIBRATION_MOVES
     steps = float(steps_for(ROBOT_PATH_IN, SIM_PATH_IN))
     one_less = inches((moves - 1) * SIM_MOVE_M)
     off_by_one = float(ROBOT_STEPS * ROBOT_PATH_IN) / one_less
     lengths = f"{float(ROBOT_PATH_IN):.2f} in (robot) and {float(SIM_PATH_IN):.1f} in (simulation)"
     return [
-        Finding(
+        Inconsistency(
             "2.2",
             f"From {lengths}, “{SIM_STEPS_PRINTED} steps with the simulation are equivalent to {ROBOT_STEPS} "
             "steps” of the robot.",
@@ -113,7 +113,7 @@ def _path_length() -> list[Finding]:
             f"Simulated paths were probably a quarter longer than the robot’s "
             f"({SIM_STEPS_PRINTED / steps - 1:+.0%}), in favor of the simulation.",
         ),
-        Finding(
+        Inconsistency(
             "2.2",
             f"The simulated robot drives {float(SIM_PATH_IN)} in in {moves} steps.",
             f"{moves} × {float(SIM_MOVE_M)} m = {float(moves * SIM_MOVE_M)} m = "
@@ -123,9 +123,9 @@ def _path_length() -> list[Finding]:
     ]
 
 
-def _sensor_range() -> Finding:
+def _sensor_range() -> Inconsistency:
     found = inches(RANGE_M)
-    return Finding(
+    return Inconsistency(
         "2.1",
         f"Sensors reach “just under {RANGE_IN_PRINTED} inches (.{RANGE_M * 10} meters)”.",
         f"{float(RANGE_M)} m = {found:.2f} in.",
@@ -134,9 +134,9 @@ def _sensor_range() -> Finding:
     )
 
 
-def _world() -> Finding:
+def _world() -> Inconsistency:
     found = [side * INCH_M for side in WORLD_IN]
-    return Finding(
+    return Inconsistency(
         "2.1",
         f"The world is {WORLD_IN[0]} × {WORLD_IN[1]} in, ({' × '.join(WORLD_M_PRINTED)} m).",
         f"{found[0]:.4f} × {found[1]:.4f} m: {WORLD_M_PRINTED[0]} is cut and not rounded, as in Table 2.",
@@ -144,11 +144,11 @@ def _world() -> Finding:
     )
 
 
-def _noise_offset() -> Finding:
+def _noise_offset() -> Inconsistency:
     largest = largest_of_uniform(N_SENSORS)
     offsets = ", ".join(f"{float(level * largest):+.2f}" for level in NOISE_LEVELS)
     levels = ", ".join(f"{float(level):.0%}" for level in NOISE_LEVELS)
-    return Finding(
+    return Inconsistency(
         "2.3",
         f"a · U(−1, 1) is added to each of {N_SENSORS} sensors, then the largest is taken.",
         f"The largest of {N_SENSORS} numbers from U(−1, 1) is {largest} on average, so that with equal readings "
@@ -157,7 +157,7 @@ def _noise_offset() -> Finding:
     )
 
 
-def _table_2() -> list[Finding]:
+def _table_2() -> list[Inconsistency]:
     found: dict[str, list[str]] = {"impossible": [], "cut": [], "raised": []}
     for texts in TABLE_2.values():
         for text in texts:
@@ -166,7 +166,7 @@ def _table_2() -> list[Finding]:
                 problem, k = doubtful
                 found[problem].append(f"{text} ({k}/{CELLS} = {k / CELLS:.4f})".replace("= 0", "= "))
     return [
-        Finding(
+        Inconsistency(
             "3.2, Table 2",
             f"Coverages, each a share of {CELLS} cells.",
             f"No share of {CELLS}: {', '.join(found['impossible'])}. Cut, not rounded: {', '.join(found['cut'])}.",
@@ -181,11 +181,11 @@ def table_2() -> dict[str, npt.NDArray[np.float64]]:
     return {name: np.array([float(text) for text in texts]) for name, texts in TABLE_2.items()}
 
 
-def _three_runs() -> Finding:
+def _three_runs() -> Inconsistency:
     pairs = compare_samples(table_2())
     least = min(pairs, key=lambda pair: pair.p)
     n = len(next(iter(TABLE_2.values())))
-    return Finding(
+    return Inconsistency(
         "3.1, 3.2, 4",
         f"{n} runs of each method; “it seems like 50% noise may perform better”, the robot “performed better”.",
         f"{n} runs against {n} cannot give a two-sided p below {smallest_p(n, n):.2f}. The smallest of the "
@@ -196,29 +196,29 @@ def _three_runs() -> Finding:
     )
 
 
-def _words() -> list[Finding]:
+def _words() -> list[Inconsistency]:
     return [
-        Finding(
+        Inconsistency(
             "2.1, Table 1",
             "Input nodes: 3. With novelty a bias input is added: 4.",
             "Objective and novelty search have different networks.",
             "What is credited to novelty may be the work of the constant input.",
         ),
-        Finding(
+        Inconsistency(
             "2.1, 3.2",
             "The text refers to “Table 2.1” and “Table 3.2”; there are a Table 1 and a Table 2.",
             "They are the tables of sections 2.1 and 3.2. So Table 2 is that of section 3.2, novelty search, and "
             "section 3.1 points to Figure 4 alone. Its caption names no search.",
             "Table 2 should be read as novelty search; this cannot be settled from the text.",
         ),
-        Finding(
+        Inconsistency(
             "3.1",
             "50 % noise “is the level of noise used in Leyden et al.’s successful bridging of the reality gap [4]”.",
             "[4] is Jakobi, Husbands & Harvey (1995). Leyden et al. are introduced in section 1 as those whose "
             "control did not transfer.",
             "The support for 50 % comes from another paper than the one named.",
         ),
-        Finding(
+        Inconsistency(
             "1, 4",
             "The gap is the difference between evolving in simulation and evolving on the robot.",
             "Jakobi et al. move one controller from one to the other. Two evolutions, each the best of 40 noisy "

@@ -14,6 +14,7 @@ from realitygap.drawing import Ink
 from realitygap.report._tally import Results, Tally, label_of, read_tally, selection_of
 from realitygap.report.charts.house import Drawing, draw_wide, shorten
 from realitygap.report.charts.lines import (
+    SPECIES_PENS,
     Dash,
     LineStyle,
     TextStyle,
@@ -29,7 +30,6 @@ from realitygap.report.charts.sheet import IS_WIDE, Sheet
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_PENS = (Ink.PEN1, Ink.PEN2, Ink.PEN3, Ink.PEN5, Ink.PEN4, Ink.PEN6, Ink.PEN7, Ink.PEN0)
 _HEIGHT = 2.25
 """Height of a panel [in]."""
 
@@ -127,7 +127,7 @@ def draw_species(
         if len(next(iter(shares.values()))) <= _MOST_BARS
         else "with the numbers of larger species where there is room; colors repeat when there are more than eight"
     )
-    labels = ", ".join(sorted({label_of(each) for each in tally.conditions}))
+    labels = ", ".join(tally.labels)
     caption = (
         f"Left (on a phone, above), condition {condition}, run {replicate}, {why}: the share of each species in the "
         f"population of each generation, {numbered}. {label_of(described)}, n = 1 run. Right "
@@ -209,7 +209,7 @@ def _draw_bars(
     """A bar for each generation, in which each share has its species' number."""
     for index, (number, share) in enumerate(shares.items()):
         at = np.arange(len(share))
-        color = _PENS[index % len(_PENS)]
+        color = SPECIES_PENS[index % len(SPECIES_PENS)]
         axes.bar(at, share, 0.82, floors[index], color=color, alpha=0.42, linewidth=0.0)
         axes.bar(at, share, 0.82, floors[index], color="none", edgecolor=Ink.GROUND, linewidth=1.0)
         for generation in np.flatnonzero(share > _LEAST_LABELED):
@@ -225,7 +225,9 @@ def _draw_bands(
         life = slice(alive[0], alive[-1] + 1)
         edges = np.repeat(np.arange(alive[0], alive[-1] + 2) - 0.5, 2)[1:-1]
         below, above = (np.repeat(height[life], 2) for height in (floors[index], floors[index] + share))
-        axes.fill_between(edges, below, above, color=_PENS[index % len(_PENS)], alpha=0.42, linewidth=0.0)
+        axes.fill_between(
+            edges, below, above, color=SPECIES_PENS[index % len(SPECIES_PENS)], alpha=0.42, linewidth=0.0
+        )
     for number, x, y in _numbers_with_room(axes, shares, floors):
         _write_number(axes, number, x, y)
 

@@ -83,7 +83,7 @@ class Luck:
 
 
 @dataclass(frozen=True)
-class Chance:
+class ChanceOnPage:
     """Which noise level comes out best by chance.
 
     Attributes:
@@ -115,7 +115,7 @@ class Statistics:
     champions: Luck
     spread: TableOnPage
     variety: TableOnPage | None
-    chance: Chance | None
+    chance: ChanceOnPage | None
 
     @property
     def compared(self) -> list[TableOnPage]:
@@ -471,7 +471,7 @@ def _difference(one: npt.NDArray[np.float64], other: npt.NDArray[np.float64], di
 # chance
 
 
-def _chance(tally: Tally, labels: str) -> Chance | None:
+def _chance(tally: Tally, labels: str) -> ChanceOnPage | None:
     few, more = chances(tally, 3), chances(tally, 100)
     if not few:
         return None
@@ -502,7 +502,7 @@ def _chance(tally: Tally, labels: str) -> Chance | None:
         ),
         rows,
     )
-    return Chance(table, _chance_sentence(tally))
+    return ChanceOnPage(table, _chance_sentence(tally))
 
 
 def _chance_sentence(tally: Tally) -> str | None:

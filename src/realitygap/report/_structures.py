@@ -22,8 +22,8 @@ Links = tuple[tuple[str, str], ...]
 """Enabled links from name to name, hidden nodes being named h1, h2, ..."""
 
 
-class Individual(NamedTuple):
-    """The numbers of an individual."""
+class Example(NamedTuple):
+    """The numbers of an individual that has a structure."""
 
     condition: str
     replicate: int
@@ -49,7 +49,7 @@ class Structure:
     links: Links
     n_hidden: int
     by_condition: Mapping[str, int]
-    example: Individual
+    example: Example
 
     @property
     def n(self) -> int:
@@ -144,7 +144,7 @@ def _count(
     inputs, outputs = declaration
     names = dict(enumerate([*inputs, *outputs]))
     counts: dict[Links, Counter[str]] = {}
-    examples: dict[Links, tuple[Individual, float]] = {}
+    examples: dict[Links, tuple[Example, float]] = {}
     known: dict[tuple[tuple[int, int], ...], Links] = {}
     for condition, kinds in genes.items():
         for kind in kinds.iter_rows(named=True):
@@ -155,7 +155,7 @@ def _count(
                 links = known.setdefault(key, _canonical(key, names))
             counts.setdefault(links, Counter())[condition] += kind["n"]
             if links not in examples or kind["coverage"] > examples[links][1]:
-                examples[links] = Individual(condition, *(kind[key] for key in _ROW)), kind["coverage"]
+                examples[links] = Example(condition, *(kind[key] for key in _ROW)), kind["coverage"]
     structures = []
     for links, by_condition in counts.items():
         n_hidden = len({name for link in links for name in link if name not in names.values()})

@@ -15,7 +15,7 @@ import polars as pl
 from realitygap._wording import significant
 from realitygap.errors import RecordError, did_you_mean
 from realitygap.records import ResultsFolder
-from realitygap.report._driven import Driven, read_driven
+from realitygap.report._driven import DrivenCondition, read_driven
 from realitygap.runs import Condition
 
 Measure = Literal["line", "ends"]
@@ -93,7 +93,7 @@ class Tally:
     folder: ResultsFolder
     description: DescribedStudy
     best: pl.DataFrame
-    driven: Mapping[str, Driven] = field(default_factory=dict)
+    driven: Mapping[str, DrivenCondition] = field(default_factory=dict)
     uncounted: tuple[str, ...] = ()
     _whole_runs: dict[tuple[str, int], pl.DataFrame] = field(default_factory=dict, repr=False, compare=False)
 
@@ -127,6 +127,11 @@ class Tally:
         """The conditions that have runs."""
         names = set(self.runs["condition"])
         return [condition for condition in self.conditions if condition["name"] in names]
+
+    @property
+    def labels(self) -> list[str]:
+        """The labels of all conditions, each once, in order."""
+        return sorted({label_of(condition) for condition in self.conditions})
 
     def selecting_by(self, selection: str) -> list[DescribedCondition]:
         """Return the conditions that have runs and this selection."""
@@ -278,7 +283,7 @@ def read_tally(folder: Results, *, with_uncounted: bool = False) -> Tally:
     return Tally(folder, description, best, driven, uncounted)
 
 
-def no_trials(folder: ResultsFolder, driven: Mapping[str, Driven]) -> RecordError:
+def no_trials(folder: ResultsFolder, driven: Mapping[str, DrivenCondition]) -> RecordError:
     """Return the error for a folder without trials."""
     begun = (
         " No run on a robot is complete; `realitygap trials list` shows how far they are." if driven else ""
@@ -300,7 +305,7 @@ def labeled_conditions(folder: ResultsFolder) -> list[DescribedCondition]:
     return [_labeled(each, driven) for each in conditions_of(folder.description)]
 
 
-def _labeled(condition: DescribedCondition, driven: Mapping[str, Driven]) -> DescribedCondition:
+def _labeled(condition: DescribedCondition, driven: Mapping[str, DrivenCondition]) -> DescribedCondition:
     label = driven[condition["name"]].label if condition["name"] in driven else None
     return condition if label is None else {**condition, "label": label}
 

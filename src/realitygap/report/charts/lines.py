@@ -179,6 +179,10 @@ def head(
         write(axes, note, (0.0 if stacked else 1.0, y), (1 if stacked else -1, up), 7.5, **muted)
 
 
+SPECIES_PENS = (Ink.PEN1, Ink.PEN2, Ink.PEN3, Ink.PEN5, Ink.PEN4, Ink.PEN6, Ink.PEN7, Ink.PEN0)
+"""Colors of species, by the order of their numbers."""
+
+
 def generation_axis(axes: Axes, unit: str, most: int = 8) -> None:
     """Number generations from left to right, with `most` numbers at most, and name the unit of the values."""
     from matplotlib.ticker import MaxNLocator

@@ -94,7 +94,7 @@ class TwinRow(GapRow):
     seconds: NotRequired[float]
 
 
-class FamilyRow(TypedDict):
+class FamilyGapRow(TypedDict):
     """Median RMS gap of a family, and its median fall, by observation level and budget."""
 
     family: str
@@ -160,6 +160,6 @@ class ClosingSummary(TypedDict):
     n_units: int
     n_counted: int
     twins: list[TwinRow]
-    families: list[FamilyRow]
+    families: list[FamilyGapRow]
     strategies: list[StrategyRow]
     goals: list[GoalRow]

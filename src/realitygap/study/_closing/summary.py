@@ -20,7 +20,7 @@ from .plan import ClosingPlan, TwinName, read_plan
 from .rows import (
     CalibratedRow,
     ClosingSummary,
-    FamilyRow,
+    FamilyGapRow,
     GoalRow,
     MissRow,
     NumberRow,
@@ -177,9 +177,9 @@ def _measures(unit: Unit) -> OrderRow:
 # families and strategies
 
 
-def _families(plan: ClosingPlan, twins: Sequence[TwinRow]) -> list[FamilyRow]:
+def _families(plan: ClosingPlan, twins: Sequence[TwinRow]) -> list[FamilyGapRow]:
     """Return the RMS gap by family, observation and budget: medians over all twins, and over those that count."""
-    rows: list[FamilyRow] = []
+    rows: list[FamilyGapRow] = []
     for family in plan.families:
         of_family = [twin for twin in twins if twin["family"] == family]
         rows.append(_family(family, "none", 0, of_family, lambda twin: (twin["rms"], 0.0)))
@@ -202,7 +202,7 @@ def _family(
     budget: int,
     twins: Sequence[TwinRow],
     read: Callable[[TwinRow], tuple[NumberRow, float | None] | None],
-) -> FamilyRow:
+) -> FamilyGapRow:
     units = [(twin, each) for twin in twins if (each := read(twin)) is not None]
     values = [each[0]["estimate"] for _, each in units if each[0]["estimate"] is not None]
     falls = [each[1] for twin, each in units if twin["counts"] and each[1] is not None]

@@ -12,7 +12,7 @@ import numpy.typing as npt
 import polars as pl
 
 from realitygap.drawing import Ink
-from realitygap.report._tally import Results, read_tally
+from realitygap.report._tally import Results, largest, read_tally
 from realitygap.report._trial_figure import ChosenTrial, choose_trial
 from realitygap.report.charts.house import Drawing, draw_wide, shorten
 from realitygap.report.charts.lines import (
@@ -103,7 +103,7 @@ def draw_lineage(
     champion = ancestors[-1]
     beside = (
         "The number in a dot is that of its species; beside it stand coverage and the structure that no parent has"
-        if rows["generation"].max() < _MOST_LABELED  # type: ignore[operator]
+        if largest(rows, "generation") < _MOST_LABELED
         else "Colors tell species apart, and repeat when there are more than eight"
     )
     caption = (
@@ -175,8 +175,8 @@ def _brought(
 
 
 def _draw(trial: ChosenTrial, rows: pl.DataFrame, ancestors: list[Ancestor], width: float) -> Sheet:
-    n = int(rows["generation"].max()) + 1  # type: ignore[arg-type]
-    n_individuals = int(rows["individual"].max()) + 1  # type: ignore[arg-type]
+    n = largest(rows, "generation") + 1
+    n_individuals = largest(rows, "individual") + 1
     is_wide = width >= IS_WIDE
     is_few = n <= (_MOST_LABELED if is_wide else _MOST_LABELED // 2)
     shows_all = is_few and n_individuals <= _MOST_ROWS

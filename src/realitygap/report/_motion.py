@@ -22,7 +22,7 @@ from realitygap.records import (
     refuse_results,
 )
 from realitygap.report._driven import driven_paths, refuse_replay
-from realitygap.report._tally import Results, Tally, read_tally
+from realitygap.report._tally import Results, Tally, largest, read_tally
 from realitygap.report._trial_figure import ChosenTrial, choose_trial
 from realitygap.robots import Robot
 from realitygap.runs import replay
@@ -160,7 +160,7 @@ def _several(
         trials = [choose_trial(tally, name, replicate, generation, k) for k in range(min(count, _MOST))]
         title = f"{name}, run {replicate}, generation {generation}"
     else:
-        last = int(rows["generation"].max())  # type: ignore[arg-type]
+        last = largest(rows, "generation")
         shown = np.unique(np.linspace(0, last, min(last + 1, _MOST)).round().astype(int)).tolist()
         trials = [choose_trial(tally, name, replicate, k) for k in shown]
         title = f"{name}, run {replicate}: the best of each generation"

@@ -47,6 +47,7 @@ from realitygap.report._table import Cell, Column, Part, Row, TableOnPage, numbe
 from realitygap.report._tally import (
     DescribedStudy,
     Tally,
+    largest,
     read_tally,
     score_text,
     selection_of,
@@ -387,7 +388,7 @@ def _banners(tally: Tally) -> list[tuple[str, str]]:
 
 
 def _expected_replicates(tally: Tally) -> int:
-    most = int(tally.runs["replicate"].max()) + 1  # type: ignore[arg-type]
+    most = largest(tally.runs, "replicate") + 1
     return int(tally.description.get("replicates") or most)
 
 

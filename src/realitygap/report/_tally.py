@@ -283,6 +283,11 @@ def read_tally(folder: Results, *, with_uncounted: bool = False) -> Tally:
     return Tally(folder, description, best, driven, uncounted)
 
 
+def largest(rows: pl.DataFrame, column: str) -> int:
+    """Return the largest number in a column of whole numbers."""
+    return int(rows[column].to_numpy().max())
+
+
 def no_trials(folder: ResultsFolder, driven: Mapping[str, DrivenCondition]) -> RecordError:
     """Return the error for a folder without trials."""
     begun = (

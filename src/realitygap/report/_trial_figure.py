@@ -13,7 +13,7 @@ import polars as pl
 from realitygap.drawing import Ink
 from realitygap.errors import whole_number
 from realitygap.report._driven import refuse_replay
-from realitygap.report._tally import Results, Tally, label_of, read_tally
+from realitygap.report._tally import Results, Tally, label_of, largest, read_tally
 from realitygap.report.charts.arena import draw_arena, draw_cells, draw_start, draw_tracks
 from realitygap.report.charts.house import Drawing, draw_wide, shorten
 from realitygap.report.charts.lines import Dash, head
@@ -89,7 +89,7 @@ def choose_trial(
     rows = tally.rows_of(name, replicate)
     if individual is not None and generation is None:
         raise ValueError(f"Individual {individual} of which generation? Name it too.")
-    last = int(rows["generation"].max())  # type: ignore[arg-type]
+    last = largest(rows, "generation")
     if generation is None and of_last:
         generation = last
     if generation is not None:

@@ -19,6 +19,7 @@ from realitygap.errors import RealityGapError, RobotError, from_extra
 from realitygap.orders import ORDER_FILE, ClosingOrder, takes_order
 from realitygap.platforms import Opening, TwinTarget, platform_of
 from realitygap.records import write_whole
+from realitygap.robots.twin import sample_twin
 from realitygap.trials import Target
 
 from .._calibrate.whole import calibrate_all
@@ -120,8 +121,6 @@ def _twin_path(folder: Path, name: TwinName) -> Path:
 
 def _write_twins(folder: Path, plan: ClosingPlan) -> None:
     """Write the file of each twin, unless it exists."""
-    from realitygap.robots.twin import sample_twin
-
     for name in plan.names:
         if name.family in plan.platforms:
             continue

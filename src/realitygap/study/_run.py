@@ -18,6 +18,7 @@ from realitygap.runs import Condition
 from realitygap.tasks import source_hash
 from realitygap.trials import Operator
 
+from ._cluster import Cluster
 from ._code import AllowCode, with_code_allowed
 from ._executors import ChunkTask, Executor, Threads
 from ._file import load_study
@@ -239,8 +240,6 @@ def _executor(threads: int | None, cluster: str | None) -> Iterator[Executor]:
         )
     if not isinstance(cluster, str):
         raise TypeError(f"cluster is {cluster!r}, expected a text, such as 'tcp://HOST:8786' or 'slurm:20'.")
-    from ._cluster import Cluster
-
     with Cluster(cluster) as executor:
         yield executor
 

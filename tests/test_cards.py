@@ -264,7 +264,7 @@ def test_texts_of_users_are_escaped_in_every_card(tmp_path):
         ),
         replace(TRANSFER, study=HOSTILE, condition=HOSTILE, target=HOSTILE, label=HOSTILE, score=HOSTILE),
         replace(TRIAL, condition=HOSTILE, code=HOSTILE, problem=HOSTILE, end=HOSTILE),
-        straight().named(HOSTILE),
+        replace(straight(), title=HOSTILE),
         study.model_copy(update={"about": about}),
         ResultsFolder.create(tmp_path / "<img src=x>", description),
     ]

@@ -13,7 +13,6 @@ from realitygap.evolution import (
     NearestArchive,
     NoveltySettings,
     PaperArchive,
-    euclidean,
     largest_cell_distance,
     sorted_cells_distance,
 )
@@ -130,7 +129,6 @@ def test_any_distance_can_be_given() -> None:
     archive = NearestArchive(lambda one, other: float(np.abs(one - other).sum()), k=1, threshold=2.0)
     assert archive.update([[0.0, 0.0], [1.0, 1.0], [5.0, 0.0]]).tolist() == [2.0, 2.0, 5.0]
     assert [b.tolist() for b in archive.behaviors] == [[5.0, 0.0]]
-    assert euclidean(np.array([0.0, 3.0]), np.array([4.0, 0.0])) == 5.0
 
 
 def test_one_individual_and_an_empty_archive_have_nothing_to_compare_with() -> None:

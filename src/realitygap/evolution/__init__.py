@@ -28,7 +28,6 @@ from ._novelty import (
     NearestArchive,
     NoveltySettings,
     PaperArchive,
-    euclidean,
     largest_cell_distance,
     sorted_cells_distance,
 )
@@ -60,7 +59,6 @@ __all__ = [
     "behavior_distance",
     "decode_all",
     "distance_kind",
-    "euclidean",
     "genome_from_record",
     "genome_record",
     "inputs_of_robot",

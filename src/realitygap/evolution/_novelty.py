@@ -168,7 +168,7 @@ class PaperArchive(ShownAsCard):
         return novelty
 
 
-def euclidean(first: NDArray[np.float64], second: NDArray[np.float64]) -> float:
+def _euclidean(first: NDArray[np.float64], second: NDArray[np.float64]) -> float:
     """Return the straight distance between two behaviors that are points."""
     return float(np.linalg.norm(first - second))
 
@@ -185,7 +185,7 @@ class NearestArchive(ShownAsCard):
 
     def __init__(
         self,
-        distance: Callable[[NDArray[np.float64], NDArray[np.float64]], float] = euclidean,
+        distance: Callable[[NDArray[np.float64], NDArray[np.float64]], float] = _euclidean,
         *,
         k: int = 15,
         threshold: float = 6.0,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
@@ -154,10 +154,6 @@ class MovingTrial(ShownAsCard):
     def duration_s(self) -> float:
         """Duration of the trial [s]."""
         return self.n_steps * self.step_s
-
-    def named(self, title: str) -> MovingTrial:
-        """Return the same trial with another title."""
-        return replace(self, title=title)
 
     def at(self, time: float) -> Moment:
         """Return the state at a time since the start [s], interpolated between steps, and the last state afterwards."""

@@ -20,7 +20,7 @@ from realitygap.report._closing import (
     write_closing_page,
 )
 from realitygap.report._closing_figures import draw_closing
-from realitygap.report._comparisons import Comparison, compare_conditions
+from realitygap.report._comparisons import compare_conditions
 from realitygap.report._distance_audit import DistanceAudit, audit_distance, distance_notes
 from realitygap.report._distance_figure import draw_distance, save_distance
 from realitygap.report._divergence_figure import compare_trials, save_divergence
@@ -50,7 +50,6 @@ __all__ = [
     "SELECTION_NOTE",
     "Audit",
     "AuditProgress",
-    "Comparison",
     "DistanceAudit",
     "Drawing",
     "Each",

@@ -174,13 +174,13 @@ def audit_distance(
     columns, rows = 12, 6
     rng = np.random.default_rng(seed)
     walks = [random_walk(rng, columns, rows, straight) for _ in range(max(n_walks, 2 * n_pairs))]
-    leverages = _leverages(distance, walks[:n_walks], columns, rows, sort)
-    order = _order(columns, rows, sort)
+    grid = _Grid(distance, columns, rows, sort)
+    leverages, order = grid.leverages(walks[:n_walks]), grid.order
     means, front, trend = _resampled(leverages[:, order], rng)
     low, high = (np.empty(columns * rows) for _ in range(2))
     low[order], high[order] = np.quantile(means, _BEYOND, axis=0)
     mean = leverages.mean(axis=0)
-    confounds = [_confound("random walks", "", distance, walks[: 2 * n_pairs], columns, rows, sort)]
+    confounds = [grid.confound("random walks", "", walks[: 2 * n_pairs])]
     if study is not None:
         confounds += _confounds_of(study, distance, rng, n_pairs, sort)
     return DistanceAudit(
@@ -231,16 +231,6 @@ def random_walk(rng: np.random.Generator, columns: int, rows: int, straight: flo
     return cells
 
 
-def _as_behavior(
-    distance: BehaviorDistance, walk: Sequence[int], columns: int
-) -> Sequence[int] | tuple[float, float]:
-    """Return the part of a walk that a distance compares: its cells, or the middle of the last one [m]."""
-    if distance.compares == "cells":
-        return walk
-    row, column = divmod(walk[-1] if walk else 0, columns)
-    return ((column + 0.5) * CELL_M, (row + 0.5) * CELL_M)
-
-
 # leverage
 
 
@@ -254,22 +244,59 @@ def changed_walk(walk: Sequence[int], cell: int, columns: int) -> list[int]:
     return [*walk[:after], cell, *walk[after:]]
 
 
-def _leverages(
-    distance: BehaviorDistance, walks: Sequence[list[int]], columns: int, rows: int, sort: CellOrder
-) -> Values:
-    """Return the distance from each walk to itself with each cell changed, (w, c)."""
-    counts = np.empty((len(walks), columns * rows))
-    for k, walk in enumerate(walks):
-        variants = [changed_walk(walk, cell, columns) for cell in range(columns * rows)]
-        behaviors = [_as_behavior(distance, each, columns) for each in (walk, *variants)]
-        counts[k] = distance.distances(behaviors[:1], behaviors[1:], columns=columns, rows=rows, sort=sort)
-    return counts
+@dataclass(frozen=True)
+class _Grid:
+    """A distance of behaviors on a grid of cells, and the order of cells in the paper's distance."""
 
+    distance: BehaviorDistance
+    columns: int
+    rows: int
+    sort: CellOrder
 
-def _order(columns: int, rows: int, sort: CellOrder) -> npt.NDArray[np.int64]:
-    """Return cells in the paper's order, (c,)."""
-    numbers = np.arange(columns * rows).reshape(rows, columns)
-    return (numbers.T if sort == "x-then-y" else numbers).ravel()
+    @property
+    def order(self) -> npt.NDArray[np.int64]:
+        """Cells in the paper's order, (c,)."""
+        numbers = np.arange(self.columns * self.rows).reshape(self.rows, self.columns)
+        return (numbers.T if self.sort == "x-then-y" else numbers).ravel()
+
+    def behavior(self, walk: Sequence[int]) -> Sequence[int] | tuple[float, float]:
+        """Return the part of a walk that the distance compares: its cells, or the middle of the last one [m]."""
+        if self.distance.compares == "cells":
+            return walk
+        row, column = divmod(walk[-1] if walk else 0, self.columns)
+        return ((column + 0.5) * CELL_M, (row + 0.5) * CELL_M)
+
+    def leverages(self, walks: Sequence[list[int]]) -> Values:
+        """Return the distance from each walk to itself with each cell changed, (w, c)."""
+        n_cells = self.columns * self.rows
+        size = {"columns": self.columns, "rows": self.rows}
+        leverages = np.empty((len(walks), n_cells))
+        for k, walk in enumerate(walks):
+            variants = [changed_walk(walk, cell, self.columns) for cell in range(n_cells)]
+            behaviors = [self.behavior(each) for each in (walk, *variants)]
+            leverages[k] = self.distance.distances(behaviors[:1], behaviors[1:], sort=self.sort, **size)
+        return leverages
+
+    def confound(self, of: str, label: str, behaviors: Sequence[Sequence[int]]) -> Confound:
+        """Compare behaviors in pairs: the first with the second, the third with the fourth, and so on."""
+        measure = measure_of(self.distance.name, self.columns, self.rows, self.sort)
+        packed = pack_behaviors(measure, list(map(self.behavior, behaviors)), self.columns, self.rows)
+        apart = np.empty(len(behaviors) // 2)
+        distances.distances_in_pairs(measure, packed, apart)
+        visited = [set(each) for each in behaviors]
+        lengths = np.array([len(each) for each in visited], np.float64)
+        difference = np.abs(lengths[0::2] - lengths[1::2])
+        both = np.array([len(one & other) for one, other in zip(visited[0::2], visited[1::2], strict=True)])
+        return Confound(
+            of=of,
+            label=label,
+            n_pairs=len(apart),
+            mean_cells=float(lengths.mean()),
+            contained=float((both / np.maximum(1, np.minimum(lengths[0::2], lengths[1::2]))).mean()),
+            correlation=rank_correlation(difference, apart),
+            length_difference=difference,
+            distance=apart,
+        )
 
 
 def _resampled(leverages: Values, rng: np.random.Generator) -> tuple[Values, Values, Values]:
@@ -303,38 +330,6 @@ def _trend(means: Values) -> Values:
 # the relation with length
 
 
-def _confound(
-    of: str,
-    label: str,
-    distance: BehaviorDistance,
-    behaviors: Sequence[Sequence[int]],
-    columns: int,
-    rows: int,
-    sort: CellOrder,
-) -> Confound:
-    """Compare behaviors in pairs: the first with the second, the third with the fourth, and so on."""
-    measure = measure_of(distance.name, columns, rows, sort)
-    packed = pack_behaviors(
-        measure, [_as_behavior(distance, each, columns) for each in behaviors], columns, rows
-    )
-    apart = np.empty(len(behaviors) // 2)
-    distances.distances_in_pairs(measure, packed, apart)
-    visited = [set(each) for each in behaviors]
-    lengths = np.array([len(each) for each in visited], np.float64)
-    difference = np.abs(lengths[0::2] - lengths[1::2])
-    both = np.array([len(one & other) for one, other in zip(visited[0::2], visited[1::2], strict=True)])
-    return Confound(
-        of=of,
-        label=label,
-        n_pairs=len(apart),
-        mean_cells=float(lengths.mean()),
-        contained=float((both / np.maximum(1, np.minimum(lengths[0::2], lengths[1::2]))).mean()),
-        correlation=rank_correlation(difference, apart),
-        length_difference=difference,
-        distance=apart,
-    )
-
-
 def _open_for(distance: BehaviorDistance, folder: ResultsFolder | str | Path) -> ResultsFolder:
     """Results on whose trials a distance can be audited."""
     if distance.compares != "cells":
@@ -349,21 +344,19 @@ def _confounds_of(
     folder: ResultsFolder, distance: BehaviorDistance, rng: np.random.Generator, n_pairs: int, sort: CellOrder
 ) -> list[Confound]:
     """Return the confounds for the trials of each condition of a study."""
-    sentences = []
+    confounds = []
     for condition in folder.description["conditions"]:
         rows = folder.read(condition["name"], columns=["replicate", "cells"])
         behaviors = _pairs_of_runs(rows, rng, n_pairs)
         if len(behaviors) >= 2 * _LEAST_PAIRS:
-            columns, lines = grid_of(condition)
-            sentences.append(
-                _confound(condition["name"], label_of(condition), distance, behaviors, columns, lines, sort)
-            )
-    if not sentences:
+            grid = _Grid(distance, *grid_of(condition), sort)
+            confounds.append(grid.confound(condition["name"], label_of(condition), behaviors))
+    if not confounds:
         raise RecordError(
             f"{folder.path} holds no condition with {2 * _LEAST_PAIRS} trials of two runs or more, so there is nothing "
             "to compare. Run the study first."
         )
-    return sentences
+    return confounds
 
 
 def _pairs_of_runs(rows: pl.DataFrame, rng: np.random.Generator, n_pairs: int) -> list[list[int]]:

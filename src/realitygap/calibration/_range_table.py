@@ -313,7 +313,11 @@ class RangeProblem:
         return self._descend(point, most_steps, STEP)
 
     def _descend(self, point: Floats, most_steps: int, step: float) -> Floats:
-        """Return the best point near another one by Levenberg-Marquardt, (p,)."""
+        """Return the best point near another one by Levenberg-Marquardt, (p,).
+
+        Differs from SciPy's method `lm`: normal equations. A table has thousands of rows, which take longer to
+        decompose, and the minimum is the same.
+        """
         seen, weights, damping = self.table.seen, self.weights, 1e-2
         left = self.left(point)
         for _ in range(most_steps):

@@ -109,7 +109,7 @@ def test_wrong_options_are_refused_before_a_trial_is_spent(folder, tmp_path):
             del others[at : at + 2]
         result = run(*others, "--to", "sim", *wrong)
         assert result.exit_code == 2
-        assert "less than or equal to" in result.output
+        assert "expected at most" in result.output
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,35 @@
+"""What scripts of pages send is taken only in the form that they send it."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import pytest
+
+pytest.importorskip("nicegui", reason="needs the extra lab")
+
+from realitygap.lab.pages._elements import _CELLS, _PULL, _content
+
+PULL = {"move": 1, "turn": -0.5, "stops": 0}
+
+
+NO_PULLS = [
+    *(None, [], "up", {}),
+    *({**PULL, "move": move} for move in ("fast", True)),
+    *({**PULL, "turn": float("nan")}, {**PULL, "stops": 0.5}, {**PULL, "more": 1}),
+]
+
+
+@pytest.mark.parametrize("args", NO_PULLS)
+def test_pull_of_another_form_is_left_out(args):
+    assert _content(SimpleNamespace(args=args), _PULL) is None
+
+
+def test_pull_and_cells_are_taken_as_they_are():
+    assert _content(SimpleNamespace(args=PULL), _PULL) == PULL
+    assert _content(SimpleNamespace(args=[3, 1]), _CELLS) == [3, 1]
+
+
+@pytest.mark.parametrize("args", [None, 3, ["3"], [True], [1.5], {"0": 1}])
+def test_cells_of_another_form_are_left_out(args):
+    assert _content(SimpleNamespace(args=args), _CELLS) is None

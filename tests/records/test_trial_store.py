@@ -18,6 +18,7 @@ from realitygap.records import (
     Score,
     TrialRecord,
     _ledger_file,
+    _ledger_reader,
     open_ledger,
     open_saved_trials,
     read_observations,
@@ -308,6 +309,18 @@ def test_a_name_that_a_command_chose_takes_up_the_lines_in_its_place(tmp_path: P
         ledger = open_saved_trials(tmp_path / "a.sqlite", HEAD, within=tmp_path)
     assert len(ledger.observations().trials) == 1
     ledger.close()
+
+
+def test_time_of_a_look_up_does_not_grow_with_the_number_of_trials(path: Path) -> None:
+    """Each trial was compared with each score: 20,000 trials took longer than a query may."""
+    with open_ledger(path) as ledger:
+        for query in (
+            f"{_ledger_reader._OBSERVED}ORDER BY place",
+            "SELECT id, state FROM trials WHERE purpose = '' AND number = 1 AND controller IS 1 ORDER BY place",
+            "SELECT coalesce(max(place), 0) FROM trials",
+        ):
+            steps = [str(row["detail"]) for row in ledger._all(f"EXPLAIN QUERY PLAN {query}")]
+            assert not [step for step in steps if step.startswith("SCAN") and "INDEX" not in step], steps
 
 
 def test_damaged_record_is_one_clear_error(path: Path) -> None:

@@ -161,7 +161,13 @@ CREATE TRIGGER closed_individuals_stay BEFORE UPDATE ON individuals WHEN OLD.fit
 BEGIN SELECT RAISE(ABORT, 'the generation is closed'); END;
 """
 
-SCHEMA = TABLES + _no_deleting(TABLE_NAMES) + FROZEN
+_INDEXES = """
+CREATE INDEX trials_by_number ON trials(number);
+CREATE INDEX trials_by_place ON trials(place);
+CREATE INDEX scores_by_trial ON scores(trial);
+"""
+
+SCHEMA = TABLES + _INDEXES + _no_deleting(TABLE_NAMES) + FROZEN
 """SQL that makes an empty ledger."""
 
 _TRIALS_1 = """
@@ -190,6 +196,7 @@ ALTER TABLE trials RENAME TO trials_of_format_1;
 {"".join(ledger_tables()[name] for name in _NEW_NAMES)}
 INSERT INTO trials SELECT *, NULL, NULL, NULL, NULL FROM trials_of_format_1;
 DROP TABLE trials_of_format_1;
+{_INDEXES}
 {_no_deleting(_NEW_NAMES)}
 PRAGMA user_version = {LEDGER_FORMAT};
 COMMIT;

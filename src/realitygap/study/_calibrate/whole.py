@@ -111,7 +111,7 @@ def calibrate_all(
     trials, left_out = of_one_length(carried_out)
     if trials:
         platform = platform.model_copy(update={"step_s": step_of(trials)})
-    fit = _Fit(platform, target.arena, seed, say, threads)
+    fit = _Fitter(platform, target.arena, seed, say, threads)
     if is_chosen:
         chosen = fit.chosen(fit.posterior(trials, "small"), budget - first, first)
         say(f"{len(chosen)} more trials, chosen")
@@ -170,10 +170,10 @@ def fit_everything(
         ValueError: Trials with commands of several lengths of time.
     """
     platform = SimPlatform(robot=robot, **({"step_s": step_of(trials)} if trials else {}))
-    return _Fit(platform, arena, seed, lambda _: None, None).parts(trials, "full")
+    return _Fitter(platform, arena, seed, lambda _: None, None).parts(trials, "full")
 
 
-class _Fit:
+class _Fitter:
     """A robot in an arena, ready to be fitted."""
 
     def __init__(

@@ -15,7 +15,7 @@ import typer
 from typer.testing import CliRunner
 
 from realitygap.cli import app
-from realitygap.cli._json import print_json
+from realitygap.cli._options import print_json
 from realitygap.errors import StudyError
 from realitygap.evolution import NeatSettings, Population
 from realitygap.world import load_calibration, load_robot

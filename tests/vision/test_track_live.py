@@ -194,7 +194,7 @@ def test_a_study_is_scored_by_a_camera_as_by_the_witness_and_says_what_it_did_no
 
 
 def test_a_camera_as_an_option_says_what_it_looks_for():
-    from realitygap.cli._camera import parse_camera, under_camera
+    from realitygap.cli._observer import parse_camera, under_camera
 
     number, marks = parse_camera("2?tag=aruco4x4:7&tag-height=0.12&corner-inset=-0.05", ARENA)
     assert (number, marks.tag.family, marks.tag.number, marks.tag.height) == (2, "aruco4x4", 7, 0.12)

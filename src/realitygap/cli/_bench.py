@@ -11,8 +11,8 @@ from realitygap._limits import parse_toml
 from realitygap._terminal import echo
 from realitygap.errors import StudyError, did_you_mean
 
-from ._json import print_json
-from ._options import Json
+from ._options import Json, print_json
+from ._progress import RunsBar
 
 DEFAULT_SEEDS = 100
 _ONLY_TASKS = "Only with a task"
@@ -159,8 +159,6 @@ def _changed_setting(text: str) -> tuple[str, Any]:
 def _bench_task(
     task: str, settings: str, seeds: int | None, seed: int, changes: dict[str, Any], *, as_json: bool
 ) -> None:
-    from ._progress import RunsBar
-
     seeds = DEFAULT_SEEDS if seeds is None else seeds
     with RunsBar(quiet=as_json) as bar:
         figures = realitygap.study.measure_task(
@@ -194,8 +192,6 @@ def _bench_task(
 def _bench_maze(
     task: str, settings: str, seeds: int | None, seed: int, changes: dict[str, Any], *, as_json: bool
 ) -> None:
-    from ._progress import RunsBar
-
     with RunsBar(quiet=as_json) as bar:
         figures = realitygap.study.measure_maze(
             task,

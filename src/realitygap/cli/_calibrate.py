@@ -16,12 +16,11 @@ from realitygap._terminal import draw, echo
 from realitygap.errors import StudyError
 from realitygap.orders import CalibrateOrder
 
-from ._camera import CameraOfRobots, under_camera
 from ._code import AllowPlatforms
-from ._json import print_json
-from ._observer import sheet_observer
-from ._options import Json
+from ._observer import CameraOfRobots, sheet_observer, under_camera
+from ._options import Json, print_json
 from ._order import command_of
+from ._tables import calibration_table, held_out_table, wide_console
 
 if TYPE_CHECKING:
     from realitygap.world import Calibration
@@ -119,8 +118,6 @@ def _print(made: Calibration, out: Path, figure: Path | None, *, as_json: bool) 
         values |= made.model_dump(exclude={"draws", "evidence"}) | {"held_out": made.held_out or None}
         print_json(values)
         return
-    from ._tables import calibration_table, held_out_table, wide_console
-
     console = wide_console()
     console.print(calibration_table(made))
     if made.held_out:

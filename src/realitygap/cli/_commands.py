@@ -56,7 +56,7 @@ SECTIONS: dict[str, tuple[Command, ...]] = {
         Command(
             "export-trials",
             "Write driven trials as JSON, Parquet, MCAP, or bags.",
-            "_export_trials",
+            "_export",
             "export_trials",
         ),
         Command("digest", "Print the hash of a study's results.", "_results", "digest"),
@@ -67,8 +67,8 @@ SECTIONS: dict[str, tuple[Command, ...]] = {
         Command("import", "Turn a log of a real robot into trials.", "_import", "import_log"),
         Command("calibrate", "Fit the simulator to a robot.", "_calibrate", "calibrate"),
         Command("transfer", "Compare strategies that transfer controllers.", "_transfer", "transfer"),
-        Command("closing-the-gap", "Measure and shrink the gap to many robots.", "_closing", "closing"),
-        Command("try", "Drive one exported controller on any platform.", "_try", "try_genome"),
+        Command("closing-the-gap", "Measure and shrink the gap to many robots.", "_transfer", "closing"),
+        Command("try", "Drive one exported controller on any platform.", "_transfer", "try_genome"),
         Command("again", "Repeat a measurement from its result.", "_order", "again", True),
         Command("twin", "Sample and inspect MuJoCo twins (pseudo-reality).", "_twin", "twin"),
     ),
@@ -92,11 +92,9 @@ SECTIONS: dict[str, tuple[Command, ...]] = {
     ),
     "Check and compare": (
         Command("audit-results", "Report what a small table of results can show.", "_audit", "audit_results"),
-        Command(
-            "audit-distance", "Report what a behavior distance weighs.", "_audit_distance", "audit_distance"
-        ),
+        Command("audit-distance", "Report what a behavior distance weighs.", "_audit", "audit_distance"),
         Command("arena", "Convert an arena from or to a map of ROS.", "_arena", "arena"),
-        Command("simulate", "Run one case file as the Jyro simulator does.", "_simulate", "simulate"),
+        Command("simulate", "Run one case file as the Jyro simulator does.", "_platforms", "simulate"),
         Command("bench", "Measure the speed of this machine.", "_bench", "bench"),
     ),
 }

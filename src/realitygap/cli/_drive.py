@@ -11,8 +11,8 @@ import realitygap
 from realitygap._terminal import echo
 from realitygap.robot_families import ports_by_family
 
-from ._camera import Camera, operated_under_camera
 from ._code import AllowTasks, code_permission
+from ._observer import Camera, operated_under_camera
 from ._options import Json, OpenPage, Replicates, StudyFolder, StudySeed, who_option
 from ._results import show_page, written_report
 from ._study import print_result

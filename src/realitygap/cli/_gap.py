@@ -13,12 +13,11 @@ from realitygap._terminal import echo
 from realitygap._wording import bracketed, counted, p_equation, reproduces
 from realitygap.orders import GapOrder, PlanOrder
 
-from ._camera import CameraOfRobots, under_camera
 from ._code import AllowPlatforms
-from ._json import print_json
-from ._observer import attending_observer
-from ._options import Json
+from ._observer import CameraOfRobots, attending_observer, under_camera
+from ._options import Json, print_json
 from ._order import command_of
+from ._progress import TrialsBar
 
 if TYPE_CHECKING:
     from realitygap.gap import GapResult, ReplayError, Why
@@ -39,8 +38,6 @@ def gap(
     """Measure the gap, print the result, and write the page."""
     if report is not None:
         realitygap.report.refuse_gap_page(report)
-    from ._progress import TrialsBar
-
     try:
         with (
             TrialsBar(quiet=as_json) as bar,

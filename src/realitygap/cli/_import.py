@@ -13,8 +13,7 @@ import realitygap
 from realitygap._terminal import echo
 from realitygap.errors import LogError
 
-from ._json import print_json
-from ._options import Json
+from ._options import Json, print_json
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -1,11 +1,16 @@
-"""Options that several commands have in the same words."""
+"""Options that several commands have in the same words, and results as JSON."""
 
 from __future__ import annotations
 
+import json
+import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+
+from realitygap._terminal import echo
 
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
 OpenPage = Annotated[
@@ -41,3 +46,18 @@ def correct_option(panel: str) -> Any:
         help="Enter the cells as a correction, after the generation was closed. Only reports use it.",
         rich_help_panel=panel,
     )
+
+
+def print_json(values: object) -> None:
+    """Print plain values as JSON that any program reads: null stands for nan and infinities, and text for paths."""
+    echo(json.dumps(_plain(values), indent=2, allow_nan=False))
+
+
+def _plain(value: object) -> object:
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, Path):
+        return str(value)
+    if isinstance(value, Mapping):
+        return {key: _plain(part) for key, part in value.items()}
+    return [_plain(part) for part in value] if isinstance(value, list | tuple) else value

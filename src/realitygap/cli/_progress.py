@@ -2,21 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Self
-
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    ProgressColumn,
-    SpinnerColumn,
-    TimeRemainingColumn,
-)
-
-from realitygap._console import PlainColumn, PlainConsole
+from typing import TYPE_CHECKING, Self
 
 if TYPE_CHECKING:
+    from rich.progress import TaskID
+
     from realitygap.study import Progress as StudyProgress
 
 
@@ -25,23 +15,20 @@ class ProgressBar:
 
     Args:
         unit: Units, in the plural.
-        first: Columns before the description.
-        more: Columns after the unit.
+        has_rate: True to show a spinner and the rate, a field of tasks.
         quiet: True to show nothing.
     """
 
-    def __init__(
-        self,
-        unit: str,
-        *,
-        first: Sequence[ProgressColumn] = (),
-        more: Sequence[ProgressColumn] = (),
-        quiet: bool,
-    ) -> None:
+    def __init__(self, unit: str, *, has_rate: bool = False, quiet: bool) -> None:
+        # Rich takes a while to import, and the help of a command needs none
+        from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TimeRemainingColumn
+
+        from realitygap._console import PlainColumn, PlainConsole
+
         self._console = PlainConsole(stderr=True, quiet=quiet)
         counted = (PlainColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), PlainColumn(unit))
-        columns = (*first, *counted, *more, TimeRemainingColumn())
-        self._progress = Progress(*columns, console=self._console, transient=True)
+        columns = (SpinnerColumn(), *counted, PlainColumn("{task.fields[rate]}")) if has_rate else counted
+        self._progress = Progress(*columns, TimeRemainingColumn(), console=self._console, transient=True)
 
     def __enter__(self) -> Self:
         return self
@@ -55,9 +42,7 @@ class RunsBar(ProgressBar):
     """Finished runs, rate, and remaining time, on standard error if that is a terminal."""
 
     def __init__(self, *, quiet: bool) -> None:
-        super().__init__(
-            "runs", first=[SpinnerColumn()], more=[PlainColumn("{task.fields[rate]}")], quiet=quiet
-        )
+        super().__init__("runs", has_rate=True, quiet=quiet)
         self._task = self._progress.add_task("compiling or loading the kernels", total=None, rate="")
 
     def show(self, progress: StudyProgress) -> None:
@@ -95,7 +80,7 @@ class TrialsBar(ProgressBar):
 
     def __init__(self, *, quiet: bool) -> None:
         super().__init__("trials", quiet=quiet)
-        self._tasks: dict[tuple[str, int], Any] = {}
+        self._tasks: dict[tuple[str, int], TaskID] = {}
 
     def show(self, name: str, done: int, total: int) -> None:
         """Show the number of finished trials."""

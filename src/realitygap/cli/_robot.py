@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
@@ -15,8 +15,8 @@ from realitygap._wording import fixed
 from realitygap.errors import RobotError
 from realitygap.robot_families import default_family, own_families, ports_by_family, robot_families
 
-from ._json import print_json
-from ._options import Json
+from ._options import Json, print_json
+from ._tables import print_rows
 
 robot = typer.Typer(
     name="robot",
@@ -85,7 +85,7 @@ def list_ports(as_json: Json = False) -> None:
     if as_json:
         print_json([guess._asdict() for guess in found])
     elif found:
-        _print_table(("port", "seems to be", "the system says"), found)
+        print_rows(("port", "seems to be", "the system says"), found)
     else:
         echo("No serial port found. Pair the robot or plug it in, see docs/how-to/robot.md.")
 
@@ -252,7 +252,7 @@ def show_recording(
     who = header.get("robot", {})
     named = who["name"] if "name" in who else f"{who.get('model')} with Fluke {who.get('fluke')}"
     echo(f"{header.get('label', 'no robot')} on {header['port']}, {named}, {header['started']}")
-    _print_table(("t [s]", "kind", "name", "what"), [_row(line) for line in lines])
+    print_rows(("t [s]", "kind", "name", "what"), [_row(line) for line in lines])
     if not recording.is_whole:
         echo("The last line is cut off, as after a crash, and left out.")
 
@@ -273,7 +273,7 @@ def export_recording(
     echo(f"Written: {out} ({realitygap.robots.export_mcap(file, out)} messages)")
 
 
-def _row(line: Any) -> tuple[str, str, str, str]:
+def _row(line: Mapping[str, Any]) -> tuple[str, str, str, str]:
     """Return a line of a recording for people."""
     values = line.get("values", {})
     what = ", ".join(f"{name} {_value(value)}" for name, value in values.items())
@@ -288,29 +288,15 @@ def _shortened(text: str, most: int = 60) -> str:
     return text if len(text) <= most else f"{text[:most]}... ({len(text) // 2} bytes)"
 
 
-def _value(value: Any) -> str:
+def _value(value: object) -> str:
     if isinstance(value, float):
         return fixed(value, 3)
     return " ".join(map(_value, value)) if isinstance(value, list | tuple) else str(value)
 
 
-def _print(found: dict[str, Any], as_json: bool) -> None:
+def _print(found: Mapping[str, object], as_json: bool) -> None:
     if as_json:
         print_json(found)
         return
     shown = {name: "-" if value in (None, "") else _value(value) for name, value in found.items()}
-    _print_table(None, [(name.replace("_", " "), value) for name, value in shown.items()])
-
-
-def _print_table(heads: tuple[str, ...] | None, rows: Any) -> None:
-    from rich import box
-    from rich.table import Table
-
-    from realitygap._console import PlainConsole
-
-    table = Table(box=box.SIMPLE_HEAD if heads else None, show_header=heads is not None)
-    for head in heads or rows[0]:
-        table.add_column(head, overflow="fold")
-    for row in rows:
-        table.add_row(*(str(cell) for cell in row))
-    PlainConsole().print(table)
+    print_rows(None, [(name.replace("_", " "), value) for name, value in shown.items()])

@@ -15,8 +15,7 @@ from realitygap._terminal import echo, prompt
 from realitygap.errors import StudyError
 
 from ._grid_editor import pick_cells
-from ._json import print_json
-from ._options import correct_option, second_option, who_option
+from ._options import correct_option, print_json, second_option, who_option
 from ._print_sheet import sheet_layout, study_sheet
 from ._trials import _Titles
 

@@ -16,9 +16,10 @@ from realitygap.errors import StudyError
 from realitygap.orders import ClosingOrder
 
 from ._code import AllowTasks, code_permission
-from ._json import print_json
-from ._options import Json, OpenPage, Replicates, StudyFolder, StudySeed
+from ._options import Json, OpenPage, Replicates, StudyFolder, StudySeed, print_json
+from ._progress import RunsBar
 from ._results import show_page, written_report
+from ._tables import summary_table, task_table, wide_console
 
 if TYPE_CHECKING:
     from realitygap.records import ResultsFolder
@@ -93,8 +94,6 @@ def run(
     """
     if study == ClosingOrder.command:
         raise StudyError(f"{study} is a command: realitygap {study}")
-
-    from ._progress import RunsBar
 
     if threads is not None and cluster is not None:
         raise StudyError(
@@ -201,8 +200,6 @@ def print_result(result: StudyResult, *, as_json: bool) -> None:
         print_json(found)
         _print_physical(result, to_stderr=True)
         return
-    from ._tables import summary_table, task_table, wide_console
-
     console = wide_console()
     title = result.folder.description["title"]
     if len(tasks):

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from rich import box
-from rich.table import Table
-
-from realitygap._console import PlainConsole
 from realitygap._wording import FEW_RUNS, fixed
 
 if TYPE_CHECKING:
     import polars as pl
+    from rich.table import Table
 
+    from realitygap._console import PlainConsole
     from realitygap.world import Calibration
 
 NARROWEST = 78
@@ -21,6 +20,8 @@ NARROWEST = 78
 
 def wide_console() -> PlainConsole:
     """Return a console that is wide enough for tables."""
+    from realitygap._console import PlainConsole
+
     console = PlainConsole()
     return console if console.width >= NARROWEST else PlainConsole(width=NARROWEST)
 
@@ -102,6 +103,9 @@ def calibration_table(calibration: Calibration) -> Table:
 
 def table_of(title: str, caption: str = "") -> Table:
     """Return a table without columns yet."""
+    from rich import box
+    from rich.table import Table
+
     return Table(
         title=title,
         caption=caption or None,
@@ -122,12 +126,8 @@ def _number(value: float | None) -> str:
 def held_out_table(held_out: dict[str, Any], label: str) -> Table:
     """Return errors on what a fit did not see: one row a prediction, the fit first."""
     unit = f" [{held_out['unit']}]" if held_out["unit"] else ""
-    table = Table(
-        title=f"Not seen by the fit ({label}, n = {held_out['n']:,}){unit}",
-        caption=f"error: {held_out['measure']}",
-        title_justify="left",
-        caption_justify="left",
-        box=box.SIMPLE_HEAD,
+    table = table_of(
+        f"Not seen by the fit ({label}, n = {held_out['n']:,}){unit}", f"error: {held_out['measure']}"
     )
     table.add_column("prediction", no_wrap=True)
     table.add_column("error", justify="right", no_wrap=True)
@@ -137,3 +137,16 @@ def held_out_table(held_out: dict[str, Any], label: str) -> Table:
         more = [held_out["more"][key].get(name) for key in held_out["more"]]
         table.add_row(name, f"{error:.3g}", *("-" if x is None else f"{x:.3g}" for x in more))
     return table
+
+
+def print_rows(heads: Sequence[str] | None, rows: Sequence[Sequence[object]]) -> None:
+    """Print rows as columns, with heads above them if there are any; long cells are folded."""
+    from rich import box
+    from rich.table import Table
+
+    table = Table(box=box.SIMPLE_HEAD if heads else None, show_header=heads is not None)
+    for head in heads or rows[0]:
+        table.add_column(str(head), overflow="fold")
+    for row in rows:
+        table.add_row(*(str(cell) for cell in row))
+    wide_console().print(table)

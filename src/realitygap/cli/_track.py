@@ -16,8 +16,7 @@ from realitygap._terminal import echo
 from realitygap._wording import fixed
 from realitygap.errors import StudyError
 
-from ._json import print_json
-from ._options import Json, second_option
+from ._options import Json, print_json, second_option
 
 if TYPE_CHECKING:
     from realitygap.records import ScoreRole

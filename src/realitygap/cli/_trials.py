@@ -16,9 +16,10 @@ from realitygap._limits import MOST_TABLE_BYTES, read_file
 from realitygap._terminal import echo
 from realitygap.errors import LedgerError, StudyError, did_you_mean
 
-from ._export_trials import export
+from ._export import write_trials
 from ._grid_editor import pick_cells
-from ._json import print_json
+from ._options import print_json
+from ._tables import wide_console
 
 if TYPE_CHECKING:
     from realitygap.records import Ledger, ScoreRole, Trial
@@ -154,7 +155,7 @@ def trials(
         elif what == "show":
             _show(opened, _number(opened, _needed(trial, "a trial")), as_json=as_json)
         elif what == "export":
-            export(source, out, () if trial is None else [_number(opened, trial)])
+            write_trials(source, out, () if trial is None else [_number(opened, trial)])
         elif what == "agreement":
             _agreement(source, as_json=as_json)
         elif what == "score":
@@ -326,8 +327,6 @@ def _list(opened: Ledger, *, as_json: bool) -> None:
         print_json(rows)
         return
     from rich.table import Table
-
-    from ._tables import wide_console
 
     table = Table(box=None, padding=(0, 2, 0, 0))
     more = ("code", "sheet") if any(trial.code for trial in trials) else ()

@@ -14,8 +14,7 @@ from realitygap._terminal import echo
 from realitygap.errors import RealityGapError
 from realitygap.robot_families import load, robot_families
 
-from ._json import print_json
-from ._options import Json
+from ._options import Json, print_json
 
 twin = typer.Typer(
     name="twin",

@@ -17,7 +17,7 @@ import realitygap.emulator  # noqa: F401  # its ports are known from then on
 from realitygap.emulator import nanoseconds
 from realitygap.errors import RobotError
 from realitygap.families.scribbler import Scribbler
-from realitygap.families.scribbler.emulator._faults import Faults, FaultyLink
+from realitygap.families.scribbler.emulator._link import Faults, FaultyLink
 from realitygap.robots import Command
 
 SETUPS = ("s1?fluke=1", "s2?fluke=none", "s2?fluke=1", "s2?fluke=2")

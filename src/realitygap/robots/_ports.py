@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import re
+import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
@@ -13,6 +15,9 @@ from realitygap.robot_families import default_family, find_family, load, robot_f
 
 _EMULATOR = "realitygap.emulator"
 """The package that pyserial imports for names that begin with emulator://."""
+_PSEUDO_TERMINAL = re.compile(
+    r"/dev/(pts/\d+|pty\w+)$" if sys.platform != "darwin" else r"/dev/(ttys\d+|pty\w+)$"
+)
 _NUMBER = re.compile(r"\[Errno (\d+)\]|\((\d+), '")
 
 
@@ -104,8 +109,19 @@ def open_on(port: str, record: Path | None = None, watchdog_s: float | None = No
     return terminal, terminal.open_robot(rest, record, watchdog_s)
 
 
-def serial_port(name: str, baud: int, timeout_s: float) -> Any:
-    """Return a port of pyserial that is not open yet.
+def is_pseudo_terminal(name: str) -> bool:
+    """Return whether a port is a pseudo-terminal, which no real robot has."""
+    return _PSEUDO_TERMINAL.match(os.path.realpath(name)) is not None
+
+
+def serial_port(name: str, baud: int, timeout_s: float, write_s: float | None = None) -> Any:
+    """Return a port of pyserial that is not open yet, and will be open in one program only, if the system can do that.
+
+    Args:
+        name: Name of the port.
+        baud: Rate [baud].
+        timeout_s: Longest wait for bytes [s].
+        write_s: Longest wait until bytes are written [s]. Default: no limit.
 
     Raises:
         ValueError: The name has an unknown scheme.
@@ -114,7 +130,12 @@ def serial_port(name: str, baud: int, timeout_s: float) -> Any:
 
     if _EMULATOR not in serial.protocol_handler_packages:
         serial.protocol_handler_packages.append(_EMULATOR)
-    return serial.serial_for_url(name, do_not_open=True, baudrate=baud, timeout=timeout_s)
+    port = serial.serial_for_url(
+        name, do_not_open=True, baudrate=baud, timeout=timeout_s, write_timeout=write_s
+    )
+    with contextlib.suppress(AttributeError, NotImplementedError, ValueError):
+        port.exclusive = True
+    return port
 
 
 def reason_of(error: Exception) -> str:

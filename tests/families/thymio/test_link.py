@@ -6,7 +6,7 @@ from realitygap.errors import RobotError, RobotTimeout
 from realitygap.families.thymio import Thymio
 from realitygap.families.thymio import _messages as messages
 from realitygap.families.thymio._messages import Decoder, Kind, Message
-from realitygap.families.thymio._stall import StallRule
+from realitygap.families.thymio._robot import StallRule
 
 
 class Answering:

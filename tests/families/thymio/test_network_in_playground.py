@@ -13,8 +13,9 @@ from realitygap.evolution import ControllerInterface, Network
 from realitygap.families.thymio import Playground, to_aseba
 from realitygap.families.thymio import _messages as messages
 from realitygap.families.thymio._fixed_point import ONE, fixed_point
-from realitygap.families.thymio._link import Link, open_port
+from realitygap.families.thymio._link import Link
 from realitygap.families.thymio._messages import Kind
+from realitygap.families.thymio._ports import open_port
 from realitygap.families.thymio.playground._playground import why_not
 from realitygap.world import Pose, paper_arena
 

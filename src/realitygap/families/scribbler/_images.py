@@ -7,7 +7,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
 
 from realitygap._image_file import eight_bits, open_image, plain
 from realitygap.errors import ProtocolError
@@ -25,6 +24,8 @@ class Size(NamedTuple):
 FLUKE_1 = Size(256, 192)
 FLUKE_2_LARGE = Size(1280, 800)
 FLUKE_2_SMALL = Size(427, 266)
+_NEAREST = 0
+"""Pillow's number of its nearest filter."""
 RUN_PIXELS = 4
 """Number of columns in a group. The runs of a blob picture count groups."""
 
@@ -43,7 +44,7 @@ def jpeg_pixels(header: bytes, scan: bytes, size: Size, *, gray: bool) -> Pixels
     except (OSError, ValueError) as error:
         raise ProtocolError(f"The picture cannot be read ({error}): a byte was lost or added") from error
     if picture.size != size:
-        picture = picture.resize(size, Image.Resampling.NEAREST)
+        picture = picture.resize(size, _NEAREST)
     return np.asarray(picture, np.uint8)
 
 

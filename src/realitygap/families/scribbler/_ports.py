@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import contextlib
 import errno
 import ipaddress
 import os
-import re
 import socket
-import sys
 import time
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
 from realitygap.errors import RobotError
-from realitygap.robots import GIVE_UP_S, Label, PortGuess, reason_of, serial_port
+from realitygap.robots import GIVE_UP_S, Label, PortGuess, is_pseudo_terminal, reason_of, serial_port
 
 from ._reading import GAP_S
 
@@ -28,9 +25,6 @@ UNKNOWN_HOLDER_S = 2.0
 """Time to retry if the system does not report which process locked the port [s]."""
 LOCKS = Path("/proc/locks")
 """The locks of files, if the system lists them."""
-_PSEUDO_TERMINAL = re.compile(
-    r"/dev/(pts/\d+|pty\w+)$" if sys.platform != "darwin" else r"/dev/(ttys\d+|pty\w+)$"
-)
 
 
 def port_name(name: str) -> str:
@@ -48,7 +42,7 @@ def label_of(name: str) -> Label:
         return label_of(inner.partition("?")[0])
     if inner:
         return "EMULATED" if _is_loopback(name) else "REAL"
-    return "EMULATED" if _PSEUDO_TERMINAL.match(str(Path(name).resolve())) else "REAL"
+    return "EMULATED" if is_pseudo_terminal(name) else "REAL"
 
 
 def _is_loopback(url: str) -> bool:
@@ -126,11 +120,8 @@ def _open_once(name: str) -> Any:
         )
     port: Any = None
     try:
-        port = serial_port(name, BAUD, GAP_S)
-        port.write_timeout = WRITE_S
+        port = serial_port(name, BAUD, GAP_S, WRITE_S)
         port.dtr = False
-        with contextlib.suppress(AttributeError, NotImplementedError, ValueError):
-            port.exclusive = True
         port.open()
     except (OSError, ValueError, AttributeError) as error:
         if getattr(error, "errno", None) == errno.EAGAIN:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import weakref
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,13 +12,13 @@ from realitygap.robots import EXITS, Clock, Command, Label, Observation, PortDri
 from realitygap.world import Pose
 
 from . import _codec as codec
-from ._board import Board
-from ._camera import Camera
-from ._channels import Channels
 from ._device import RobotInfo
 from ._driving import Driving
+from ._fluke import Board, Camera
+from ._identity import Identity
 from ._link import Link
 from ._ports import is_serial_port, label_of, open_port, port_name
+from ._senses import Senses
 from ._sound import SoundAndLight
 from ._watchdog import Watchdog, WatchedClock
 
@@ -25,9 +26,13 @@ COUNT_M = 0.00025
 """Distance of a wheel for one count of an S2's encoders [m]: half of its half millimeter."""
 FAR = 99
 """Distance reading of an S2 if nothing is in range."""
+DARKEST = {"s1": 5000, "s2": 65_535}
+"""The light reading of a dark room; an S1 reads more if there is no light at all."""
+FULL_SPEED = 0.15
+"""Speed of an S2's wheel at full command: 600 counts in a second [m/s]."""
 
 
-class Scribbler(Driving, Channels, SoundAndLight, Camera, Board, PortDriver):
+class Scribbler(Driving, Senses, Identity, SoundAndLight, Camera, Board, PortDriver):
     """A Scribbler (S1, S2 or S3), alone or with a Fluke (1 or 2), on a port.
 
     | command | least | most | unit |
@@ -40,6 +45,14 @@ class Scribbler(Driving, Channels, SoundAndLight, Camera, Board, PortDriver):
     | obstacle left, center, right | a Fluke | free | `reading_max` and more | 0 to 6400 |
     | distance left, right | an S2 alone | nothing seen | touching | 99 to 0 |
     | infrared left, right | an S1 alone | free | an obstacle | 1, 0 |
+
+    Other sensors are read only if `select` chose them, because each costs a command on the wire.
+
+    | channel | with | from | to |
+    |---|---|---|---|
+    | light.0, .1, .2: left, center, right | a robot | 0: dark | 1: bright |
+    | line.0, .1: left, right | a robot | 0: light floor | 1: dark floor |
+    | encoder.0, .1: left, right wheel, as the end ahead sees it | an S2 or S3 | -1: full speed back | 1: full speed |
 
     The motors are off after opening. `close`, the end of a `with` block, an exception, Ctrl-C, SIGTERM, and the end of
     the program stop them. In trials, silence of the program also stops them (`watchdog_s`).
@@ -58,6 +71,10 @@ class Scribbler(Driving, Channels, SoundAndLight, Camera, Board, PortDriver):
     least_battery_v = 6.15
     """Voltage below which the firmware of the Fluke 1 blinks for new batteries, and Bluetooth may fail [V]."""
     blinded_advice = ", or lower ir_power"
+
+    _selected: tuple[str, ...] = ()
+    _is_turned = False
+    _counted: tuple[float, int, int] | None = None
 
     def __init__(
         self,
@@ -121,6 +138,23 @@ class Scribbler(Driving, Channels, SoundAndLight, Camera, Board, PortDriver):
 
     # the contract
 
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Names of the sensors besides range sensors."""
+        if self.info.model is None:
+            return ()
+        encoders = ("encoder.0", "encoder.1") if self.info.model == "s2" else ()
+        return ("light.0", "light.1", "light.2", "line.0", "line.1", *encoders)
+
+    def select(self, names: Sequence[str]) -> None:
+        """Choose the sensors that `observe` reads besides range sensors.
+
+        Raises:
+            RobotError: The robot does not answer which end is ahead, which encoders need.
+        """
+        self._selected = tuple(names)
+        self._is_turned = self._has("encoder") and self.forwardness == "fluke"
+
     def reset(self, pose: Pose | None = None) -> None:
         """Begin a trial: stop the motors, and count steps from 0. The operator has placed the robot at its start."""
         self.need_robot("reset")
@@ -140,6 +174,39 @@ class Scribbler(Driving, Channels, SoundAndLight, Camera, Board, PortDriver):
         more = {"channels": seen.channels} if seen.channels else {}
         self._recorder.call("observe", readings=seen.readings, stalled=seen.stalled, raw=seen.raw, **more)
         return seen
+
+    def _has(self, kind: str) -> bool:
+        return any(name.startswith(f"{kind}.") for name in self._selected)
+
+    def _read_channels(self) -> dict[str, float]:
+        """Read the selected sensors, all of a kind in one command."""
+        values: list[tuple[str, float]] = []
+        if self._has("light"):
+            darkest = DARKEST[self.info.model or "s2"]
+            bright = (max(1.0 - raw / darkest, 0.0) for raw in self.light())
+            values += [(f"light.{k}", value) for k, value in enumerate(bright)]
+        if self._has("line"):
+            values += [(f"line.{k}", float(dark)) for k, dark in enumerate(self.line())]
+        if self._has("encoder"):
+            values += [(f"encoder.{k}", value) for k, value in enumerate(self._wheel_speeds())]
+        return {name: value for name, value in values if name in self._selected}
+
+    def _wheel_speeds(self) -> tuple[float, float]:
+        """Return the mean speeds since the last call as parts of full speed, -1..1; 0 at the first call of a trial."""
+        left, right = self.encoders()
+        if self._is_turned:
+            left, right = -right, -left
+        now = self.link.clock.now()
+        time, *before = self._counted or (now, left, right)
+        self._counted = now, left, right
+        full = FULL_SPEED / COUNT_M * (now - time)
+        if full <= 0:
+            return 0.0, 0.0
+        first, second = (
+            min(max((count - old) / full, -1.0), 1.0)
+            for count, old in zip((left, right), before, strict=True)
+        )
+        return first, second
 
     def _observe(self) -> Observation:
         if self.info.fluke != "none":

@@ -31,7 +31,7 @@ def emulate(
     In Python: realitygap.families.thymio.Playground(speed=8)
     """
     from .playground._playground import LACKS, Playground
-    from .playground._serve import PlaygroundServer
+    from .playground._port import PlaygroundServer
 
     with (
         Playground(open_arena(arena), speed=speed, port=tcp, window=window) as playground,

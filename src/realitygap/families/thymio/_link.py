@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import errno
-import socket
 import threading
 import time
 from collections.abc import Callable, Sequence
@@ -13,22 +11,19 @@ from typing import Any, TypeVar
 
 from realitygap.errors import ProtocolError, RobotError, RobotTimeout
 from realitygap.robots import SILENT_S as FROZEN_S
-from realitygap.robots import Guardian, descriptor_of, reason_of, serial_port
+from realitygap.robots import Guardian, descriptor_of
 
 from . import _messages as messages
 from ._messages import Decoder, Kind, Message
+from ._ports import POLL_S
 from ._program import OWN, safety_program, with_sum
 
 T = TypeVar("T")
 
-BAUD = 115_200
-POLL_S = 0.02
-"""Longest wait for bytes in one piece [s]."""
 ANSWER_S = 0.8
 """Time in which a robot has to answer [s]."""
 OTHERS_S = 0.1
 """Time in which other robots on a dongle may name themselves after the first [s]."""
-WRITE_S = 0.5
 ONCE_MORE = 2
 """Attempts to read variables: reading them again is safe."""
 WRITE_TRIES = 3
@@ -52,41 +47,6 @@ Span = tuple[int, int]
 """Offset and number of words."""
 Tell = Callable[[str, bytes, bytes], None]
 """A function that gets an event, the bytes sent, and the bytes received."""
-
-
-def open_port(name: str) -> Any:
-    """Open a port with DTR high, as the robot needs it to listen.
-
-    Raises:
-        RobotError: It cannot be opened; the message says what to do.
-    """
-    try:
-        port = serial_port(name, BAUD, POLL_S)
-        port.write_timeout = WRITE_S
-        with contextlib.suppress(AttributeError, NotImplementedError, ValueError):
-            port.exclusive = True
-        port.open()
-        connection = getattr(port, "_socket", None)
-        if isinstance(
-            connection, socket.socket
-        ):  # otherwise a short message waits for the one before to be confirmed
-            connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-    except (OSError, ValueError, AttributeError) as error:
-        raise RobotError(f"{name} cannot be opened: {reason_of(error)}. {_advice(name, error)}") from error
-    return port
-
-
-def _advice(name: str, error: Exception) -> str:
-    number, text = getattr(error, "errno", None), str(error).lower()
-    if number in (errno.EAGAIN, errno.EBUSY) or "busy" in text or "exclusively lock" in text:
-        return "Another program has the port: quit Thymio Suite, which holds it while it runs, and try again."
-    if "access is denied" in text:
-        return "Another program may have the port: quit Thymio Suite and try again."
-    if "permission" in text or "denied" in text:
-        return "May this account use it? On Linux: sudo usermod -aG dialout $USER, then log in again."
-    if "://" in name:
-        return "Is the address right, and does a playground listen there?"
-    return "Is the robot or its dongle plugged in? `realitygap robot list` names the ports."
 
 
 @dataclass(frozen=True)

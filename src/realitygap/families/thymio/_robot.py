@@ -15,11 +15,10 @@ from realitygap.robots import EXITS, Command, Label, Observation, PortDriver, ch
 from realitygap.world import Pose
 
 from ._clock import BoardClock
-from ._link import Description, Link, open_port
+from ._link import Description, Link
 from ._messages import set_variables, user_event
-from ._ports import label_of, port_name
+from ._ports import label_of, open_port, port_name
 from ._program import DRIVE, OWN, TICK_S, with_sum
-from ._stall import StallRule
 
 FULL_SCALE = 4505.0
 """Reading of an infrared sensor that touches white paper; source: Enki, `Thymio2.cpp`."""
@@ -47,6 +46,14 @@ _PROX, _GROUND = "prox.horizontal", "prox.ground.delta"
 _TARGETS = ("motor.left.target", "motor.right.target")
 _SPEEDS = ("motor.left.speed", "motor.right.speed")
 _ENCODERS = ("encoder.0", "encoder.1")
+
+
+LEAST_TARGET = 50
+"""Targets below it count as standing: measured speeds are noisy [units]."""
+SHARE = 0.3
+"""Share of its target below which a wheel counts as held."""
+STALL_S = 0.3
+"""Time for which a wheel has to be held [s]."""
 
 
 @dataclass(frozen=True)
@@ -79,6 +86,35 @@ class _Seen:
 
     values: dict[str, tuple[int, ...]]
     own: dict[str, int]
+
+
+class StallRule:
+    """A robot is stalled if a wheel has turned slower than 0.3 of its target for 0.3 s.
+
+    The numbers are chosen. The rule was not tried on a robot. A playground reports targets as speeds, so it never
+    applies there.
+    """
+
+    def __init__(self) -> None:
+        self._since: float | None = None
+
+    def is_stalled(self, now: float, targets: Sequence[int], speeds: Sequence[int]) -> bool:
+        """Return whether the robot is stalled.
+
+        Args:
+            now: The robot's time [s].
+            targets: Target speeds of both wheels [units].
+            speeds: Measured [units].
+        """
+        is_held = any(
+            abs(target) >= LEAST_TARGET and speed * (1 if target > 0 else -1) < SHARE * abs(target)
+            for target, speed in zip(targets, speeds, strict=True)
+        )
+        if not is_held:
+            self._since = None
+        elif self._since is None:
+            self._since = now
+        return self._since is not None and now - self._since >= STALL_S
 
 
 class Thymio(PortDriver):

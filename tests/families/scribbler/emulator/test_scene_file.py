@@ -5,8 +5,8 @@ import pytest
 
 from realitygap.errors import RobotError
 from realitygap.families.scribbler.emulator import Emulator, open_scene
+from realitygap.families.scribbler.emulator._scene import Walls
 from realitygap.families.scribbler.emulator._view import picture
-from realitygap.families.scribbler.emulator._walls import Walls
 
 from .wire import ask
 

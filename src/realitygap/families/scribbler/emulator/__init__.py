@@ -1,7 +1,7 @@
 """A Scribbler for real client programs, with any simulated robot behind it."""
 
 from ._emulator import Emulator
-from ._faults import Faults
+from ._link import Faults
 from ._scene import Scene, open_scene
 from ._simulated import SCRIBBLER_BODY, BoxOnWheels, RobotOfItsOwn, SimulatedRobot
 

@@ -16,9 +16,8 @@ from numpy.typing import NDArray
 
 from realitygap.world import FloorImage
 
-from ._scene import Scene
+from ._scene import Scene, Walls
 from ._simulated import SimulatedRobot
-from ._walls import Walls
 
 Bytes = NDArray[np.uint8]
 Floats = NDArray[np.float64]

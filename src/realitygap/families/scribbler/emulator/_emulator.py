@@ -17,12 +17,10 @@ from realitygap.errors import RobotError, whole_number
 from realitygap.world import Arena, Pose
 
 from ._camera import Camera
-from ._faults import SAG_HANG_UP_S, Faults, FaultyLink
 from ._fluke import LINK_BYTE_NS, Fluke
-from ._line import Line
+from ._link import SAG_HANG_UP_S, Faults, FaultyLink, Line
 from ._memory import Memory
-from ._motors import S1_SPACING, S2_SPACING, S1Motors, S2Motors
-from ._power import DROP_OUT_VOLTS, Battery
+from ._motors import DROP_OUT_VOLTS, S1_SPACING, S2_SPACING, Battery, S1Motors, S2Motors
 from ._scene import Scene, paper_scene
 from ._scribbler import BYTE_NS, Scribbler
 from ._senses import Senses
@@ -119,18 +117,7 @@ class Emulator(EmulatedRobot):
         if self.fluke_model != "none":
             camera = Camera(body, self.scene, self.fluke_model)
             self.fluke = Fluke(
-                self.fluke_model,
-                *(
-                    self.robot,
-                    self.table,
-                    self.senses,
-                    camera,
-                    self.battery,
-                    self.memory,
-                    self.schedule,
-                    self._send,
-                ),
-                timing=self.timing,
+                self.fluke_model, self.robot, camera, self.schedule, self._send, timing=self.timing
             )
         self._board: Scribbler | Fluke = self.fluke or self.robot
         self.place(arena.start, seed)

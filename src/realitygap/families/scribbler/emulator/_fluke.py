@@ -14,11 +14,9 @@ from realitygap.emulator import MILLISECOND, SECOND, nanoseconds
 from realitygap.families.scribbler.opcodes import FLUKE_2_COMMANDS, FLUKE_COMMANDS, PACKET, FlukeLengths, Op
 
 from ._camera import Camera, Window
-from ._memory import SCRIBBLER_AHEAD, Memory
-from ._power import Battery
+from ._memory import SCRIBBLER_AHEAD
 from ._scribbler import BYTE_NS, Schedule, Scribbler
-from ._senses import IR_POWER, Senses
-from ._table import Table
+from ._senses import IR_POWER
 
 FlukeModel = Literal["1", "2"]
 Answer = Callable[[bytes, int, int], None]  # bytes, from when on, time of a byte
@@ -63,11 +61,7 @@ class Fluke:
     Args:
         model: "1" or "2".
         robot: Robot that it is plugged into.
-        table: Table with the robot's body and motors.
-        senses: Senses, for its IR.
         camera: Camera.
-        battery: Battery, for its gauge.
-        memory: Memory.
         schedule: Calls back at a time [ns].
         answer: Takes what goes to the client.
         timing: True if bytes and readings take their time.
@@ -77,19 +71,15 @@ class Fluke:
         self,
         model: FlukeModel,
         robot: Scribbler,
-        table: Table,
-        senses: Senses,
         camera: Camera,
-        battery: Battery,
-        memory: Memory,
         schedule: Schedule,
         answer: Answer,
         *,
         timing: bool,
     ) -> None:
         self.model = model
-        self._robot, self._table, self._senses, self._camera = robot, table, senses, camera
-        self._battery, self._memory = battery, memory
+        self._robot, self._camera = robot, camera
+        self._table, self._senses, self._memory = robot.table, robot.senses, robot.memory
         self._schedule, self._answer = schedule, answer
         self._timing = timing
         self._jobs = 0
@@ -316,7 +306,7 @@ class Fluke:
             setattr(self, name, value)
 
     def _get_battery(self, given: bytes, now: int) -> bytes:
-        volts = self._battery.volts(self._table.motors.load)
+        volts = self._table.battery.volts(self._table.motors.load)
         return min(0xFFFF, round(volts * VOLTS)).to_bytes(2, "big")
 
     def _get_ir(self, op: Op) -> Act:

@@ -1,4 +1,4 @@
-"""The response of the Scribblers' motors to commands: the S1 open loop, the S2 in regulated steps of speed.
+"""The motors of the Scribblers, the S1's open loop, the S2's in regulated steps of speed; and the cells that feed them.
 
 Source: scribbler_server.bs2 and ipre_s2_port.spin of Myro's repository, and what is known of s2.spin.
 """
@@ -7,13 +7,20 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass
 
-from realitygap.emulator import MILLISECOND, nanoseconds
+from realitygap.emulator import MILLISECOND, SECOND, nanoseconds
 
 STEP_NS = 5 * MILLISECOND  # of the simulation
 STEP_S = 0.005
 TICK_STEPS = 4  # simulation steps in the 20 ms of the S2's regulator
+
+FULL_VOLTS, EMPTY_VOLTS = 9.0, 6.0  # a full set; the Fluke blinks below 6.15 V
+CAPACITY_AS = 2.0 * 3600  # of fresh AA cells [A s]; chosen
+IDLE_A, MOTORS_A = 0.15, 0.35  # chosen
+OWN_SAG = 0.015  # share of the voltage that fresh cells lose under full load; chosen
+DROP_OUT_VOLTS = 5.5  # below it Bluetooth drops out; chosen
 
 S1_SPACING = 0.1463  # of the S1's wheels, from its CAD model [m]
 S1_TOP_SPEED = 0.15  # no trustworthy figure is known; the S2's is taken [m/s]
@@ -244,3 +251,29 @@ class S2Motors:
 
 Motors = S1Motors | S2Motors
 """The motors that turn the wheels."""
+
+
+class Battery:
+    """A battery with its remaining charge and its voltage under load.
+
+    Args:
+        sag: Share of the voltage lost under full load, of weak cells.
+        own_volts: Function of a load of 0 to 1 that returns the voltage of a robot with its own battery [V].
+    """
+
+    def __init__(self, sag: float = 0.0, own_volts: Callable[[float], float] | None = None) -> None:
+        self._sag = sag + (OWN_SAG if own_volts is None else 0.0)
+        self._own_volts = own_volts
+        self.used = 0.0  # share of the capacity
+
+    def drain(self, load: float, duration_ns: int) -> None:
+        """Use what robot and motors take in a while, with the motors at a load of 0 to 1."""
+        amperes = IDLE_A + MOTORS_A * load
+        self.used = min(1.0, self.used + amperes * duration_ns / SECOND / CAPACITY_AS)
+
+    def volts(self, load: float) -> float:
+        """Return the voltage with the motors at a load of 0 to 1."""
+        if self._own_volts is not None:
+            return self._own_volts(load) * (1 - self._sag * load)
+        resting = FULL_VOLTS - (FULL_VOLTS - EMPTY_VOLTS) * self.used
+        return resting * (1 - self._sag * load)

@@ -12,7 +12,7 @@ from realitygap.robots.twin import TwinBody, load_twin
 from realitygap.world import Arena
 
 from ._emulator import Emulator
-from ._faults import Faults
+from ._link import Faults
 from ._scene import open_scene
 
 

@@ -87,7 +87,7 @@ class Scribbler:
         timing: bool,
     ) -> None:
         self.model = model
-        self._table, self._senses, self._memory = table, senses, memory
+        self.table, self.senses, self.memory = table, senses, memory
         self._schedule, self._send = schedule, send
         self._timing = timing
         self._readers = self._all_readers()
@@ -109,20 +109,20 @@ class Scribbler:
         self._leds = 0
         self._idle_since = now
         self.reckoning = Reckoning()
-        self.echo = self._memory.echo
+        self.echo = self.memory.echo
         self.last_command = b""
         self.tone: tuple[int, int, int] | None = None  # Hz, Hz, until
-        self._table.motors.stop()
-        if isinstance(self._table.motors, S2Motors):
-            self._table.motors.tripped = False
-            self._table.motors.encoders = [0.0, 0.0]
-        self._announces = bool(self._memory.broadcast)
+        self.table.motors.stop()
+        if isinstance(self.table.motors, S2Motors):
+            self.table.motors.tripped = False
+            self.table.motors.encoders = [0.0, 0.0]
+        self._announces = bool(self.memory.broadcast)
         if self._announces:
             self._later(now, self._announce)
 
     def reset(self, now: int) -> None:
         """Restart, as its button, its reset line or SOFT_RESET do."""
-        self._table.advance_to(now)
+        self.table.advance_to(now)
         self._wake(now)
         self._deaf_until = now + (BOOT_NS[self.model] if self._timing else 0)
 
@@ -139,7 +139,7 @@ class Scribbler:
     def _announce(self, now: int) -> None:
         """Send the name once a second until the first command."""
         if self._announces:
-            self._send(b"IPRE" + bytes(self._memory.name[:9]) + b"\0", now, False)
+            self._send(b"IPRE" + bytes(self.memory.name[:9]) + b"\0", now, False)
             self._later(now + SECOND, self._announce)
 
     @property
@@ -182,8 +182,8 @@ class Scribbler:
 
     def _execute(self, packet: bytes, now: int) -> None:
         """Execute a command and send the answer when it is done."""
-        self._table.advance_to(now)
-        if getattr(self._table.motors, "tripped", False):
+        self.table.advance_to(now)
+        if getattr(self.table.motors, "tripped", False):
             self._busy = False
             return  # too much current has stopped everything
         self._announces = False
@@ -219,8 +219,8 @@ class Scribbler:
 
     def _hand_on(self, segments: list[Segment], packet: bytes, number: int, now: int) -> None:
         """Give motions to the motors; the answer waits until they have taken all of them."""
-        motors = self._table.motors
-        self._table.advance_to(now)
+        motors = self.table.motors
+        self.table.advance_to(now)
         if number != self._motions:
             segments = []
         while segments and isinstance(motors, S2Motors) and motors.post(segments[0]):
@@ -237,7 +237,7 @@ class Scribbler:
             self._finish(packet, answer, now)
 
     def _finish(self, packet: bytes, answer: Callable[[], bytes], now: int) -> None:
-        self._table.advance_to(now)
+        self.table.advance_to(now)
         data = answer()
         if self.echo:
             from_memory = self.model == "s1" and packet[0] in EEPROM_READS
@@ -256,7 +256,7 @@ class Scribbler:
     def _all_readers(self) -> dict[int, tuple[int, Callable[[bytes], bytes]]]:
         """Return, for each reading, the time that it takes and the function that answers it."""
         ir, light = IR_NS[self.model], LIGHT_NS[self.model]
-        memory = self._memory
+        memory = self.memory
         readers: dict[int, tuple[int, Callable[[bytes], bytes]]] = {
             Op.GET_PASS1: (0, lambda _: bytes(memory.password[:8])),
             Op.GET_PASS2: (0, lambda _: bytes(memory.password[8:])),
@@ -274,7 +274,7 @@ class Scribbler:
             Op.GET_LINE_RIGHT: (0, lambda _: self._line()[1:]),
             Op.GET_LINE_ALL: (0, lambda _: self._line()),
             Op.GET_STATE: (0, lambda _: self._state()),
-            Op.GET_STALL: (0, lambda _: bytes((self._table.stalled,))),
+            Op.GET_STALL: (0, lambda _: bytes((self.table.stalled,))),
         }
         for op in SIDES:
             readers[op] = (light, self._one_light)
@@ -282,18 +282,18 @@ class Scribbler:
             readers |= {
                 Op.GET_POSITION: (0, lambda _: _longs(_halved(self.reckoning.x), _halved(self.reckoning.y))),
                 Op.GET_ANGLE: (0, lambda _: _longs(round(self.reckoning.angle * 360 / 955))),
-                Op.GET_MIC_ENVELOPE: (0, lambda _: _longs(self._senses.loudness())),
-                Op.GET_MOTOR_STATS: (0, lambda _: self._s2.statistics(self._table.time)),
+                Op.GET_MIC_ENVELOPE: (0, lambda _: _longs(self.senses.loudness())),
+                Op.GET_MOTOR_STATS: (0, lambda _: self._s2.statistics(self.table.time)),
                 Op.GET_ENCODERS: (0, self._encoders),
                 Op.GET_IR_EX: (ir, self._ir_ex),
                 Op.GET_LINE_EX: (0, self._line_ex),
-                Op.GET_DISTANCE: (DISTANCE_NS, lambda packet: bytes((self._senses.ir_level(packet[1] & 1),))),
+                Op.GET_DISTANCE: (DISTANCE_NS, lambda packet: bytes((self.senses.ir_level(packet[1] & 1),))),
             }
         return readers
 
     @property
     def _s2(self) -> S2Motors:
-        motors = self._table.motors
+        motors = self.table.motors
         assert isinstance(motors, S2Motors)  # noqa: S101  # asked of an S2 only
         return motors
 
@@ -302,14 +302,14 @@ class Scribbler:
         return 2 * IR_NS[self.model] + 3 * LIGHT_NS[self.model]
 
     def _sensor_block(self) -> bytes:
-        return self._ir() + self._light() + self._line() + bytes((self._table.stalled,))
+        return self._ir() + self._light() + self._line() + bytes((self.table.stalled,))
 
     def _ir(self, threshold: int = 0) -> bytes:
-        left, right = self._senses.ir(threshold)
+        left, right = self.senses.ir(threshold)
         return bytes((not left, not right))
 
     def _light(self) -> bytes:
-        return b"".join(value.to_bytes(2, "big") for value in self._senses.light(self._darkest))
+        return b"".join(value.to_bytes(2, "big") for value in self.senses.light(self._darkest))
 
     @property
     def _darkest(self) -> int:
@@ -320,20 +320,20 @@ class Scribbler:
         return self._light()[2 * side : 2 * side + 2]
 
     def _line(self) -> bytes:
-        return bytes(self._senses.line())
+        return bytes(self.senses.line())
 
     def _binary(self) -> bytes:
         ir, line = self._ir(), self._line()
-        return bytes((ir[0] << 4 | ir[1] << 3 | self._table.stalled << 2 | line[0] << 1 | line[1],))
+        return bytes((ir[0] << 4 | ir[1] << 3 | self.table.stalled << 2 | line[0] << 1 | line[1],))
 
     def _state(self) -> bytes:
         """Return input and output pins; on the S2 the levels of the light sensors spoil the former."""
         line = self._line()
-        pins = 1 << 3 | line[1] << 4 | line[0] << 5 | 1 << 6 | self._table.stalled << 7
+        pins = 1 << 3 | line[1] << 4 | line[0] << 5 | 1 << 6 | self.table.stalled << 7
         if self.model == "s2":
-            left, center, right = (255 - (value >> 8) for value in self._senses.light(S2_DARKEST))
+            left, center, right = (255 - (value >> 8) for value in self.senses.light(S2_DARKEST))
             pins |= right | center << 1 | left << 2 | 0b11 << 14
-        left_led, center_led, right_led = self.leds(self._table.time)
+        left_led, center_led, right_led = self.leds(self.table.time)
         pins |= right_led << 8 | center_led << 9 | left_led << 10
         return bytes((pins & 0xFF, pins >> 8 & 0xFF))
 
@@ -359,7 +359,7 @@ class Scribbler:
 
         An action returns its duration [ns], or motions for the motors.
         """
-        memory = self._memory
+        memory = self.memory
         setters: dict[int, Setter] = {
             Op.SET_PASS1: lambda packet, _: self._keep(memory.password, 0, packet[1:]),
             Op.SET_PASS2: lambda packet, _: self._keep(memory.password, 8, packet[1:]),
@@ -395,13 +395,13 @@ class Scribbler:
     def _keep(self, where: bytearray, first: int, data: bytes) -> int:
         if where[first : first + len(data)] != data:
             where[first : first + len(data)] = data
-            self._memory.save()
+            self.memory.save()
         return len(data) * EEPROM_NS
 
     def _set_single_data(self, packet: bytes, now: int) -> int:
         """No bounds are checked: password, echo mode, name broadcast and quiet follow the eight bytes."""
         position, value = packet[1], packet[2]
-        memory = self._memory
+        memory = self.memory
         if position < 8:
             return self._keep(memory.data, position, bytes((value,)))
         if position < 24:
@@ -415,18 +415,18 @@ class Scribbler:
     def _set_echo(self, packet: bytes, now: int) -> int:
         self.echo = packet[1]
         if self.model == "s1":
-            self._memory.broadcast = packet[1]
-        self._memory.set_echo(packet[1])
+            self.memory.broadcast = packet[1]
+        self.memory.set_echo(packet[1])
         return EEPROM_NS
 
     def _set_quiet(self, value: int) -> int:
-        self._memory.quiet = value
-        self._memory.save()
+        self.memory.quiet = value
+        self.memory.save()
         return EEPROM_NS
 
     def _set_volume(self, packet: bytes, now: int) -> None:
-        self._memory.volume = min(100, packet[1])
-        self._memory.save()
+        self.memory.volume = min(100, packet[1])
+        self.memory.save()
 
     def _set_led(self, packet: bytes, now: int) -> None:
         on, kept = LEDS[Op(packet[0])]
@@ -442,18 +442,18 @@ class Scribbler:
 
     def leds(self, now: int) -> tuple[int, int, int]:
         """Return left, center and right, 1 for on; all blink after an over-current."""
-        if getattr(self._table.motors, "tripped", False):
+        if getattr(self.table.motors, "tripped", False):
             on = 1 - now // (SECOND // 2) % 2
             return on, on, on
         shown = self._leds ^ (((now - self._idle_since) // SECOND % 2) << 1)
         return shown >> 2 & 1, shown >> 1 & 1, shown & 1
 
     def _stop(self, packet: bytes, now: int) -> None:
-        self._table.motors.stop()
+        self.table.motors.stop()
         self.reckoning.forget()
 
     def _drive(self, packet: bytes, now: int) -> None:
-        self._table.motors.drive(right=packet[1], left=packet[2])
+        self.table.motors.drive(right=packet[1], left=packet[2])
         self.reckoning.forget()
 
     def _sound(self, packet: bytes, now: int) -> int:
@@ -463,7 +463,7 @@ class Scribbler:
         if self.model == "s2":  # its counter of clock cycles has 32 bits
             milliseconds = milliseconds * 80_000 % 2**32 // 80_000
         duration = milliseconds * MILLISECOND
-        if not self._memory.quiet:
+        if not self.memory.quiet:
             self.tone = (packet[3] << 8 | packet[4], second, now + duration)
         return duration
 
@@ -475,7 +475,7 @@ class Scribbler:
 
     def _turn(self, packet: bytes, now: int) -> list[Segment]:
         if packet[1] in (12, 13):
-            self._table.motors.stop()
+            self.table.motors.stop()
             self.reckoning.forget()
         return self.reckoning.turn(packet[1], _word(packet, 2))
 

@@ -10,7 +10,7 @@ import numpy as np
 from realitygap.errors import check_finite
 from realitygap.world import Arena, Body, Pose
 
-from ._walls import Floats, Walls
+from ._scene import Floats, Walls
 
 SCRIBBLER_BODY = Body(((0.089, 0.0795), (0.089, -0.0795), (-0.089, -0.0795), (-0.089, 0.0795)))
 """The outline of the Scribbler, 178 x 159 mm; its origin is the pen, midway between the wheels."""

@@ -7,8 +7,7 @@ from array import array
 from realitygap.emulator import SECOND
 from realitygap.world import Arena, Pose, VisitedCells
 
-from ._motors import STEP_NS, STEP_S, Motors
-from ._power import Battery
+from ._motors import STEP_NS, STEP_S, Battery, Motors
 from ._simulated import RobotOfItsOwn, SimulatedRobot
 
 MOST_POINTS = 1_000_000  # of the path that are kept: 80 minutes of driving; the oldest go first

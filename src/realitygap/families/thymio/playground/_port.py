@@ -1,4 +1,4 @@
-"""A playground in a process of this program, behind the interface of a serial port of pyserial.
+"""A playground behind a serial port of pyserial, in a process of this program; and one that other programs use.
 
 `serial.serial_for_url("emulator://playground?speed=8&arena=paper")` starts one and connects to its robot. Closing the
 port ends it.
@@ -6,12 +6,15 @@ port ends it.
 
 from __future__ import annotations
 
+import selectors
 import socket
 import weakref
 from urllib.parse import parse_qsl, urlsplit
 
 from serial.urlhandler.protocol_socket import Serial as SocketPort
 
+from realitygap._closed_on_exit import ClosedOnExit
+from realitygap.emulator import WitnessDoor
 from realitygap.errors import DescriptionError, RobotError, did_you_mean
 from realitygap.world import Arena, load_arena
 
@@ -21,6 +24,8 @@ HOST = "playground"
 POLL_S = 0.02
 """Longest wait for bytes in one piece [s]."""
 KEYS = ("speed", "arena", "window")
+LOOK_S = 0.2
+"""Time between two looks at whether the playground still runs [s]."""
 
 
 class PlaygroundPort(SocketPort):  # type: ignore[misc]  # pyserial has no types
@@ -107,3 +112,49 @@ def options_of(url: str) -> tuple[Arena | None, float, bool]:
         return load_arena(options["arena"]) if "arena" in options else None, speed, window == "on"
     except DescriptionError as error:
         raise RobotError(str(error)) from None
+
+
+class PlaygroundServer(ClosedOnExit):
+    """Serves the witness of a playground; its robot has a separate port.
+
+    Args:
+        playground: The playground.
+        witness: Port of the witness, 0 for any that is free; None for no witness.
+
+    Attributes:
+        witness_address: Address of the witness, HOST:PORT; None without one.
+
+    Raises:
+        RobotError: The port cannot be used.
+    """
+
+    def __init__(self, playground: Playground, witness: int | None = None) -> None:
+        self._playground = playground
+        self._door = None if witness is None else WitnessDoor(playground, witness)
+        self.witness_address = self._door.address if self._door else None
+        self._selector = selectors.DefaultSelector()
+        if self._door:
+            self._door.watch(self._selector)
+        self._is_stopped = False
+
+    def run(self) -> None:
+        """Serve until `stop`.
+
+        Raises:
+            RobotError: The playground has ended, as when its window is closed.
+        """
+        while not self._is_stopped:
+            for key, _ in self._selector.select(LOOK_S):
+                if self._door:
+                    self._door.serve(key.fileobj)
+            self._playground.pose()
+
+    def stop(self) -> None:
+        """Let `run` return; may be called from a signal handler."""
+        self._is_stopped = True
+
+    def close(self) -> None:
+        """Let go of all who ask the witness."""
+        if self._door:
+            self._door.close()
+        self._selector.close()

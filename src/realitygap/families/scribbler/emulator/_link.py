@@ -1,13 +1,18 @@
-"""The faults of a real link: lost and late bytes, hang-ups, and a supply that sags."""
+"""The link to a client: bytes that leave one after another, and the faults of a real link.
+
+Bytes are lost or late, the link hangs up, and its supply sags.
+"""
 
 from __future__ import annotations
 
 import random
+from collections import deque
 from dataclasses import dataclass, fields
 
 from realitygap.emulator import SECOND, nanoseconds
 from realitygap.errors import RobotError, did_you_mean
 
+MOST_WAITING = 8 << 20  # bytes that wait for a client who does not read; more are lost
 HANG_UP_S = (1.0, 3.0)  # how long the link stays away; chosen
 SAG_HANG_UP_S = 3.0  # after the supply dropped out
 
@@ -118,3 +123,62 @@ class FaultyLink:
     def lateness(self) -> int:
         """Return the delay of a piece of data [ns]."""
         return int(self._random.random() * self._faults.delay * SECOND) if self._faults.delay else 0
+
+
+@dataclass(slots=True)
+class _Chunk:
+    """Bytes that leave one after another."""
+
+    due: int  # of the next one [ns]
+    byte_ns: int
+    data: bytes
+    next: int = 0
+
+
+class Line:
+    """A queue of the bytes that were sent and that the client has not taken yet."""
+
+    def __init__(self) -> None:
+        self._chunks: deque[_Chunk] = deque()
+        self._free = 0
+        self._n_waiting = 0
+
+    def send(self, data: bytes, ready: int, byte_ns: int) -> None:
+        """Send bytes from a time on [ns], each of which takes `byte_ns`."""
+        if not data or self._n_waiting + len(data) > MOST_WAITING:
+            return
+        first = (self._free if self._free > ready else ready) + byte_ns
+        self._free = first + (len(data) - 1) * byte_ns
+        self._chunks.append(_Chunk(first, byte_ns, data))
+        self._n_waiting += len(data)
+
+    def take(self, now: int) -> bytes:
+        """Return the bytes that are out by now."""
+        taken = []
+        while self._chunks and self._chunks[0].due <= now:
+            chunk = self._chunks[0]
+            left = len(chunk.data) - chunk.next
+            n = min(left, (now - chunk.due) // chunk.byte_ns + 1) if chunk.byte_ns else left
+            taken.append(chunk.data[chunk.next : chunk.next + n])
+            if n < left:
+                chunk.next += n
+                chunk.due += n * chunk.byte_ns
+                break
+            self._chunks.popleft()
+        out = taken[0] if len(taken) == 1 else b"".join(taken)
+        self._n_waiting -= len(out)
+        return out
+
+    def drop(self) -> None:
+        """Lose what has not been taken."""
+        self._chunks.clear()
+        self._n_waiting = 0
+
+    def due(self, n: int) -> int | None:
+        """Return the time at which `n` of the queued bytes have been sent [ns]; None if there are fewer."""
+        for chunk in self._chunks:
+            left = len(chunk.data) - chunk.next
+            if n <= left:
+                return chunk.due + (n - 1) * chunk.byte_ns
+            n -= left
+        return None

@@ -1,21 +1,19 @@
-"""The camera of the Fluke."""
+"""The Fluke: its camera, infrared messages, servos, error log, and the reset of the robot."""
 
 from __future__ import annotations
 
 import struct
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
-from realitygap.errors import ProtocolError, did_you_mean, whole_number
+from realitygap.errors import ProtocolError, RobotError, did_you_mean, whole_number
 
 from . import _codec as codec
+from . import _images as images
 from ._codec import Blob, Request, fluke_request
 from ._device import Device
 from .opcodes import COUNTED, Op
-
-if TYPE_CHECKING:
-    from ._images import Pixels, Size
 
 Kind = Literal["jpeg", "jpeg-fast", "gray", "grayjpeg", "grayjpeg-fast", "grayraw", "color", "blob"]
 KINDS = ("jpeg", "jpeg-fast", "gray", "grayjpeg", "grayjpeg-fast", "grayraw", "color", "blob")
@@ -68,13 +66,11 @@ class Camera(Device):
             self.set_window(number, left, 0, left + width, bottom, 2, 1)
 
     @property
-    def picture_size(self) -> Size:
+    def picture_size(self) -> images.Size:
         """Return width and height of a picture with the present setting."""
-        from ._images import FLUKE_1, FLUKE_2_LARGE, FLUKE_2_SMALL
-
         if self.info.fluke != "2":
-            return FLUKE_1
-        return FLUKE_2_SMALL if self._is_small else FLUKE_2_LARGE
+            return images.FLUKE_1
+        return images.FLUKE_2_SMALL if self._is_small else images.FLUKE_2_LARGE
 
     def set_picture_size(self, size: Literal["small", "large"]) -> None:
         """Choose 427 x 266 or 1280 x 800 pixels; a Fluke 2 only."""
@@ -146,7 +142,7 @@ class Camera(Device):
 
     # seeing
 
-    def picture(self, kind: Kind = "jpeg") -> Pixels:
+    def picture(self, kind: Kind = "jpeg") -> images.Pixels:
         """Return a picture, (h, w, 3) uint8 red, green, blue, or (h, w) uint8 in gray; rows from the top.
 
         Args:
@@ -167,9 +163,7 @@ class Camera(Device):
             return self._raw_gray_picture()
         return self._blob_picture()
 
-    def _jpeg_picture(self, *, gray: bool, fast: bool) -> Pixels:
-        from ._images import jpeg_pixels
-
+    def _jpeg_picture(self, *, gray: bool, fast: bool) -> images.Pixels:
         header_op = Op.GET_JPEG_GRAY_HEADER if gray else Op.GET_JPEG_COLOR_HEADER
         scan_op = Op.GET_JPEG_GRAY_SCAN if gray else Op.GET_JPEG_COLOR_SCAN
         if gray not in self._headers:
@@ -178,34 +172,28 @@ class Camera(Device):
         header, size = self._headers[gray], self.picture_size
         request = _camera_request("picture", scan_op, bytes((0 if fast else 1,)))
         try:
-            return self._get(request, lambda scan: jpeg_pixels(header, scan, size, gray=gray))
+            return self._get(request, lambda scan: images.jpeg_pixels(header, scan, size, gray=gray))
         except ProtocolError:
             self._headers = {}  # it may be the header that was damaged
             raise
 
-    def _raw_picture(self) -> Pixels:
-        from ._images import raw_pixels
-
+    def _raw_picture(self) -> images.Pixels:
         size = self.picture_size
         request = _camera_request("picture", Op.GET_IMAGE, answer=size.width * size.height)
-        return self._get(request, lambda data: raw_pixels(data, size))
+        return self._get(request, lambda data: images.raw_pixels(data, size))
 
-    def _raw_gray_picture(self) -> Pixels:
-        from ._images import Size, gray_window_pixels
-
+    def _raw_gray_picture(self) -> images.Pixels:
         whole = self.picture_size
-        size = Size(whole.width // 2 * 2, whole.height // 2 * 2)
+        size = images.Size(whole.width // 2 * 2, whole.height // 2 * 2)
         self.set_window(RAW_WINDOW, 1, 0, size.width - 1, size.height - 1, 2, 2)
         n_bytes = size.width * size.height // 4
         request = _camera_request("picture", Op.GET_WINDOW, bytes((RAW_WINDOW,)), answer=n_bytes)
-        return self._get(request, lambda data: gray_window_pixels(data, size))
+        return self._get(request, lambda data: images.gray_window_pixels(data, size))
 
-    def _blob_picture(self) -> Pixels:
-        from ._images import run_pixels
-
+    def _blob_picture(self) -> images.Pixels:
         size, word = self.picture_size, 3 if self.info.fluke == "2" else 2
         request = _camera_request("picture", Op.GET_RLE, answer=COUNTED)
-        return self._get(request, lambda data: run_pixels(data, size, word))
+        return self._get(request, lambda data: images.run_pixels(data, size, word))
 
     def bright(self) -> tuple[int, int, int]:
         """Return the brightness to the left, center, and right: sums of the pixels in the camera's three windows."""
@@ -244,3 +232,72 @@ class Camera(Device):
 
 def _camera_request(name: str, op: Op, arguments: bytes = b"", *, answer: int | None = None) -> Request:
     return fluke_request(name, op, arguments, answer=answer, wait_s=PICTURE_WAIT_S)
+
+
+RESET_S = 3.0
+"""Time that a robot needs to restart [s]. Source: the wait in Scribbler2-Python."""
+FIRST_MESSAGES = (2, 8, 1)
+"""First firmware of a Fluke that sends messages. Source: the check in Myro."""
+_EMITTERS = {"right": 1, "center": 2, "left": 4}
+
+
+class Board(Device):
+    """The functions of a Fluke that no trial needs."""
+
+    def _need_messages(self, what: str) -> None:
+        self._need(what, self.info.has_fluke(*FIRST_MESSAGES), "a Fluke with firmware 2.8.1 or newer")
+
+    def send_ir_message(self, message: bytes) -> None:
+        """Send up to 255 bytes by infrared."""
+        self._need_messages("send_ir_message")
+        if len(message) > 255:
+            raise ValueError(f"message has {len(message)} bytes, expected at most 255.")
+        arguments = bytes((len(message),)) + message
+        self._tell_fluke("send_ir_message", Op.SEND_IR_MESSAGE, arguments, repeatable=False)
+
+    def get_ir_message(self) -> bytes:
+        """Return the bytes that arrived by infrared since the last call. A lost answer is not requested again."""
+        self._need_messages("get_ir_message")
+        request = fluke_request("get_ir_message", Op.GET_IR_MESSAGE, answer=COUNTED, repeatable=False)
+        return self._get(request, bytes)
+
+    def set_ir_emitters(self, *, left: bool = True, center: bool = True, right: bool = True) -> None:
+        """Choose which emitters send messages."""
+        chosen = {"left": left, "center": center, "right": right}
+        mask = sum(_EMITTERS[side] for side, wanted in chosen.items() if wanted)
+        self._tell_fluke("set_ir_emitters", Op.SET_IR_EMITTERS, bytes((mask,)))
+
+    def servo(self, number: int, position: int) -> None:
+        """Turn servo 0 to 3 of a Fluke 2 to a position, 0 to 255."""
+        self.need_fluke_2("servo")
+        arguments = bytes((whole_number("number", number, 0, 3), whole_number("position", position, 0, 255)))
+        self._tell_fluke("servo", Op.SET_SERVO, arguments)
+
+    def error_log(self) -> str:
+        """Return the error log of a Fluke 2."""
+        self.need_fluke_2("error_log")
+        request = fluke_request("error_log", Op.GET_ERRORS, answer=COUNTED, repeatable=False)
+        return self._get(request, bytes).decode("utf-8", "replace")
+
+    def enable_pan(self) -> None:
+        """Have a Fluke 2 offer a network over Bluetooth."""
+        self.need_fluke_2("enable_pan")
+        self._tell_fluke("enable_pan", Op.ENABLE_PAN, b"\x01\x23")
+
+    def reset_robot(self) -> None:
+        """Restart the firmware of the robot and wait until it answers again; the motors are off then.
+
+        A Fluke pulls the robot's reset line; without one the robot is asked to.
+
+        Raises:
+            RobotError: The robot does not answer again.
+        """
+        self.need_robot("reset_robot")
+        if self.info.fluke == "none":
+            self.link.forget(codec.Request("reset_robot", codec.packet(Op.SOFT_RESET), 0, False), RESET_S)
+        else:
+            request = fluke_request("reset_robot", Op.RESET_SCRIBBLER, answer=0)
+            self.link.forget(request, RESET_S)
+        found = self.link.greet()
+        if found.model != self.info.model:
+            raise RobotError(f"After the reset {found.model} answers on {self.info.port}, not {self.info}.")

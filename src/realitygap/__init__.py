@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from . import emulator as emulator
     from . import evolution as evolution
     from . import gap as gap
+    from . import lab as lab
     from . import logs as logs
     from . import platforms as platforms
     from . import playback as playback

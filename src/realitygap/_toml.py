@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from typing import Any
 
 DIGITS = 9
 """Maximum number of digits of a number: more than any measurement has, and few enough to parse."""
 
 
-def toml_value(value: Any) -> str:
+def toml_value(value: object, *, digits: int | None = DIGITS) -> str:
     """Return a value on one line.
 
     Args:
         value: Texts, numbers, truth values, and lists, arrays and tables of such.
+        digits: Significant digits of numbers with a fraction; None for all.
 
     Raises:
         TypeError: TOML has no such value, such as None.
@@ -28,12 +28,14 @@ def toml_value(value: Any) -> str:
     if isinstance(value, int):
         return str(value)
     if isinstance(value, float):
-        return repr(float(f"{value:.{DIGITS}g}"))
+        return repr(value if digits is None else float(f"{value:.{digits}g}"))
     if isinstance(value, Mapping):
-        parts = ", ".join(f"{toml_key(key)} = {toml_value(part)}" for key, part in value.items())
+        parts = ", ".join(
+            f"{toml_key(key)} = {toml_value(part, digits=digits)}" for key, part in value.items()
+        )
         return f"{{ {parts} }}" if parts else "{}"
     if isinstance(value, list | tuple):
-        return f"[{', '.join(map(toml_value, value))}]"
+        return f"[{', '.join(toml_value(part, digits=digits) for part in value)}]"
     raise TypeError(f"{value!r} is a {type(value).__name__}, expected a text, a number, a list or a table.")
 
 
@@ -43,13 +45,12 @@ def toml_key(key: str) -> str:
     return key if is_bare else toml_value(key)
 
 
-def toml_table(values: Mapping[str, Any]) -> str:
+def toml_table(values: Mapping[str, object]) -> str:
     """Return a table, a line for each key; a list of tables or texts has a line for each of them."""
     return "\n".join(f"{toml_key(key)} = {_spread(value)}" for key, value in values.items())
 
 
-def _spread(value: Any) -> str:
-    is_long = isinstance(value, list | tuple) and any(isinstance(part, Mapping | str) for part in value)
-    if not is_long:
-        return toml_value(value)
-    return "\n".join(["[", *(f"    {toml_value(part)}," for part in value), "]"])
+def _spread(value: object) -> str:
+    if isinstance(value, list | tuple) and any(isinstance(part, Mapping | str) for part in value):
+        return "\n".join(["[", *(f"    {toml_value(part)}," for part in value), "]"])
+    return toml_value(value)

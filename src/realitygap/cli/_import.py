@@ -81,8 +81,7 @@ def import_log(
 
     In Python: realitygap.logs.import_log("drive.csv", "trials.jsonl", log_map)
     """
-    from realitygap import logs
-
+    logs = realitygap.logs
     mapped = logs.mapped_logs(log, map_file, step_s=step, draft=show_map)
     if show_map:
         echo(mapped[0].log_map.to_toml(), nl=False)

@@ -7,7 +7,7 @@ import os
 import select
 import sys
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from realitygap.trials import Verdict
@@ -71,7 +71,7 @@ if sys.platform == "win32":
             return _NAMES.get(letter, letter)
 
     @contextlib.contextmanager
-    def single_keys() -> Iterator[Any]:
+    def single_keys() -> Iterator[Keys | NoKeys]:
         """Yield keys as they are pressed, while in the block."""
         yield Keys() if sys.stdin is not None and sys.stdin.isatty() else NoKeys()
 
@@ -108,7 +108,7 @@ else:
             return data.decode("latin-1")
 
     @contextlib.contextmanager
-    def single_keys() -> Iterator[Any]:
+    def single_keys() -> Iterator[Keys | NoKeys]:
         """Yield keys as they are pressed, while in the block; the terminal is as it was afterwards."""
         if sys.stdin is None or not sys.stdin.isatty():
             yield NoKeys()

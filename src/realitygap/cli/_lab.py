@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+import realitygap
 from realitygap._terminal import echo
 
 
@@ -45,9 +46,7 @@ def lab(
 
     In Python: realitygap.lab.open_lab("results")
     """
-    from realitygap.lab import open_lab
-
-    open_lab(folder, port=port, host=host, show=not no_open, tell=_say, allow_code=allow_code)
+    realitygap.lab.open_lab(folder, port=port, host=host, show=not no_open, tell=_say, allow_code=allow_code)
 
 
 def _say(line: str) -> None:

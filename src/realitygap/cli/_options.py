@@ -6,9 +6,10 @@ import json
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
+from typer.models import OptionInfo
 
 from realitygap._terminal import echo
 
@@ -23,29 +24,32 @@ StudyFolder = Annotated[
 StudySeed = Annotated[int | None, typer.Option(min=0, help="Seed of the study. [default: from the study]")]
 
 
-def who_option(panel: str | None = None) -> Any:
+def who_option(panel: str | None = None) -> OptionInfo:
     """Return the option of the person who counts cells."""
-    return typer.Option(
+    option: OptionInfo = typer.Option(
         metavar="NAME",
         help="Name to record with each entry. [default: your account's name]",
         rich_help_panel=panel,
     )
+    return option
 
 
-def second_option(panel: str) -> Any:
+def second_option(panel: str) -> OptionInfo:
     """Return the option of a second count."""
-    return typer.Option(
+    option: OptionInfo = typer.Option(
         "--second", help="Enter the cells as a second count, only for the agreement.", rich_help_panel=panel
     )
+    return option
 
 
-def correct_option(panel: str) -> Any:
+def correct_option(panel: str) -> OptionInfo:
     """Return the option of a correction."""
-    return typer.Option(
+    option: OptionInfo = typer.Option(
         "--correct",
         help="Enter the cells as a correction, after the generation was closed. Only reports use it.",
         rich_help_panel=panel,
     )
+    return option
 
 
 def print_json(values: object) -> None:

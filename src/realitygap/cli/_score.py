@@ -5,6 +5,7 @@ from __future__ import annotations
 import getpass
 import sys
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -22,6 +23,7 @@ from ._trials import _Titles
 if TYPE_CHECKING:
     from realitygap.records import Ledger, Score, ScoreRole, Trial
     from realitygap.vision import SheetScore, SheetTrials, TraceScore
+    from realitygap.world import Arena
 
 
 _WITH_STUDY = "Only with --study"
@@ -128,9 +130,8 @@ def score(
         on_sheet = realitygap.vision.trials_on_sheet(
             ledger, generation, condition=condition, replicate=run, sheet=sheet, role=role
         )
-        _score_trials(
-            ledger, study, photo, on_sheet, role, who or getpass.getuser(), overlay, yes=yes, as_json=as_json
-        )
+        read = _Photo(photo, realitygap.vision.photo_bytes(photo), who or getpass.getuser())
+        _score_trials(ledger, study, read, on_sheet, role, overlay, yes=yes, as_json=as_json)
 
 
 def _only_show(photo: Path, arena: str, pens: str | None, overlay: Path | None, *, as_json: bool) -> None:
@@ -171,13 +172,32 @@ def _say_what_was_guessed(found: SheetScore) -> None:
         )
 
 
+@dataclass(frozen=True)
+class _Photo:
+    """A photo of a sheet, and the person who confirms the cells read from it."""
+
+    path: Path
+    data: bytes
+    who: str
+
+    def score(self, trace: TraceScore, cells: tuple[int, ...]) -> Score:
+        """Return the score of a trial with confirmed cells."""
+        count = realitygap.records.PhotoCount(
+            self.path.name,
+            realitygap.vision.photo_hash(self.data),
+            trace.cells,
+            trace.doubtful,
+            is_confirmed=True,
+        )
+        return realitygap.records.Score(cells, self.who, photo=count)
+
+
 def _score_trials(
     ledger: Ledger,
     folder: Path,
-    photo: Path,
+    photo: _Photo,
     on_sheet: SheetTrials,
     role: ScoreRole,
-    who: str,
     overlay: Path | None,
     *,
     yes: bool,
@@ -185,9 +205,8 @@ def _score_trials(
 ) -> None:
     arena, pens = study_sheet(folder, on_sheet.waiting[0].condition)
     titles = _Titles(ledger)
-    data = realitygap.vision.photo_bytes(photo)
     found = realitygap.vision.score_sheet(
-        realitygap.vision.read_photo(data), realitygap.vision.SheetLayout.of(arena, pens), on_sheet.pens
+        realitygap.vision.read_photo(photo.data), realitygap.vision.SheetLayout.of(arena, pens), on_sheet.pens
     )
     traces = {trace.pen: trace for trace in found.traces}
     names = {
@@ -206,9 +225,9 @@ def _score_trials(
     _say_what_is_spoiled(on_sheet)
     is_asked = not yes and not as_json and sys.stdin.isatty() and sys.stdout.isatty()
     entries = (
-        _confirmed(on_sheet, traces, photo, data, who, arena)
+        _confirmed(on_sheet, traces, photo, arena)
         if is_asked
-        else _all_confirmed(on_sheet, traces, photo, data, who)
+        else _all_confirmed(on_sheet, traces, photo)
         if yes
         else iter(())
     )
@@ -247,11 +266,11 @@ def _say_what_is_spoiled(on_sheet: SheetTrials) -> None:
 
 
 def _all_confirmed(
-    on_sheet: SheetTrials, traces: dict[int, TraceScore], photo: Path, data: bytes, who: str
+    on_sheet: SheetTrials, traces: dict[int, TraceScore], photo: _Photo
 ) -> Iterator[dict[int, Score]]:
     """Confirm all trials as they were read, except those whose pen drew twice and those without visible ink."""
     scores = {
-        trial.trial: _score_of(traces[trial.pen], traces[trial.pen].cells, photo, data, who)
+        trial.trial: photo.score(traces[trial.pen], traces[trial.pen].cells)
         for trial in on_sheet.waiting
         if trial.pen not in on_sheet.spoiled and traces[trial.pen].cells
     }
@@ -260,7 +279,7 @@ def _all_confirmed(
 
 
 def _confirmed(
-    on_sheet: SheetTrials, traces: dict[int, TraceScore], photo: Path, data: bytes, who: str, arena: Any
+    on_sheet: SheetTrials, traces: dict[int, TraceScore], photo: _Photo, arena: Arena
 ) -> Iterator[dict[int, Score]]:
     """Yield the cells of each trial, as the operator at the terminal confirms them."""
     for trial in on_sheet.waiting:
@@ -271,7 +290,7 @@ def _confirmed(
             picked = pick_cells(arena, trace.cells)
             cells = None if picked is None else tuple(picked)
         if answer != "s" and cells:
-            yield {trial.trial: _score_of(trace, cells, photo, data, who)}
+            yield {trial.trial: photo.score(trace, cells)}
 
 
 def _answer(trial: Trial, trace: TraceScore) -> str:
@@ -282,10 +301,3 @@ def _answer(trial: Trial, trace: TraceScore) -> str:
         answer = prompt(question, default="", show_default=False).strip().lower()
         if answer in ("", "e", "s"):
             return answer
-
-
-def _score_of(trace: TraceScore, cells: tuple[int, ...], photo: Path, data: bytes, who: str) -> Score:
-    count = realitygap.records.PhotoCount(
-        photo.name, realitygap.vision.photo_hash(data), trace.cells, trace.doubtful, is_confirmed=True
-    )
-    return realitygap.records.Score(cells, who, photo=count)

@@ -259,22 +259,20 @@ def _wanted(
     """Return the trial in the video; None if none was named."""
     if study is not None and trials is not None:
         raise StudyError("--study and --trials exclude each other: the trial is in a ledger or in a file.")
-    if (trial is None) != (study is None and trials is None):
+    source = trials if study is None else study
+    if (trial is None) != (source is None):
         raise StudyError(
             "A trial is named by --study DIR --trial NUMBER, or by --trials FILE --trial NUMBER."
         )
-    if trial is None:
+    if trial is None or source is None:
         if into is not None:
             raise StudyError(
                 "--into saves a trial with its commands. Name the trial: --study DIR --trial NUMBER"
             )
         return None
-    if trials is not None and into is None:
-        raise StudyError(
-            "No file for the trial with its poses. Name one with --into, such as tracked.sqlite."
-        )
-
-    return realitygap.study.trial_of_ledger(study or trials or Path(), trial)
+    if study is None and into is None:
+        raise StudyError("No file for the trial with its poses. Name one with --into, such as tracked.sqlite.")
+    return realitygap.study.trial_of_ledger(source, trial)
 
 
 def _marks(

@@ -47,13 +47,14 @@ def families(
 
     In Python: realitygap.robots.twin.family_rows("worn")
     """
-    from realitygap.robots.twin import FAMILIES, family_rows
-
     if name is None:
-        rows = [{"family": key, "meaning": family.meaning} for key, family in FAMILIES.items()]
+        rows = [
+            {"family": key, "meaning": family.meaning}
+            for key, family in realitygap.robots.twin.FAMILIES.items()
+        ]
     else:
         try:
-            rows = [row._asdict() for row in family_rows(name)]
+            rows = [row._asdict() for row in realitygap.robots.twin.family_rows(name)]
         except ValueError as error:
             raise RealityGapError(str(error)) from error
     if as_json:
@@ -107,10 +108,8 @@ def sample(
 
     In Python: realitygap.robots.twin.sample_twin("worn", 1).to_toml()
     """
-    from realitygap.robots.twin import sample_twin
-
     try:
-        text = sample_twin(family, seed).to_toml()
+        text = realitygap.robots.twin.sample_twin(family, seed).to_toml()
     except ValueError as error:
         raise RealityGapError(str(error)) from error
     if out is None:
@@ -175,11 +174,9 @@ def render(
 
     In Python: realitygap.playback.save_twin_trial(realitygap.playback.TwinDrive(model, arena), "worn-1.mp4")
     """
-    from realitygap.robots.twin import load_twin
-
     try:
         trial = realitygap.playback.TwinDrive(
-            load_twin(file), realitygap.world.load_arena(arena), steps, number
+            realitygap.robots.twin.load_twin(file), realitygap.world.load_arena(arena), steps, number
         )
         path = realitygap.playback.save_twin_trial(trial, out, view=view, speed=speed)  # type: ignore[arg-type]  # checked there
     except ValueError as error:

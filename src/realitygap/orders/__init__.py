@@ -4,7 +4,6 @@ A command, a function, a form of the lab, the message to a worker, and the recor
 """
 
 from ._calibrate import CalibrateOrder
-from ._closing import ClosingOrder
 from ._field import Limits, OrderField
 from ._function import takes_order, with_fields
 from ._gap import GapOrder
@@ -12,8 +11,7 @@ from ._order import Order, OrderError
 from ._plan import PlanOrder, Question
 from ._record import ORDER_FILE, ORDERS, read_order
 from ._shared import ONLY_ROBOTS
-from ._transfer import TransferOrder
-from ._try import TryOrder
+from ._transfer import ClosingOrder, TransferOrder, TryOrder
 
 __all__ = [
     "ONLY_ROBOTS",

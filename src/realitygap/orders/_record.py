@@ -12,12 +12,10 @@ from realitygap._limits import MOST_TABLE_BYTES, parse_json, parse_toml, read_fi
 from realitygap.errors import StudyError, did_you_mean
 
 from ._calibrate import CalibrateOrder
-from ._closing import ClosingOrder
 from ._gap import GapOrder
 from ._order import Order
 from ._plan import PlanOrder
-from ._transfer import TransferOrder
-from ._try import TryOrder
+from ._transfer import ClosingOrder, TransferOrder, TryOrder
 
 ORDERS: dict[str, type[Order]] = {
     model.command: model

@@ -55,8 +55,8 @@ class PortDriver:
             raise
         return self._recorder
 
-    def _record_set_up(self, name: str, **more: Any) -> None:
-        set_up: Mapping[str, Any] = {key: getattr(self, key) for key in _SET_UP}
+    def _record_set_up(self, name: str, **more: object) -> None:
+        set_up: Mapping[str, object] = {key: getattr(self, key) for key in _SET_UP}
         self._recorder.begin({"port": name, "robot": asdict(self.info), **set_up, **more})
 
     def _record_failure(self, name: str, error: BaseException) -> None:

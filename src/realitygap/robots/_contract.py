@@ -19,6 +19,11 @@ class Command(NamedTuple):
     move: float
     turn: float
 
+    @property
+    def wheels(self) -> tuple[float, float]:
+        """The speeds of the left and the right wheel: move - turn and move + turn, each limited to -1..1."""
+        return _within(self.move - self.turn), _within(self.move + self.turn)
+
 
 class Observation(NamedTuple):
     """The sensor values of a robot at one moment.
@@ -91,7 +96,7 @@ class Robot(Protocol):
     ) -> None: ...
 
 
-def channels_of(robot: Any) -> tuple[str, ...]:
+def channels_of(robot: object) -> tuple[str, ...]:
     """Return the names of a robot's sensors other than range sensors."""
     return tuple(getattr(robot, "channels", ()))
 
@@ -127,3 +132,7 @@ def check_command(command: Command) -> Command:
         if not -1.0 <= value <= 1.0:
             raise ValueError(f"{part} is {value!r}, expected a number from -1 to 1. No command was sent.")
     return Command(float(command[0]), float(command[1]))
+
+
+def _within(speed: float) -> float:
+    return min(max(speed, -1.0), 1.0)

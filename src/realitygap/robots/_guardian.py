@@ -190,6 +190,7 @@ def _not_started(reason: str) -> str:
     )
 
 
+_Handler = Callable[[int, FrameType | None], object] | int | signal.Handlers | None
 _ENDING = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP", "SIGBREAK") if hasattr(signal, name)]
 """Signals that end a program without an exception by default: from `kill`, or a closed terminal or window."""
 
@@ -203,7 +204,7 @@ class Exits:
 
     def __init__(self) -> None:
         self._n_open = 0
-        self._changed: dict[Any, Any] = {}
+        self._changed: dict[signal.Signals, _Handler] = {}
         self._lock = threading.Lock()
 
     def hold(self) -> None:

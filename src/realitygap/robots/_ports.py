@@ -10,6 +10,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
+import serial
+
 from realitygap.errors import RobotError
 from realitygap.robot_families import default_family, find_family, load, robot_families
 
@@ -126,8 +128,6 @@ def serial_port(name: str, baud: int, timeout_s: float, write_s: float | None = 
     Raises:
         ValueError: The name has an unknown scheme.
     """
-    import serial
-
     if _EMULATOR not in serial.protocol_handler_packages:
         serial.protocol_handler_packages.append(_EMULATOR)
     port = serial.serial_for_url(

@@ -12,7 +12,7 @@ from realitygap.world import Pose
 from ._bases import ProgramRobot
 from ._clock import VirtualClock
 from ._contract import Command, Label, Observation, check_command
-from ._recording import Recording, read_recording
+from ._recording import Line, Recording, read_recording
 
 NAME = "recording:"
 
@@ -58,7 +58,7 @@ class RecordedRobot(ProgramRobot):
         """Return the recorded line of this call, which must have the same name."""
         self._check_open()
         is_over = self._next == len(self._lines)
-        line: Mapping[str, Any] = {"name": "end"} if is_over else self._lines[self._next]
+        line: Line = {"t": 0.0, "kind": "end", "name": "end"} if is_over else self._lines[self._next]
         if line["name"] != name:
             said = "ends" if line["name"] in ("end", "close") else f"has '{line['name']}'"
             raise RobotError(

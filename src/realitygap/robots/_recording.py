@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Required, TypedDict, cast
 
 from realitygap._limits import MOST_LINES_BYTES, parse_json, read_file
 from realitygap._version import __version__
@@ -52,6 +52,19 @@ COLUMNS = {
 """Columns of the table of a recording."""
 
 
+class Line(TypedDict, total=False):
+    """A line of a recording: a call with its values, bytes over the wire, or a fault."""
+
+    t: Required[float]
+    kind: Required[str]
+    name: Required[str]
+    values: Mapping[str, Any]
+    sent: str
+    answered: str
+    took_s: float
+    outcome: str
+
+
 class Recorder:
     """Writes a recording line by line during a session.
 
@@ -68,7 +81,7 @@ class Recorder:
         self._clock = clock
         self._began_s = clock.now()
         self._started = datetime.now(UTC).isoformat(timespec="milliseconds")
-        self._early: list[dict[str, Any]] | None = []  # until it is known who is there
+        self._early: list[Line] | None = []  # until it is known who is there
         self._is_broken = False
         try:
             self._file = self.path.open("xb", buffering=0)
@@ -81,7 +94,7 @@ class Recorder:
                 f"Could not write {path}: {error.strerror or error}. Name another file."
             ) from error
 
-    def begin(self, set_up: Mapping[str, Any]) -> None:
+    def begin(self, set_up: Mapping[str, object]) -> None:
         """Write the first line, which describes the robot and the set-up, then the lines noted before it."""
         self._write(
             {
@@ -102,29 +115,34 @@ class Recorder:
         self, time_s: float, took_s: float, name: str, sent: bytes, answered: bytes, outcome: str
     ) -> None:
         """Record one command and its answer."""
-        self._add(
-            time_s,
-            "wire",
-            name,
-            {"sent": sent.hex(), "answered": answered.hex(), "took_s": round(took_s, 6), "outcome": outcome},
-        )
+        line = self._line(time_s, "wire", name)
+        line["sent"], line["answered"] = sent.hex(), answered.hex()
+        line["took_s"], line["outcome"] = round(took_s, 6), outcome
+        self._add(line)
 
-    def call(self, name: str, **values: Any) -> None:
+    def call(self, name: str, **values: object) -> None:
         """Record a call of the program, or an observation."""
-        self._add(self._clock.now(), "call", name, {"values": values} if values else {})
+        line = self._line(self._clock.now(), "call", name)
+        if values:
+            line["values"] = values
+        self._add(line)
 
     def fault(self, name: str, error: BaseException) -> None:
         """Record an error of a call."""
-        self._add(self._clock.now(), "fault", name, {"outcome": str(error)})
+        line = self._line(self._clock.now(), "fault", name)
+        line["outcome"] = str(error)
+        self._add(line)
 
-    def _add(self, time_s: float, kind: str, name: str, more: Mapping[str, Any]) -> None:
-        line = {"t": round(time_s - self._began_s, 6), "kind": kind, "name": name, **more}
+    def _line(self, time_s: float, kind: str, name: str) -> Line:
+        return {"t": round(time_s - self._began_s, 6), "kind": kind, "name": name}
+
+    def _add(self, line: Line) -> None:
         if self._early is not None:
             self._early.append(line)
         else:
             self._write(line)
 
-    def _write(self, line: Mapping[str, Any]) -> None:
+    def _write(self, line: Mapping[str, object] | Line) -> None:
         """Write a line. Only the first failure raises an error, so that the robot can be stopped."""
         if self._is_broken:
             return
@@ -149,7 +167,7 @@ class Recorder:
 class NoRecorder:
     """The recorder of a session that is not recorded."""
 
-    def _nothing(self, *_: Any, **__: Any) -> None:
+    def _nothing(self, *_: object, **__: object) -> None:
         pass
 
     begin = wire = call = fault = close = _nothing
@@ -168,7 +186,7 @@ class Recording:
 
     path: Path
     header: Mapping[str, Any]
-    lines: tuple[Mapping[str, Any], ...]
+    lines: tuple[Line, ...]
     is_whole: bool
 
     def table(self) -> pl.DataFrame:
@@ -214,13 +232,13 @@ def read_recording(path: Path | str) -> Recording:
                 f"{path} is damaged: in line {number} {wrong[0]} is {shown(line[wrong[0]])}, expected "
                 f"{_EXPECTED[COLUMNS[wrong[0]]]}."
             )
-    return Recording(path, lines[0], tuple(lines[1:]), not rest)
+    return Recording(path, lines[0], cast("tuple[Line, ...]", tuple(lines[1:])), not rest)
 
 
 _EXPECTED = {float: "a number", str: "a text"}
 
 
-def _is_of_column(name: str, value: Any) -> bool:
+def _is_of_column(name: str, value: object) -> bool:
     """Return whether a value of a line has the type of its column. `values` is written as JSON."""
     if name not in COLUMNS or name == "values":
         return True

@@ -11,7 +11,7 @@ from typing import Any
 
 from realitygap.errors import RecordError, from_extra
 
-from ._recording import KINDS, read_recording
+from ._recording import KINDS, Line, read_recording
 
 NANOSECONDS = 1_000_000_000
 _TYPES = {bool: "boolean", int: "integer", float: "number", str: "string"}
@@ -60,11 +60,11 @@ def export_mcap(recording: Path | str, out: Path | str) -> int:
     return len(source.lines)
 
 
-def _text(value: Any) -> str:
+def _text(value: object) -> str:
     return value if isinstance(value, str) else json.dumps(value)
 
 
-def _message(line: Mapping[str, Any]) -> tuple[str, dict[str, Any]]:
+def _message(line: Line) -> tuple[str, dict[str, object]]:
     """Return topic and content of a line."""
     if line["kind"] == "call":
         return f"/call/{line['name']}", dict(line.get("values", {}))
@@ -72,7 +72,7 @@ def _message(line: Mapping[str, Any]) -> tuple[str, dict[str, Any]]:
     return f"/{line['kind']}", rest
 
 
-def _channel(writer: Any, topic: str, kind: str, example: Mapping[str, Any]) -> int:
+def _channel(writer: Any, topic: str, kind: str, example: Mapping[str, object]) -> int:
     schema = {
         "type": "object",
         "title": topic,
@@ -84,7 +84,7 @@ def _channel(writer: Any, topic: str, kind: str, example: Mapping[str, Any]) -> 
     return channel
 
 
-def _property(value: Any) -> dict[str, Any]:
+def _property(value: object) -> dict[str, object]:
     if isinstance(value, list):
         return {"type": "array", "items": {"type": "number"}}
     return {"type": _TYPES.get(type(value), "object")}

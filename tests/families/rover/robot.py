@@ -40,8 +40,7 @@ class Rover(ProgramRobot):
         return Observation((left / RANGE, right / RANGE), bool(stalled), (float(left), float(right)))
 
     def drive(self, command: Command) -> None:
-        move, turn = check_command(command)
-        wheels = (max(-1.0, min(1.0, move - turn)), max(-1.0, min(1.0, move + turn)))
+        wheels = check_command(command).wheels
         self._ask(ord("m"), *(round(100 + 100 * speed) for speed in wheels))
         self.clock.sleep(self.step_s)
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -14,9 +15,13 @@ from realitygap.emulator.command import (
     QuietOption,
     SpeedOption,
     TcpOption,
+    View,
     WitnessOption,
     serve,
 )
+
+if TYPE_CHECKING:
+    from .emulator import Emulator
 
 
 def emulate(
@@ -65,7 +70,6 @@ def emulate(
     In Python: realitygap.emulator.serve_pty(realitygap.families.scribbler.emulator.Emulator("s2", "2"))
     """
     from .emulator._port import make_emulator
-    from .emulator._view import LiveView
 
     options = {"arena": arena, "seed": str(seed), "timing": timing, "faults": faults}
     if fluke is not None:
@@ -75,7 +79,6 @@ def emulate(
     if state is not None:
         options["state"] = str(state)
     emulator = make_emulator(model, options)
-    title = f"{emulator.model}, Fluke {emulator.fluke_model}"
     serve(
         emulator,
         link=link,
@@ -83,5 +86,11 @@ def emulate(
         speed=speed,
         witness=witness,
         command=command,
-        view=None if quiet else lambda channel: LiveView(emulator, f"{title}: {channel}"),
+        view=None if quiet else partial(_live_view, emulator),
     )
+
+
+def _live_view(emulator: Emulator, channel: str) -> View:
+    from .emulator._view import LiveView  # Rich, which a terminal alone needs
+
+    return LiveView(emulator, f"{emulator.model}, Fluke {emulator.fluke_model}: {channel}")

@@ -11,6 +11,9 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
+import serial
+from serial.tools import list_ports
+
 from realitygap.errors import RobotError
 from realitygap.robots import GIVE_UP_S, Label, PortGuess, is_pseudo_terminal, reason_of, serial_port
 
@@ -58,7 +61,9 @@ def _is_loopback(url: str) -> bool:
 
 def find_ports() -> list[PortGuess]:
     """Return the serial ports of this machine, probable robots first."""
-    devices = {device.device: (device.description or "", device.hwid or "") for device in _serial_devices()}
+    devices = {
+        device.device: (device.description or "", device.hwid or "") for device in list_ports.comports()
+    }
     for path in sorted(Path("/dev").glob("rfcomm*")):
         devices.setdefault(str(path), ("Bluetooth serial port", ""))
     guesses = [
@@ -69,13 +74,6 @@ def find_ports() -> list[PortGuess]:
     return sorted(
         guesses, key=lambda guess: ([not guess.seems.startswith(word) for word in order], guess.port)
     )
-
-
-def _serial_devices() -> list[Any]:
-    """Return the serial ports of the system, as pyserial describes them."""
-    from serial.tools import list_ports
-
-    return list(list_ports.comports())
 
 
 def _seems(name: str, description: str, hardware: str) -> str:
@@ -132,8 +130,6 @@ def _open_once(name: str) -> Any:
 
 def is_serial_port(port: object) -> bool:
     """Return whether a port is one of pyserial's, whose name identifies the device."""
-    import serial
-
     return isinstance(port, serial.SerialBase)
 
 

@@ -226,13 +226,12 @@ class Scribbler(Driving, Senses, Identity, SoundAndLight, Camera, Board, PortDri
 
         The robot moves on until the next command.
         """
-        move, turn = check_command(command)
+        command = check_command(command)
         self._n_steps += 1
         self.link.where = f"step {self._n_steps}"
-        left, right = _within(move - turn), _within(move + turn)
-        self._recorder.call("drive", move=move, turn=turn)
+        self._recorder.call("drive", move=command.move, turn=command.turn)
         with self._noted("drive"):
-            self.motors(left, right)
+            self.motors(*command.wheels)
         if self._watchdog is not None:
             self._watchdog.excuse(self.step_s)
         self.link.clock.sleep(self.step_s)
@@ -262,10 +261,6 @@ class Scribbler(Driving, Senses, Identity, SoundAndLight, Camera, Board, PortDri
             self._released()
             self._recorder.call("close")
             self._recorder.close()
-
-
-def _within(wheel: float) -> float:
-    return min(max(wheel, -1.0), 1.0)
 
 
 def _let_go(link: Link) -> None:

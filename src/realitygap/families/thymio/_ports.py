@@ -7,6 +7,8 @@ import socket
 from collections.abc import Container
 from typing import Any
 
+from serial.tools import list_ports
+
 from realitygap.errors import RobotError
 from realitygap.robots import Label, PortGuess, is_pseudo_terminal, reason_of, serial_port
 
@@ -26,8 +28,6 @@ def port_name(name: str) -> str:
 
 def find_ports() -> list[PortGuess]:
     """Return the ports of this machine behind which a Thymio or its dongle is."""
-    from serial.tools import list_ports
-
     devices = [device for device in list_ports.comports() if device.vid == VENDOR and device.pid in PRODUCTS]
     return sorted(
         PortGuess(device.device, PRODUCTS[device.pid], device.description or "") for device in devices

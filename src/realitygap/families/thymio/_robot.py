@@ -371,12 +371,12 @@ class Thymio(PortDriver):
             RobotError: The link is lost.
             RobotStopped: The center button was pressed.
         """
-        move, turn = check_command(command)
-        self._recorder.call("drive", move=move, turn=turn)
+        command = check_command(command)
+        self._recorder.call("drive", move=command.move, turn=command.turn)
         with self._noted("drive"):
-            self._drive(move, turn)
+            self._drive(command)
 
-    def _drive(self, move: float, turn: float) -> None:
+    def _drive(self, command: Command) -> None:
         self.link.expect_motion()
         until = self.clock.now() + self.step_s
         while True:
@@ -387,16 +387,16 @@ class Thymio(PortDriver):
             remaining = until - self.clock.now()
             piece = max(min(remaining, RENEW_S), 0.0)
             # a playground may be faster than this program can renew commands
-            self._send_wheels(move, turn, piece if self.label == "REAL" else max(remaining, 0.0))
+            self._send_wheels(command, piece if self.label == "REAL" else max(remaining, 0.0))
             if remaining <= 0:
                 return
             self.clock.sleep(piece)
             if remaining <= RENEW_S:
                 return
 
-    def _send_wheels(self, move: float, turn: float, seconds: float) -> None:
+    def _send_wheels(self, command: Command, seconds: float) -> None:
         """Send a command with a life of so much time [s], and a margin."""
-        wheels = [round(self.full_speed * min(max(part, -1.0), 1.0)) for part in (move - turn, move + turn)]
+        wheels = [round(self.full_speed * wheel) for wheel in command.wheels]
         margin = LIFE_MARGIN_S if self.label == "REAL" else EMULATED_MARGIN_S
         life = round((max(seconds, self.lasts_s) + margin) / TICK_S)
         self.link.emit(DRIVE, (*wheels, min(life, MOST_LIFE)))
@@ -407,9 +407,9 @@ class Thymio(PortDriver):
         Raises:
             RobotError: The link is lost.
         """
-        move, turn = check_command(Command((left + right) / 2, (right - left) / 2))
+        command = check_command(Command((left + right) / 2, (right - left) / 2))
         self.link.expect_motion()
-        self._send_wheels(move, turn, RENEW_S * max(self.clock.rate, 1.0))
+        self._send_wheels(command, RENEW_S * max(self.clock.rate, 1.0))
 
     def line(self) -> tuple[int, ...]:
         """Return the raw readings of the ground sensors, left and right."""

@@ -3,9 +3,8 @@
 from ._body import TwinBody
 from ._camera import TwinCamera
 from ._families import EVERY, FAMILIES, Family, FamilyRow, Range, family_rows, sample_twin
-from ._file import load_twin
 from ._ir import places_of
-from ._model import TwinModel
+from ._model import TwinModel, load_twin
 from ._picture import outline_of, twin_picture
 from ._robot import TwinRobot
 

@@ -11,10 +11,9 @@ import numpy as np
 from realitygap.world import Arena, Pose
 
 from ._ir import IrSensors
-from ._model import TwinModel
+from ._model import DELAYS, TwinModel, numbers_for
 from ._motors import NOMINAL, Servo
 from ._physics import Floats, Physics
-from ._random import DELAYS, numbers_for
 from ._robot import FULL_SCALE
 from ._senses import Encoders, Idler
 from ._shape import STEP_S

@@ -12,8 +12,7 @@ import numpy as np
 
 from realitygap.errors import did_you_mean, whole_number
 
-from ._model import TwinModel
-from ._random import FAMILY, numbers_for
+from ._model import FAMILY, TwinModel, numbers_for
 
 Value = bool | int | float | str
 

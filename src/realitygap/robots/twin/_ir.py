@@ -7,9 +7,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from ._model import TwinModel
+from ._model import LIGHT, TwinModel, numbers_for
 from ._physics import Physics
-from ._random import LIGHT, numbers_for
 
 DARK = 1e-12  # light below which no pulse is seen
 

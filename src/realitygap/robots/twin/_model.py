@@ -1,17 +1,25 @@
-"""The parameters of a twin: body, wheels, motors, battery, and sensors of a robot, as in a twin file."""
+"""The parameters of a twin, as in its file, and the random numbers that its seed draws."""
 
 from __future__ import annotations
 
+import textwrap
+from collections.abc import Iterator
+from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
+import numpy as np
 from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
+from realitygap._limits import is_file
+from realitygap._toml import toml_value
+from realitygap.errors import DescriptionError
 from realitygap.settings import Settings
-from realitygap.world import MOST_CORNERS, why_no_part
-
-from ._toml import toml_of
+from realitygap.world import MOST_CORNERS, in_si, read_toml, why_no_part
 
 MOST_MOUNTS = 16
+_WIDTH = 110
+DELAYS, WHEELS, LIGHT, ENCODERS, FAMILY, AMBIENT = range(6)
+"""Purposes of the random numbers."""
 
 Share = Annotated[float, Field(ge=0, le=1)]
 Length = Annotated[float, Field(gt=0, le=1)]
@@ -406,4 +414,75 @@ class TwinModel(Settings):
 
     def to_toml(self) -> str:
         """Return the text of a twin file, with a comment for each number. `load_twin` reads it."""
-        return toml_of(self)
+        return _toml_of(self)
+
+
+def load_twin(path: str | Path) -> TwinModel:
+    """Return a twin from its file.
+
+    Args:
+        path: Path of a TOML file, as written by `TwinModel.to_toml`. Keys may end in _mm, _cm or _in, angles in _deg.
+
+    Raises:
+        DescriptionError: There is no such file, or it cannot be used: every mistake with its place.
+    """
+    file = Path(path)
+    if not is_file(file):
+        raise DescriptionError(
+            f"There is no twin file {file}. Draw one: realitygap twin sample --family close -o {file.name or 'FILE'}"
+        )
+    written = read_toml(file, str(file))
+    if "format" not in written:
+        raise DescriptionError(
+            f'{file} is no twin file: it does not begin with format = "realitygap twin 1".'
+        )
+    try:
+        return TwinModel(**in_si(written))
+    except ValueError as error:
+        lines = [
+            line.removeprefix("TwinModel.").removeprefix("TwinModel: ") for line in str(error).split("\n")
+        ]
+        head = f"{file} has {len(lines)} mistake{'s' if len(lines) != 1 else ''}."
+        raise DescriptionError("\n  ".join([head, *lines])) from None
+
+
+def numbers_for(seed: int, number: int, purpose: int, step: int = 0) -> np.random.Generator:
+    """Return a generator that draws the same on every machine."""
+    words = np.array([seed, number], np.uint64)
+    return np.random.Generator(np.random.Philox(key=words, counter=[0, 0, step, purpose]))
+
+
+def _toml_of(model: Settings) -> str:
+    """Return a model as the text of its file, with the meaning of table value above it."""
+    return "\n".join(_lines(model, "")) + "\n"
+
+
+def _lines(model: Settings, place: str) -> Iterator[str]:
+    """Yield a table's own values, then the tables in it."""
+    tables: list[tuple[str, tuple[Settings, ...] | Settings]] = []
+    for key, field in type(model).model_fields.items():
+        value = getattr(model, key)
+        if value is None:
+            continue
+        is_list = isinstance(value, tuple) and value and isinstance(value[0], Settings)
+        if isinstance(value, Settings) or is_list:
+            tables.append((key, value))
+            continue
+        yield from textwrap.wrap(
+            field.description or "", _WIDTH, initial_indent="# ", subsequent_indent="#   "
+        )
+        yield f"{key} = {toml_value(value, digits=None)}"
+    for key, value in tables:
+        for k, table in enumerate(value if isinstance(value, tuple) else [value]):
+            name = f"{place}{key}"
+            header = f"[[{name}]]" if isinstance(value, tuple) else f"[{name}]"
+            meaning = (type(table).__doc__ or "").strip().splitlines()[0]
+            yield ""
+            yield f"{header}  # {meaning}" if not k else header
+            yield from _lines(table, f"{name}.") if not k else _bare(table)
+
+
+def _bare(model: Settings) -> Iterator[str]:
+    """Return the values of a further table of a list, without comments, which the first table has."""
+    for key in type(model).model_fields:
+        yield f"{key} = {toml_value(getattr(model, key), digits=None)}"

@@ -6,8 +6,7 @@ import math
 
 from realitygap.world import Pose
 
-from ._model import TwinModel
-from ._random import WHEELS, numbers_for
+from ._model import WHEELS, TwinModel, numbers_for
 
 TICK_S = 0.020  # of the S2's regulator
 STEPS = 12  # of speed at full command

@@ -16,10 +16,9 @@ from realitygap.robots._contract import Command, Label, Observation, check_comma
 from realitygap.world import Arena, Pose, cells_along
 
 from ._ir import IrSensors
-from ._model import TwinModel
+from ._model import DELAYS, TwinModel, numbers_for
 from ._motors import NOMINAL, TICK_S, PlainSpeeds, Servo, SpeedSteps
 from ._physics import Physics
-from ._random import DELAYS, numbers_for
 from ._senses import Ambient, Encoders, Idler, names_of
 from ._shape import STEP_S
 
@@ -135,8 +134,7 @@ class TwinRobot(ProgramRobot):
     def drive(self, command: Command) -> None:
         """Drive one command for `step_s`: left wheel move - turn, right wheel move + turn, limited to -1..1."""
         self._check_open()
-        move, turn = check_command(command)
-        self.order(_within(move - turn), _within(move + turn))
+        self.order(*check_command(command).wheels)
         self._advance(round(self.step_s / STEP_S))
         self.n_steps += 1
         self._told, self._before = self.encoders, self._told
@@ -228,7 +226,3 @@ class TwinRobot(ProgramRobot):
     def visited_cells(self) -> tuple[int, ...]:
         """Cells visited along the line, in order of first visit, columns * row + column."""
         return cells_along(self.path(), self.arena.grid)
-
-
-def _within(wheel: float) -> float:
-    return min(max(wheel, -1.0), 1.0)

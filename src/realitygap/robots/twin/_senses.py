@@ -6,8 +6,7 @@ import math
 
 from realitygap.world import Arena, Pose
 
-from ._model import TwinLight, TwinModel, TwinMount
-from ._random import AMBIENT, ENCODERS, numbers_for
+from ._model import AMBIENT, ENCODERS, TwinLight, TwinModel, TwinMount, numbers_for
 
 NEAREST = 0.05
 """Distance below which a lamp gets no brighter [m]."""

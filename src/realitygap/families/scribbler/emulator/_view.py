@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import math
 from types import TracebackType
-from typing import TYPE_CHECKING
 
 import numpy as np
+from rich.console import RenderableType
+from rich.live import Live
+from rich.panel import Panel
 
+from realitygap._console import plain_text
 from realitygap.families.scribbler.opcodes import Op
 
 from ._emulator import Emulator
-
-if TYPE_CHECKING:
-    from rich.console import RenderableType
 
 WIDTH, HEIGHT = 72, 30  # characters of the picture at most
 FRAME_WIDTH, FRAME_HEIGHT = 4, 9  # of the terminal's characters that the picture must leave free
@@ -32,8 +32,6 @@ class LiveView:
     """
 
     def __init__(self, emulator: Emulator, title: str) -> None:
-        from rich.live import Live
-
         self._emulator, self._title = emulator, title
         self._live = Live(auto_refresh=False, transient=True)
 
@@ -42,10 +40,6 @@ class LiveView:
         self._live.update(self._panel(self._emulator), refresh=True)
 
     def _panel(self, emulator: Emulator) -> RenderableType:
-        from rich.panel import Panel
-
-        from realitygap._console import plain_text
-
         size = self._live.console.size
         room = (min(WIDTH, size.width - FRAME_WIDTH), min(HEIGHT, size.height - FRAME_HEIGHT))
         text = "\n".join([*picture(emulator, *room), "", *status(emulator)])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Protocol
 
 
 @dataclass
@@ -64,3 +65,51 @@ class Wire:
     to_host: Callable[[int, int], bytes] = lambda number, byte: bytes((byte,))
     n_to_robot: int = 0
     n_to_host: int = 0
+
+
+class Peer(Protocol):
+    """A robot that answers byte by byte."""
+
+    def receive(self, byte: int, now: float) -> bytes: ...
+
+
+class WiredPort(BufferPort):
+    """A robot at the other end of a wire."""
+
+    write_s = 0.0
+    """Time that a write takes [s]."""
+
+    def __init__(self, robot: Peer, wire: Wire | None = None) -> None:
+        super().__init__()
+        self.robot = robot
+        self.wire = wire or Wire()
+        self.writes: list[bytes] = []
+        self.gone = False
+
+    def check(self) -> None:
+        if self.gone or not self.is_open:
+            raise OSError(5, "Input/output error")
+
+    def write(self, data: bytes) -> int:
+        self.check()
+        self.writes.append(data)
+        self.clock.sleep(self.write_s)
+        for byte in data:
+            number, self.wire.n_to_robot = self.wire.n_to_robot, self.wire.n_to_robot + 1
+            for arriving in self.wire.to_robot(number, byte):
+                self.send(self.robot.receive(arriving, self.clock.now()))
+        return len(data)
+
+    def send(self, data: bytes) -> None:
+        for byte in data:
+            number, self.wire.n_to_host = self.wire.n_to_host, self.wire.n_to_host + 1
+            self.incoming += self.wire.to_host(number, byte)
+
+    def read(self, size: int = 1) -> bytes:
+        self.check()
+        return super().read(size)
+
+    def open(self) -> None:
+        if self.gone:
+            raise OSError(2, "No such file or directory")
+        super().open()

@@ -13,12 +13,12 @@ from realitygap.families.scribbler import Scribbler
 from realitygap.robots import Command, RecordedRobot, Robot, export_mcap, read_recording
 from realitygap.testing import RobotContractError, check_robot
 
-from ..families.scribbler.peers import FakePort, FakeScribbler
-from .ports import Wire
+from ..families.scribbler.peers import FakeScribbler
+from .ports import Wire, WiredPort
 
 
-def record(path: Path, n_steps: int = 3, wire: Wire | None = None) -> FakePort:
-    port = FakePort(FakeScribbler("s2+fluke1"), wire)
+def record(path: Path, n_steps: int = 3, wire: Wire | None = None) -> WiredPort:
+    port = WiredPort(FakeScribbler("s2+fluke1"), wire)
     with Scribbler(port, record=path, reading_max=1600) as robot:
         for _ in range(2):
             robot.reset()
@@ -54,7 +54,7 @@ def test_a_recording_says_what_was_recorded_and_holds_every_byte(tmp_path):
 def test_a_recorded_robot_does_again_what_it_did_and_keeps_the_contract(tmp_path):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(FakeScribbler, "fluke_command", varied(FakeScribbler.fluke_command))
-        robot = Scribbler(FakePort(FakeScribbler("s2+fluke1")), record=tmp_path / "one.jsonl")
+        robot = Scribbler(WiredPort(FakeScribbler("s2+fluke1")), record=tmp_path / "one.jsonl")
         seen = []
         observe = robot.observe
         robot.observe = lambda: seen.append(observe()) or seen[-1]  # type: ignore[method-assign]
@@ -107,7 +107,7 @@ def test_a_call_that_deviates_from_a_recording_is_refused_with_its_step(tmp_path
 
 
 def test_a_fault_is_recorded_and_comes_again(tmp_path):
-    port = FakePort(FakeScribbler("s2+fluke1"))
+    port = WiredPort(FakeScribbler("s2+fluke1"))
     robot = Scribbler(port, record=tmp_path / "one.jsonl")
     robot.reset()
     robot.observe()
@@ -128,7 +128,7 @@ def test_a_fault_is_recorded_and_comes_again(tmp_path):
 
 
 def test_a_robot_that_nobody_reached_leaves_a_recording_of_the_attempts(tmp_path):
-    port = FakePort(FakeScribbler("s2"), Wire(to_host=lambda number, byte: b""))
+    port = WiredPort(FakeScribbler("s2"), Wire(to_host=lambda number, byte: b""))
     with pytest.raises(RobotError):
         Scribbler(port, record=tmp_path / "one.jsonl")
     recording = read_recording(tmp_path / "one.jsonl")
@@ -174,14 +174,14 @@ def test_files_that_are_no_recordings_are_said(tmp_path):
 
 def test_a_recording_never_overwrites_one(tmp_path):
     record(tmp_path / "one.jsonl")
-    port = FakePort(FakeScribbler("s2"))
+    port = WiredPort(FakeScribbler("s2"))
     with pytest.raises(RecordError, match=r"one.jsonl exists already\. .* Name another file"):
         Scribbler(port, record=tmp_path / "one.jsonl")
     assert not port.is_open
 
 
 def test_a_full_disk_is_one_error_and_the_motors_stop(tmp_path):
-    port = FakePort(FakeScribbler("s2"))
+    port = WiredPort(FakeScribbler("s2"))
 
     class FullFile:
         def write(self, data: bytes) -> int:
@@ -211,7 +211,7 @@ class NoRoom:
 
 
 def test_a_full_disk_does_not_keep_stop_from_stopping(tmp_path):
-    port = FakePort(FakeScribbler("s2"))
+    port = WiredPort(FakeScribbler("s2"))
     robot = Scribbler(port, record=tmp_path / "one.jsonl")
     robot.motors(1, 1)
     robot._recorder._file = NoRoom()
@@ -222,7 +222,7 @@ def test_a_full_disk_does_not_keep_stop_from_stopping(tmp_path):
 
 
 def test_a_full_disk_under_the_watchdog_is_said_with_the_next_command(tmp_path):
-    port = FakePort(FakeScribbler("s2"))
+    port = WiredPort(FakeScribbler("s2"))
     with Scribbler(port, record=tmp_path / "one.jsonl", watchdog_s=1.0) as robot:
         robot.motors(1, 1)
         robot._recorder._file = NoRoom()

@@ -11,12 +11,13 @@ from realitygap.robots import Command, Observation
 from realitygap.testing import RobotContractError, check_robot
 from realitygap.world import load_arena
 
-from ..families.scribbler.peers import FakePort, FakeScribbler
+from ..families.scribbler.peers import FakeScribbler
+from ..robots.ports import WiredPort
 
 
 @pytest.mark.parametrize("setup", ["s1", "s2", "s1+fluke1", "s2+fluke1", "s2+fluke2"])
 def test_a_scribbler_keeps_the_contract(setup):
-    port = FakePort(FakeScribbler(setup))
+    port = WiredPort(FakeScribbler(setup))
     check_robot(Scribbler(port, watchdog_s=1.0))
     assert not port.is_open
     assert port.robot.motors == (100, 100)
@@ -86,7 +87,7 @@ def test_a_thing_without_methods_is_told_which():
 
 
 def test_a_step_that_is_too_short_is_noticed():
-    port = FakePort(FakeScribbler("s2"))
+    port = WiredPort(FakeScribbler("s2"))
     robot = Scribbler(port, step_s=0.0)
     robot.step_s = 0.5
     sleep = port.clock.sleep
@@ -96,7 +97,7 @@ def test_a_step_that_is_too_short_is_noticed():
 
 
 def test_an_error_of_the_robot_itself_comes_through():
-    port = FakePort(FakeScribbler("s2"))
+    port = WiredPort(FakeScribbler("s2"))
     robot = Scribbler(port)
     port.gone = True
     with pytest.raises(RobotError, match="hung up"):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict
 from pathlib import Path
 from types import TracebackType
@@ -13,6 +13,7 @@ from realitygap._closed_on_exit import ClosedOnExit
 from realitygap.errors import RecordError, RobotError
 
 from ._clock import Clock
+from ._contract import Observation
 from ._recording import NoRecorder, Recorder
 
 _SET_UP = ("label", "step_s", "n_sensors", "reading_max")
@@ -41,11 +42,18 @@ class ProgramRobot(ClosedOnExit):
 
 
 class PortDriver:
-    """A robot behind a link. Its calls, and what goes wrong with them, are recorded if a file is named."""
+    """A robot behind a link. Its calls, and what goes wrong with them, are recorded if a file is named.
+
+    Attributes:
+        link: The link to the robot.
+        info: Facts about the robot.
+    """
 
     link: Any
     info: Any
     _recorder: Recorder | NoRecorder
+    _released: Callable[[], object]
+    """Lets go of what a robot that was not closed would still hold."""
 
     def _record_into(self, path: Path | str | None, clock: Clock) -> Recorder | NoRecorder:
         try:
@@ -72,9 +80,43 @@ class PortDriver:
             self._recorder.fault(name, error)
             raise
 
+    def _seen(self, seen: Observation) -> Observation:
+        """Record an observation, and return it."""
+        more = {"channels": seen.channels} if seen.channels else {}
+        self._recorder.call("observe", readings=seen.readings, stalled=seen.stalled, raw=seen.raw, **more)
+        return seen
+
+    def stop(self) -> None:
+        """Stop the motors. This is safe at any moment, and if called twice."""
+        if not self.link.is_open:
+            return
+        try:
+            self._recorder.call("stop")
+        finally:  # also if the recording fails
+            self._stop_motors()
+
     def close(self) -> None:
-        """Stop the motors and let go of the robot; safe to call twice."""
+        """Stop the motors and close the port. This is safe if called twice.
+
+        Raises:
+            RobotError: The motors could not be stopped; the port is closed all the same.
+        """
+        if not self.link.is_open:
+            return
+        try:
+            self._end()
+        finally:
+            self.link.close()
+            self._released()
+            self._recorder.call("close")
+            self._recorder.close()
+
+    def _stop_motors(self) -> None:
         raise NotImplementedError
+
+    def _end(self) -> None:
+        """Stop the motors for good."""
+        self._stop_motors()
 
     def __enter__(self) -> Self:
         return self

@@ -19,7 +19,7 @@ from realitygap.families.scribbler.opcodes import (
     Op,
 )
 
-from ...robots.ports import BufferPort, Wire
+from ...robots.ports import BufferPort
 
 
 def packet(*values: int) -> bytes:
@@ -155,39 +155,3 @@ class FakeScribbler:
         n_answer = known.get(command[0], 0)  # type: ignore[call-overload]
         answer = BLOCK if n_answer == 11 else bytes(n_answer)
         return command + answer
-
-
-class FakePort(BufferPort):
-    """A `FakeScribbler` at the other end of a wire."""
-
-    def __init__(self, robot: FakeScribbler, wire: Wire | None = None) -> None:
-        super().__init__()
-        self.robot = robot
-        self.wire = wire or Wire()
-        self.writes: list[bytes] = []
-        self.gone = False
-
-    def write(self, data: bytes) -> int:
-        if self.gone or not self.is_open:
-            raise OSError(5, "Input/output error")
-        self.writes.append(data)
-        for byte in data:
-            number, self.wire.n_to_robot = self.wire.n_to_robot, self.wire.n_to_robot + 1
-            for arriving in self.wire.to_robot(number, byte):
-                self.send(self.robot.receive(arriving, self.clock.now()))
-        return len(data)
-
-    def send(self, data: bytes) -> None:
-        for byte in data:
-            number, self.wire.n_to_host = self.wire.n_to_host, self.wire.n_to_host + 1
-            self.incoming += self.wire.to_host(number, byte)
-
-    def read(self, size: int = 1) -> bytes:
-        if self.gone or not self.is_open:
-            raise OSError(5, "Input/output error")
-        return super().read(size)
-
-    def open(self) -> None:
-        if self.gone:
-            raise OSError(2, "No such file or directory")
-        super().open()

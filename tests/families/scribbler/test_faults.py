@@ -17,8 +17,8 @@ from realitygap.errors import ProtocolError, RobotError, RobotTimeout
 from realitygap.families.scribbler import Scribbler
 from realitygap.robots import Command
 
-from ...robots.ports import Wire
-from .peers import INFOS, FakePort, FakeScribbler, ScriptedPort, greeting, packet
+from ...robots.ports import Wire, WiredPort
+from .peers import INFOS, FakeScribbler, ScriptedPort, greeting, packet
 
 SETUPS = ["s1", "s2", "s1+fluke1", "s2+fluke1", "s2+fluke2"]
 LEFT_RIGHT = (0.5, -0.25)
@@ -38,7 +38,7 @@ def scene(robot: Scribbler) -> list[object]:
 
 
 def undisturbed(setup: str) -> tuple[list[object], Wire, list[bytes]]:
-    port = FakePort(FakeScribbler(setup))
+    port = WiredPort(FakeScribbler(setup))
     with Scribbler(port) as robot:
         seen = scene(robot)
         assert robot.faults.recoveries == robot.faults.retries == 0
@@ -64,7 +64,7 @@ def test_wherever_one_byte_is_lost_or_added_all_values_are_right_and_the_motors_
         change = {
             direction: lambda number, byte, at=at: FAULTS[fault](byte) if number == at else bytes((byte,))
         }
-        port = FakePort(FakeScribbler(setup), Wire(**change))
+        port = WiredPort(FakeScribbler(setup), Wire(**change))
         with Scribbler(port) as robot:
             n_unnoticed += scene(robot) != expected
         assert port.robot.motors == STILL, at
@@ -87,7 +87,7 @@ def test_noise_on_the_line_ends_in_a_working_link_or_one_error_and_motors_off(se
         return draw.choice([b"", bytes((byte, byte)), bytes((draw.randrange(256),))])
 
     for _ in range(200):
-        port = FakePort(FakeScribbler(setup), Wire(noisy, noisy))
+        port = WiredPort(FakeScribbler(setup), Wire(noisy, noisy))
         try:
             with Scribbler(port) as robot:
                 scene(robot)
@@ -102,7 +102,7 @@ def test_noise_on_the_line_ends_in_a_working_link_or_one_error_and_motors_off(se
 
 
 def test_a_fluke_1_that_is_stuck_in_a_packet_is_released_and_nothing_is_carried_out_by_it():
-    port = FakePort(FakeScribbler("s2+fluke1"))
+    port = WiredPort(FakeScribbler("s2+fluke1"))
     with Scribbler(port) as robot:
         for n_sent in range(1, 9):
             port.write(bytes([109, 200, 0, 0, 0, 0, 0, 0, 0][:n_sent]))  # cut short
@@ -116,7 +116,7 @@ def test_a_fluke_1_that_is_stuck_in_a_packet_is_released_and_nothing_is_carried_
 
 def test_a_fluke_stuck_by_the_program_before_is_released_as_the_port_is_opened():
     for n_sent in range(1, 9):
-        port = FakePort(FakeScribbler("s1+fluke1"))
+        port = WiredPort(FakeScribbler("s1+fluke1"))
         port.write(packet(109, 200)[:n_sent])
         port.incoming.clear()
         with Scribbler(port) as robot:
@@ -125,7 +125,7 @@ def test_a_fluke_stuck_by_the_program_before_is_released_as_the_port_is_opened()
 
 
 def test_motors_go_on_as_told_after_a_fault_was_put_right():
-    port = FakePort(FakeScribbler("s2"))
+    port = WiredPort(FakeScribbler("s2"))
     with Scribbler(port) as robot:
         robot.motors(*LEFT_RIGHT)
         port.send(b"\x07" * 30)  # late, of nothing
@@ -141,7 +141,7 @@ def test_motors_go_on_as_told_after_a_fault_was_put_right():
 
 
 def test_a_late_answer_is_not_taken_for_that_of_the_next_command():
-    port = FakePort(FakeScribbler("s2+fluke1"))
+    port = WiredPort(FakeScribbler("s2+fluke1"))
     with Scribbler(port) as robot:
         held = bytearray()
         port.wire.to_host = lambda number, byte: held.append(byte) or b""
@@ -162,12 +162,12 @@ def test_a_late_answer_is_not_taken_for_that_of_the_next_command():
 class Silence:
     """Cuts the wire from the robot after so many bytes."""
 
-    def __init__(self, port: FakePort, n_bytes: int = 0) -> None:
+    def __init__(self, port: WiredPort, n_bytes: int = 0) -> None:
         port.wire.to_host = lambda number, byte: b""
 
 
 def test_a_robot_that_falls_silent_is_one_error_that_says_all_there_is_to_know():
-    port = FakePort(FakeScribbler("s2"))
+    port = WiredPort(FakeScribbler("s2"))
     robot = Scribbler(port, step_s=0.5)
     for _ in range(41):
         robot.drive(Command(0.5, 0.0))
@@ -200,7 +200,7 @@ def test_a_robot_that_falls_silent_is_one_error_that_says_all_there_is_to_know()
     ],
 )
 def test_commands_that_are_not_safe_to_repeat_are_sent_once_and_reported_as_in_doubt(name, call):
-    port = FakePort(FakeScribbler("s2"))
+    port = WiredPort(FakeScribbler("s2"))
     with Scribbler(port) as robot:
         robot.motors(*LEFT_RIGHT)
         lost = port.wire.n_to_host + 10
@@ -217,7 +217,7 @@ def test_commands_that_are_not_safe_to_repeat_are_sent_once_and_reported_as_in_d
 
 
 def test_a_motion_that_a_fault_cut_short_is_said_and_one_that_has_ended_is_not():
-    port = FakePort(FakeScribbler("s2"))
+    port = WiredPort(FakeScribbler("s2"))
     with Scribbler(port) as robot:
         robot.move_by(100, 0)
         lose_a_byte(port)
@@ -242,14 +242,14 @@ def test_motor_stats_say_whether_a_motion_has_ended():
         assert not robot.link.is_in_motion
 
 
-def lose_a_byte(port: FakePort) -> None:
+def lose_a_byte(port: WiredPort) -> None:
     """Of the next answer."""
     lost = port.wire.n_to_host + 10
     port.wire.to_host = lambda number, byte: b"" if number == lost else bytes((byte,))
 
 
 def test_a_hang_up_is_survived_when_the_port_comes_back():
-    port = FakePort(FakeScribbler("s2+fluke1"))
+    port = WiredPort(FakeScribbler("s2+fluke1"))
     with Scribbler(port) as robot:
         robot.motors(*LEFT_RIGHT)
         port.gone = True
@@ -267,19 +267,19 @@ def test_a_hang_up_is_survived_when_the_port_comes_back():
     assert port.robot.motors == STILL
 
 
-def silence(port: FakePort) -> None:
+def silence(port: WiredPort) -> None:
     """Have a robot answer nothing, without a hang-up."""
     port.wire.to_host = lambda number, byte: b""
 
 
-def hang_up(port: FakePort) -> None:
+def hang_up(port: WiredPort) -> None:
     port.gone = True
 
 
 @pytest.mark.parametrize("lose", [silence, hang_up])
 @pytest.mark.parametrize("setup", ["s1", "s2", "s2+fluke1", "s2+fluke2"])
 def test_warning_that_motors_may_be_running_comes_within_3_s(lose, setup):
-    port = FakePort(FakeScribbler(setup))
+    port = WiredPort(FakeScribbler(setup))
     warned: list[tuple[float, str]] = []
     robot = Scribbler(port)
     with warnings.catch_warnings():
@@ -302,7 +302,7 @@ def test_warning_that_motors_may_be_running_comes_within_3_s(lose, setup):
 
 
 def test_robot_that_stands_gives_no_warning_when_it_is_lost():
-    port = FakePort(FakeScribbler("s2+fluke1"))
+    port = WiredPort(FakeScribbler("s2+fluke1"))
     robot = Scribbler(port)
     silence(port)
     with warnings.catch_warnings():
@@ -313,7 +313,7 @@ def test_robot_that_stands_gives_no_warning_when_it_is_lost():
 
 
 def test_a_hang_up_in_the_greeting_is_survived_too():
-    port = FakePort(FakeScribbler("s2"))
+    port = WiredPort(FakeScribbler("s2"))
     write = port.write
 
     def hang_up(data: bytes) -> int:
@@ -328,7 +328,7 @@ def test_a_hang_up_in_the_greeting_is_survived_too():
 
 
 def test_a_hang_up_for_good_is_one_error():
-    port = FakePort(FakeScribbler("s2+fluke1"))
+    port = WiredPort(FakeScribbler("s2+fluke1"))
     robot = Scribbler(port)
     robot.motors(*LEFT_RIGHT)
     port.gone = True
@@ -343,7 +343,7 @@ def test_a_hang_up_for_good_is_one_error():
 
 def test_a_pseudo_terminal_that_ended_is_not_opened_again():
     """The next one with its name belongs to another program, which would get the bytes for the robot."""
-    port = FakePort(FakeScribbler("s2+fluke1"))
+    port = WiredPort(FakeScribbler("s2+fluke1"))
     port.name = "/dev/pts/7"
     robot = Scribbler(port)
     robot.motors(*LEFT_RIGHT)
@@ -359,7 +359,7 @@ def test_a_pseudo_terminal_that_ended_is_not_opened_again():
 @pytest.mark.parametrize("setup", SETUPS)
 def test_a_reset_of_the_robot_is_survived(setup):
     """Three seconds deaf, then its name once a second until it is spoken to."""
-    port = FakePort(FakeScribbler(setup))
+    port = WiredPort(FakeScribbler(setup))
     with Scribbler(port) as robot:
         robot.motors(*LEFT_RIGHT)
         back, spoken = port.clock.now() + 3.0, []
@@ -382,7 +382,7 @@ def test_a_reset_of_the_robot_is_survived(setup):
 
 
 def test_a_port_that_is_never_silent_is_one_error_and_no_hang():
-    class Chatter(FakePort):
+    class Chatter(WiredPort):
         def read(self, size: int = 1) -> bytes:
             return b"U" * size
 
@@ -393,7 +393,7 @@ def test_a_port_that_is_never_silent_is_one_error_and_no_hang():
 
 
 def test_a_port_where_nobody_answers_is_one_error_after_a_few_tries():
-    port = FakePort(FakeScribbler("s2"), Wire(to_robot=lambda number, byte: b""))
+    port = WiredPort(FakeScribbler("s2"), Wire(to_robot=lambda number, byte: b""))
     with pytest.raises(
         RobotTimeout, match=r"No Scribbler answers on /dev/test, asked 3 times within \d+ s. No answer"
     ):
@@ -421,7 +421,7 @@ def test_an_answer_of_something_else_is_no_scribbler():
 
 
 def test_motors_stop_when_an_exception_leaves_the_block():
-    port = FakePort(FakeScribbler("s2"))
+    port = WiredPort(FakeScribbler("s2"))
     with pytest.raises(ZeroDivisionError), Scribbler(port) as robot:  # noqa: PT012
         robot.motors(1, 1)
         raise ZeroDivisionError
@@ -430,7 +430,7 @@ def test_motors_stop_when_an_exception_leaves_the_block():
 
 @pytest.mark.parametrize("n_reads", range(1, 9))
 def test_motors_stop_after_ctrl_c_in_the_middle_of_an_answer(n_reads):
-    port = FakePort(FakeScribbler("s2+fluke1"))
+    port = WiredPort(FakeScribbler("s2+fluke1"))
     read, count = port.read, 0
 
     def interrupted(size: int = 1) -> bytes:
@@ -453,7 +453,7 @@ def test_motors_stop_after_ctrl_c_in_the_middle_of_an_answer(n_reads):
 
 
 def test_a_stop_that_fails_on_the_way_out_is_a_note_on_the_exception():
-    port = FakePort(FakeScribbler("s2"))
+    port = WiredPort(FakeScribbler("s2"))
     with pytest.raises(ZeroDivisionError) as caught, Scribbler(port) as robot:  # noqa: PT012
         robot.motors(1, 1)
         port.gone = True
@@ -462,7 +462,7 @@ def test_a_stop_that_fails_on_the_way_out_is_a_note_on_the_exception():
 
 
 def test_motors_stop_when_nobody_holds_the_robot_any_more():
-    port = FakePort(FakeScribbler("s2"))
+    port = WiredPort(FakeScribbler("s2"))
     Scribbler(port).motors(1, 1)
     gc.collect()
     assert port.robot.motors == STILL
@@ -472,7 +472,7 @@ def test_motors_stop_when_nobody_holds_the_robot_any_more():
 def test_signals_that_end_a_program_leave_blocks_while_a_robot_is_open():
     before = signal.getsignal(signal.SIGTERM)
     assert before is signal.SIG_DFL
-    port = FakePort(FakeScribbler("s2"))
+    port = WiredPort(FakeScribbler("s2"))
     with pytest.raises(SystemExit) as caught, Scribbler(port) as robot:  # noqa: PT012
         robot.motors(1, 1)
         signal.raise_signal(signal.SIGTERM)
@@ -486,7 +486,7 @@ def test_a_handler_of_ones_own_is_left_alone():
 
     signal.signal(signal.SIGTERM, mine)
     try:
-        with Scribbler(FakePort(FakeScribbler("s2"))):
+        with Scribbler(WiredPort(FakeScribbler("s2"))):
             assert signal.getsignal(signal.SIGTERM) is mine
         assert signal.getsignal(signal.SIGTERM) is mine
     finally:
@@ -497,7 +497,7 @@ def test_a_handler_of_ones_own_is_left_alone():
 
 
 def test_a_silent_program_is_stopped_by_the_watchdog_at_the_very_moment():
-    port = FakePort(FakeScribbler("s2"))
+    port = WiredPort(FakeScribbler("s2"))
     with Scribbler(port, watchdog_s=1.0, step_s=3.0) as robot:
         robot.drive(Command(1, 0))  # a step may last longer than that
         assert port.robot.motors == (200, 200)
@@ -541,7 +541,7 @@ def test_an_emulated_robot_in_real_time_is_watched_by_a_thread():
         assert robot.faults.watchdog_stops == 1
 
 
-class RealTimePort(FakePort):
+class RealTimePort(WiredPort):
     """The same in real time; what would wait for an answer is not needed here."""
 
     clock = property(lambda self: None, lambda self, clock: None)

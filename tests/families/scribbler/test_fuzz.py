@@ -16,7 +16,8 @@ from realitygap.families.scribbler import Scribbler, _codec, _images
 from realitygap.families.scribbler._link import Link
 from realitygap.robots import Command
 
-from .peers import INFOS, FakePort, FakeScribbler
+from ...robots.ports import WiredPort
+from .peers import INFOS, FakeScribbler
 from .pictures import jpeg_parts, slope
 
 N = 10_000
@@ -89,7 +90,7 @@ def fuzz_codec(n: int) -> int:
     return n_refused
 
 
-class FuzzPort(FakePort):
+class FuzzPort(WiredPort):
     """A robot whose answers are now and then something else."""
 
     def __init__(self, setup: str, draw: random.Random) -> None:
@@ -183,7 +184,7 @@ def test_a_million_random_and_mutated_strings_do_no_harm():
 def test_a_link_keeps_no_bytes_of_a_flood():
     """An answer without an end is given up after a bounded number of bytes."""
 
-    class Flood(FakePort):
+    class Flood(WiredPort):
         n_read = 0
         flooding = False
 

@@ -9,7 +9,7 @@ from realitygap.families.thymio import _messages as messages
 from realitygap.families.thymio._messages import Decoder, Kind, Message
 from realitygap.families.thymio._program import CHECK, DRIVE, OWN, TICK_S
 
-from ...robots.ports import BufferPort, Wire
+from ...robots.ports import Wire, WiredPort
 
 VARIABLES = {
     "_id": 1,
@@ -118,36 +118,11 @@ class FakeThymio:
         ]
 
 
-class FakePort(BufferPort):
+class FakePort(WiredPort):
     """A `FakeThymio` at the other end of a wire."""
 
+    write_s = 0.001
+
     def __init__(self, robot: FakeThymio | None = None, wire: Wire | None = None) -> None:
-        super().__init__()
+        super().__init__(robot or FakeThymio(), wire)
         self.timeout = 0.02
-        self.robot = robot or FakeThymio()
-        self.wire = wire or Wire()
-        self.writes: list[bytes] = []
-        self.gone = False
-
-    def check(self) -> None:
-        if self.gone or not self.is_open:
-            raise OSError(5, "Input/output error")
-
-    def write(self, data: bytes) -> int:
-        self.check()
-        self.writes.append(data)
-        self.clock.sleep(0.001)
-        for byte in data:
-            number, self.wire.n_to_robot = self.wire.n_to_robot, self.wire.n_to_robot + 1
-            for arriving in self.wire.to_robot(number, byte):
-                self.send(self.robot.receive(arriving, self.clock.now()))
-        return len(data)
-
-    def send(self, data: bytes) -> None:
-        for byte in data:
-            number, self.wire.n_to_host = self.wire.n_to_host, self.wire.n_to_host + 1
-            self.incoming += self.wire.to_host(number, byte)
-
-    def read(self, size: int = 1) -> bytes:
-        self.check()
-        return super().read(size)

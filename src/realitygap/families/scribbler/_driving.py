@@ -67,8 +67,7 @@ class Driving(Device):
         self.need_robot("motors")
         return self._set(codec.motors(left, right))
 
-    def stop(self) -> None:
-        """Stop the motors. This is safe at any moment, and if called twice."""
+    def _stop_motors(self) -> None:
         if self.info.model is not None and self.link.is_open:
             self._set(codec.STOP)
 

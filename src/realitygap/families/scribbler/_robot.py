@@ -160,7 +160,7 @@ class Scribbler(Driving, Senses, Identity, SoundAndLight, Camera, Board, PortDri
         self.need_robot("reset")
         self._recorder.call("reset")
         with self._noted("reset"):
-            super().stop()
+            self._stop_motors()
         self._n_steps = 0
         self._counted = None
         self.link.where = ""
@@ -171,9 +171,7 @@ class Scribbler(Driving, Senses, Identity, SoundAndLight, Camera, Board, PortDri
             seen = self._observe()
             if self._selected:
                 seen = seen._replace(channels=self._read_channels())
-        more = {"channels": seen.channels} if seen.channels else {}
-        self._recorder.call("observe", readings=seen.readings, stalled=seen.stalled, raw=seen.raw, **more)
-        return seen
+        return self._seen(seen)
 
     def _has(self, kind: str) -> bool:
         return any(name.startswith(f"{kind}.") for name in self._selected)
@@ -236,31 +234,12 @@ class Scribbler(Driving, Senses, Identity, SoundAndLight, Camera, Board, PortDri
             self._watchdog.excuse(self.step_s)
         self.link.clock.sleep(self.step_s)
 
-    def stop(self) -> None:
-        """Stop the motors. This is safe at any moment, and if called twice."""
+    def _end(self) -> None:
         try:
-            if self.link.is_open:
-                self._recorder.call("stop")
-        finally:  # also where the recording fails
-            super().stop()
-
-    def close(self) -> None:
-        """Stop the motors and close the port. This is safe if called twice.
-
-        Raises:
-            RobotError: The motors could not be stopped; the port is closed all the same.
-        """
-        if not self.link.is_open:
-            return
-        try:
-            super().stop()
+            self._stop_motors()
         finally:
             if self._watchdog is not None:
                 self._watchdog.end()
-            self.link.close()
-            self._released()
-            self._recorder.call("close")
-            self._recorder.close()
 
 
 def _let_go(link: Link) -> None:

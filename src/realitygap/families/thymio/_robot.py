@@ -325,7 +325,7 @@ class Thymio(PortDriver):
         """Begin a trial: motors stopped, and armed again if its center button was pressed."""
         self._recorder.call("reset")
         with self._noted("reset"):
-            _stop(self.link, self.description)
+            self._stop_motors()
             halted = self.description.first_free + OWN.index("halted")
             self.link.write(self.description, halted, (0,))
             self._read()
@@ -342,9 +342,7 @@ class Thymio(PortDriver):
         channels = dict(zip(self.channels, (*lines, *self._encoders()), strict=True))
         stalled = self._is_stalled(seen)
         chosen = {name: channels[name] for name in self._selected}
-        more = {"channels": chosen} if chosen else {}
-        self._recorder.call("observe", readings=readings, stalled=stalled, raw=raw, **more)
-        return Observation(readings, stalled, raw, chosen)
+        return self._seen(Observation(readings, stalled, raw, chosen))
 
     def _encoders(self) -> tuple[float, ...]:
         """Return the mean speed of each wheel since the last observation, as a part of `full_speed`."""
@@ -415,31 +413,13 @@ class Thymio(PortDriver):
         """Return the raw readings of the ground sensors, left and right."""
         return self._read().values[_GROUND]
 
-    def stop(self) -> None:
-        """Stop the motors and read back that their targets are 0; safe to call twice."""
-        if not self.link.is_open:
-            return
-        try:
-            self._recorder.call("stop")
-        finally:  # also if the recording fails
-            _stop(self.link, self.description)
+    def _stop_motors(self) -> None:
+        """Stop the motors, and read back that their targets are 0."""
+        _stop(self.link, self.description)
 
-    def close(self) -> None:
-        """Stop the motors and let go of the robot; safe to call twice.
-
-        Raises:
-            RobotError: The motors could not be stopped; the port is closed all the same.
-        """
-        if not self.link.is_open:
-            return
-        try:
-            _stop(self.link, self.description)
-            self.link.reset(self.description)
-        finally:
-            self.link.close()
-            self._released()
-            self._recorder.call("close")
-            self._recorder.close()
+    def _end(self) -> None:
+        self._stop_motors()
+        self.link.reset(self.description)
 
 
 def _stop_messages(robot: Description) -> bytes:

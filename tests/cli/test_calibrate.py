@@ -5,14 +5,13 @@ from __future__ import annotations
 import json
 import math
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
 
 from realitygap.calibration import Fit, path_plans
-from realitygap.cli import _calibrate, _calibration_operator, app
-from realitygap.errors import RealityGapError
+from realitygap.cli import _calibrate, _calibration_operator
 from realitygap.platforms import SimPlatform, SimTarget
 from realitygap.records import read_observations, write_observations
 from realitygap.study import parse_length, save_calibration
@@ -21,21 +20,15 @@ from realitygap.study._targets import observations_head
 from realitygap.trials import _target_robot
 from realitygap.world import Fitted, load_calibration, load_robot, paper_arena
 
+from . import invoked
+from .invoked import printed
+
 pytestmark = pytest.mark.slow
 
 PORT = "scribbler:emulator://s2?fluke=2&arena=paper&seed=1&speed=off"
 
 
-def run(*arguments: object) -> str:
-    done = CliRunner().invoke(app, ["calibrate", *map(str, arguments)], catch_exceptions=False)
-    assert done.exit_code == 0, done.output
-    return done.output
-
-
-def refused(*arguments: object) -> str:
-    done = CliRunner().invoke(app, ["calibrate", *map(str, arguments)])
-    assert isinstance(done.exception, RealityGapError), done.output
-    return str(done.exception)
+run, refused = partial(printed, "calibrate"), partial(invoked.refused, "calibrate")
 
 
 @pytest.fixture(scope="module")

@@ -10,11 +10,10 @@ import time
 
 import pytest
 import serial
-from typer.testing import CliRunner
 
-from realitygap.cli import app
 from realitygap.emulator import connect_witness
-from realitygap.errors import RobotError
+
+from .invoked import refused
 
 pytestmark = pytest.mark.slow
 
@@ -156,6 +155,4 @@ def test_in_a_terminal_there_is_a_live_view():
     ],
 )
 def test_a_wrong_option_gets_one_clear_message(options, says):
-    result = CliRunner().invoke(app, ["emulate", *options])
-    assert isinstance(result.exception, RobotError)
-    assert says in str(result.exception)
+    assert says in refused("emulate", *options)

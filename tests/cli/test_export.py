@@ -2,6 +2,7 @@
 
 import json
 import sys
+from functools import partial
 
 import networkx
 import numpy as np
@@ -9,14 +10,14 @@ import onnx
 import onnxruntime
 import polars as pl
 import pytest
-from typer.testing import CliRunner
 
-from realitygap.cli import app
 from realitygap.errors import RealityGapError
 from realitygap.evolution import Genome
 from realitygap.records import ResultsFolder
 from realitygap.runs import Condition, genome_of
 from realitygap.study import parse_study, run_study
+
+from .invoked import printed
 
 STUDY = """
 [study]
@@ -45,14 +46,7 @@ def results(tmp_path_factory):
     return str(run_study(parse_study(STUDY, "tiny.toml"), tmp_path_factory.mktemp("tiny")).folder.path)
 
 
-def export(*words):
-    """What the command prints; its errors as they reach `main`, which prints them as one message."""
-    done = CliRunner().invoke(app, ["export", *map(str, words)])
-    if done.exception is not None and not isinstance(done.exception, SystemExit):
-        raise done.exception
-    assert done.exit_code == 0, done.output
-    return done.output
-
+export = partial(printed, "export")
 
 WHICH = {"condition": "novelty-50", "replicate": 2, "generation": 1, "individual": 3}
 OPTIONS = [word for key, value in WHICH.items() for word in (f"--{key}", value)]

@@ -4,16 +4,17 @@ import json
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 from realitygap.calibration import predict_range_table
-from realitygap.cli import app
 from realitygap.errors import RealityGapError
 from realitygap.evolution import NeatSettings, Population
 from realitygap.platforms import open_target
 from realitygap.records import read_observations
 from realitygap.world import load_calibration, load_robot, paper_arena
 from tests.logs.made import SPEED, TRACK, drive, rows, wall_table, write, write_sample
+
+from . import invoked
+from .invoked import printed as run
 
 MAP = f"""\
 robot = "pioneer"
@@ -54,16 +55,8 @@ direction_deg = -70
 """
 
 
-def run(*arguments):
-    done = CliRunner().invoke(app, [*map(str, arguments)], catch_exceptions=False)
-    assert done.exit_code == 0, done.output
-    return done.output
-
-
 def refused(*arguments):
-    done = CliRunner().invoke(app, [*map(str, arguments)])
-    assert isinstance(done.exception, RealityGapError), done.output
-    message = str(done.exception)
+    message = invoked.refused(*arguments)
     assert "\n" not in message
     return message
 

@@ -22,6 +22,8 @@ from realitygap.world import load_calibration, load_robot
 from tests.cli.test_import import DISC, MAP
 from tests.logs.made import drive, rows, wall_table, write, write_sample
 
+from .invoked import printed as run
+
 pytestmark = pytest.mark.slow
 
 PORT = "emulator://s2?fluke=2&arena=paper&seed=1&speed=off"
@@ -124,12 +126,6 @@ def folder(tmp_path_factory):
     (folder / "drive.toml").write_text(MAP, "utf-8")
     write(folder / "drive.csv", rows(*drive(200, noise=0.002)))
     return folder
-
-
-def run(*words: str) -> str:
-    done = CliRunner().invoke(app, words, catch_exceptions=False)
-    assert done.exit_code == 0, (words, done.output)
-    return done.output
 
 
 def test_json_has_what_is_printed(folder, monkeypatch):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 import os
 import re
@@ -11,7 +10,6 @@ import signal
 import subprocess
 import sys
 import time
-from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
@@ -22,7 +20,7 @@ from realitygap.cli._keys import ask_verdict
 from realitygap.records import LEDGER_NAME, Ledger
 from realitygap.world import paper_arena
 
-from .fake_port import STUDY, open_fake
+from .fake_port import STUDY
 
 pytestmark = pytest.mark.slow
 
@@ -180,31 +178,6 @@ def test_lines_picked_one_after_the_other_are_kept_one_by_one(driven):
     assert "Traceback" not in terminal.seen
     with Ledger.open(driven / LEDGER_NAME) as ledger:
         assert [trial.state for trial in ledger.trials()] == ["scored", "driven"]
-
-
-@dataclass
-class Done:
-    returncode: int
-    stdout: str
-    stderr: str
-
-
-@pytest.fixture
-def no_terminal(monkeypatch, capsys):
-    """Commands in this process, with nobody at a terminal."""
-    monkeypatch.setattr(sys, "stdin", io.StringIO())
-    monkeypatch.setattr("realitygap.study._run.connect_robot", open_fake)
-
-    def command(*arguments: str) -> Done:
-        monkeypatch.setattr(sys, "argv", ["realitygap", *arguments])
-        try:
-            main()
-            code = 0
-        except SystemExit as ended:
-            code = int(ended.code or 0)
-        return Done(code, *capsys.readouterr())
-
-    return command
 
 
 def test_without_a_terminal_options_answer_and_scores_come_from_a_file(tmp_path, study, no_terminal):

@@ -3,24 +3,22 @@
 from __future__ import annotations
 
 import json
+from functools import partial
 
 import numpy as np
 import pytest
 from PIL import Image
-from typer.testing import CliRunner
 
-from realitygap.cli import app
 from realitygap.cli._robot import robot
 from tests.commands import run_command
+
+from .invoked import printed
 
 PORT = "emulator://s2?fluke=2&arena=paper&seed=1&speed=off"
 S1 = "emulator://s1?fluke=none&arena=paper&seed=1&speed=off"
 
 
-def run(*arguments: object) -> str:
-    done = CliRunner().invoke(app, ["robot", *map(str, arguments)], catch_exceptions=False)
-    assert done.exit_code == 0, done.output
-    return done.output
+run = partial(printed, "robot")
 
 
 def failed(*arguments: object) -> str:

@@ -5,47 +5,19 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-import sys
-from dataclasses import dataclass
 
 import numpy as np
 import pytest
 
 import realitygap.vision
-from realitygap.cli import main
 from realitygap.records import LEDGER_NAME, Ledger
 from realitygap.testing import photograph_sheet
 from realitygap.vision import SheetLayout
 from realitygap.world import cells_along, paper_arena
 
-from .fake_port import STUDY, open_fake
+from .fake_port import STUDY
 
 pytestmark = pytest.mark.slow
-
-
-@dataclass
-class Done:
-    returncode: int
-    stdout: str
-    stderr: str
-
-
-@pytest.fixture
-def command(monkeypatch, capsys):
-    """Commands in this process, with nobody at a terminal."""
-    monkeypatch.setattr(sys, "stdin", io.StringIO())
-    monkeypatch.setattr("realitygap.study._run.connect_robot", open_fake)
-
-    def run(*arguments: object) -> Done:
-        monkeypatch.setattr(sys, "argv", ["realitygap", *map(str, arguments)])
-        try:
-            main()
-            code = 0
-        except SystemExit as ended:
-            code = int(ended.code or 0)
-        return Done(code, *capsys.readouterr())
-
-    return run
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -66,10 +38,10 @@ def _one_reading_of_each_photo():
 
 
 @pytest.fixture
-def driven(tmp_path, command):
+def driven(tmp_path, no_terminal):
     study, out = tmp_path / "small.toml", tmp_path / "out"
     study.write_text(STUDY)
-    assert command("drive", study, "--port", "real", "--out", out, "--no-wait").returncode == 0
+    assert no_terminal("drive", study, "--port", "real", "--out", out, "--no-wait").returncode == 0
     return out
 
 
@@ -92,17 +64,17 @@ def photo(tmp_path_factory, lines):
     return path
 
 
-def test_a_photo_is_entered_once_somebody_has_looked(driven, photo, lines, command):
-    shown = command("score", photo, "--study", driven, "--generation", "0", "--who", "anna")
+def test_a_photo_is_entered_once_somebody_has_looked(driven, photo, lines, no_terminal):
+    shown = no_terminal("score", photo, "--study", driven, "--generation", "0", "--who", "anna")
     assert shown.returncode == 0, shown.stderr
     assert "Nothing was entered" in shown.stdout
     assert (driven / "sheet-1.png").read_bytes().startswith(b"\x89PNG")
     with Ledger.open(driven / LEDGER_NAME) as ledger:
         assert [trial.state for trial in ledger.trials()] == ["driven", "driven"]
     words = ("score", photo, "--study", driven, "--generation", "0", "--who", "anna", "--json")
-    values = json.loads(command(*words).stdout)
+    values = json.loads(no_terminal(*words).stdout)
     assert (values["entered"], values["overlay"]) == (0, str(driven / "sheet-1.png"))
-    values = json.loads(command(*words, "--yes").stdout)
+    values = json.loads(no_terminal(*words, "--yes").stdout)
     assert (values["entered"], len(values["trials"])) == (2, 2)
     with Ledger.open(driven / LEDGER_NAME) as ledger:
         for trial, line in zip(ledger.trials(), lines, strict=True):
@@ -118,34 +90,36 @@ def test_a_photo_is_entered_once_somebody_has_looked(driven, photo, lines, comma
         assert event["details"]["photo"]["is_confirmed"] is True
 
 
-def test_the_counts_of_a_photo_go_on_as_any_others(driven, photo, command, tmp_path):
-    command("score", photo, "--study", driven, "--sheet", "1", "--yes", "--who", "anna")
-    second = command("score", photo, "--study", driven, "--sheet", "1", "--yes", "--second", "--who", "ben")
+def test_the_counts_of_a_photo_go_on_as_any_others(driven, photo, no_terminal, tmp_path):
+    no_terminal("score", photo, "--study", driven, "--sheet", "1", "--yes", "--who", "anna")
+    second = no_terminal(
+        "score", photo, "--study", driven, "--sheet", "1", "--yes", "--second", "--who", "ben"
+    )
     assert second.returncode == 0, second.stderr
-    assert "100.0 % judged alike" in command("trials", "agreement", driven).stdout
-    again = command("score", photo, "--study", driven, "--sheet", "1", "--yes", "--who", "anna")
+    assert "100.0 % judged alike" in no_terminal("trials", "agreement", driven).stdout
+    again = no_terminal("score", photo, "--study", driven, "--sheet", "1", "--yes", "--who", "anna")
     assert again.returncode == 1
     assert "none of these trials waits for its cells; they are 2 scored" in again.stderr
-    run = command("drive", tmp_path / "small.toml", "--port", "real", "--out", driven, "--no-wait")
+    run = no_terminal("drive", tmp_path / "small.toml", "--port", "real", "--out", driven, "--no-wait")
     assert run.returncode == 0, run.stderr
-    corrected = command(
+    corrected = no_terminal(
         "score", photo, "--study", driven, "--sheet", "1", "--yes", "--correct", "--who", "anna"
     )
     assert "2 trials entered." in corrected.stdout
 
 
-def test_a_pen_that_drew_a_void_trial_too_is_left_out(driven, photo, command, tmp_path):
-    command("trials", "void", driven, "1", "--text", "it was pushed")
-    command("drive", tmp_path / "small.toml", "--port", "real", "--out", driven, "--no-wait")
-    done = command("score", photo, "--study", driven, "--sheet", "1", "--yes")
+def test_a_pen_that_drew_a_void_trial_too_is_left_out(driven, photo, no_terminal, tmp_path):
+    no_terminal("trials", "void", driven, "1", "--text", "it was pushed")
+    no_terminal("drive", tmp_path / "small.toml", "--port", "real", "--out", driven, "--no-wait")
+    done = no_terminal("score", photo, "--study", driven, "--sheet", "1", "--yes")
     assert "the pen also drew trial 1, which is void" in done.stderr
     assert "1 trials entered." in done.stdout
     with Ledger.open(driven / LEDGER_NAME) as ledger:
         assert [trial.state for trial in ledger.trials()] == ["void", "driven", "scored"]
 
 
-def test_without_a_study_it_only_shows(photo, lines, command, tmp_path):
-    done = command("score", photo, "--pens", "red,blue", "--json", "--overlay", tmp_path / "seen.png")
+def test_without_a_study_it_only_shows(photo, lines, no_terminal, tmp_path):
+    done = no_terminal("score", photo, "--pens", "red,blue", "--json", "--overlay", tmp_path / "seen.png")
     assert done.returncode == 0, done.stderr
     told = json.loads(done.stdout)
     assert [trace["pen"] for trace in told["traces"]] == ["red", "blue"]
@@ -168,19 +142,19 @@ def test_without_a_study_it_only_shows(photo, lines, command, tmp_path):
         (("--study", "none", "--pens", "red"), "--pens cannot be combined with --study"),
     ],
 )
-def test_wrong_options_get_one_clear_message(photo, options, said, command):
-    done = command("score", photo, *options)
+def test_wrong_options_get_one_clear_message(photo, options, said, no_terminal):
+    done = no_terminal("score", photo, *options)
     assert done.returncode == 1
     assert said in done.stderr
     assert "Traceback" not in done.stderr
 
 
-def test_a_photo_of_something_else_enters_nothing(driven, tmp_path, command):
+def test_a_photo_of_something_else_enters_nothing(driven, tmp_path, no_terminal):
     from PIL import Image
 
     other = tmp_path / "other.jpg"
     Image.new("RGB", (800, 600), (200, 180, 160)).save(other)
-    done = command("score", other, "--study", driven, "--generation", "0", "--yes")
+    done = no_terminal("score", other, "--study", driven, "--generation", "0", "--yes")
     assert done.returncode == 1
     assert "Of the sheet's four tags 0 were found" in done.stderr
     assert done.stderr.count("\n") == 1
@@ -211,11 +185,11 @@ def _bytes_of(kind: str, photo) -> bytes:
     ],
 )
 def test_an_upload_that_is_no_color_photo_gets_one_message_and_enters_nothing(
-    driven, photo, tmp_path, command, kind, said
+    driven, photo, tmp_path, no_terminal, kind, said
 ):
     other = tmp_path / "other.jpg"
     other.write_bytes(_bytes_of(kind, photo))
-    done = command("score", other, "--study", driven, "--generation", "0", "--yes")
+    done = no_terminal("score", other, "--study", driven, "--generation", "0", "--yes")
     assert done.returncode == 1
     assert said in done.stderr
     assert done.stderr.count("\n") == 1
@@ -224,18 +198,18 @@ def test_an_upload_that_is_no_color_photo_gets_one_message_and_enters_nothing(
         assert [trial.state for trial in ledger.trials()] == ["driven", "driven"]
 
 
-def test_generations_that_are_not_there_are_said(driven, photo, command):
-    done = command("score", photo, "--study", driven, "--generation", "7")
+def test_generations_that_are_not_there_are_said(driven, photo, no_terminal):
+    done = no_terminal("score", photo, "--study", driven, "--generation", "7")
     assert done.returncode == 1
     assert "has no such trials" in done.stderr
 
 
-def test_a_sheet_is_printed(tmp_path, command, driven):
+def test_a_sheet_is_printed(tmp_path, no_terminal, driven):
     out = tmp_path / "sheet.pdf"
-    done = command("print-sheet", "-o", out, "--paper", "arena")
+    done = no_terminal("print-sheet", "-o", out, "--paper", "arena")
     assert done.stdout == f"Written: {out} (1 page; the sheet is 1091 x 634 mm)\n"
     assert out.read_bytes().startswith(b"%PDF")
-    assert command("print-sheet", "-o", out, "--study", driven).returncode == 0
-    wrong = command("print-sheet", "-o", out, "--paper", "a44")
+    assert no_terminal("print-sheet", "-o", out, "--study", driven).returncode == 0
+    wrong = no_terminal("print-sheet", "-o", out, "--paper", "a44")
     assert wrong.returncode == 1
     assert "Did you mean 'a4'" in wrong.stderr

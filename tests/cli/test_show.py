@@ -1,15 +1,16 @@
 """`realitygap show` as a user meets it."""
 
 import xml.etree.ElementTree as ET
+from functools import partial
 
 import pytest
 from PIL import Image
-from typer.testing import CliRunner
 
-from realitygap.cli import app
 from realitygap.errors import RealityGapError
 from realitygap.report import save_view
 from realitygap.study import parse_study, run_study
+
+from .invoked import printed
 
 STUDY = """
 [study]
@@ -37,13 +38,7 @@ def results(tmp_path_factory):
     return str(run_study(parse_study(STUDY, "tiny.toml"), tmp_path_factory.mktemp("tiny")).folder.path)
 
 
-def show(*words):
-    """What the command prints; its errors as they reach `main`, which prints them as one message."""
-    done = CliRunner().invoke(app, ["show", *map(str, words)])
-    if done.exception is not None and not isinstance(done.exception, SystemExit):
-        raise done.exception
-    assert done.exit_code == 0, done.output
-    return done.output
+show = partial(printed, "show")
 
 
 @pytest.mark.parametrize("ending", ["svg", "pdf", "png"])

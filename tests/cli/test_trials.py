@@ -9,19 +9,12 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 import pytest
-from typer.testing import CliRunner
 
-from realitygap.cli import app
 from realitygap.evolution import NeatSettings, Population
 from realitygap.records import RecordWarning, read_observations
 from tests.study.physical import drive, small_study
 
-
-def run(*arguments: object) -> str:
-    """Return the words of a command, whether it succeeds or refuses."""
-    result = CliRunner().invoke(app, list(map(str, arguments)))
-    assert result.exception is None or result.exit_code == 1, result.output
-    return str(result.exception) if result.exception else result.output
+from .invoked import answered as run
 
 
 @pytest.fixture

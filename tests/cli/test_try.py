@@ -3,23 +3,20 @@
 from __future__ import annotations
 
 import json
+from functools import partial
 
 import pytest
-from typer.testing import CliRunner
 
-from realitygap.cli import app
 from realitygap.evolution import ControllerInterface, NeatSettings, Population
 from realitygap.robots.twin import sample_twin
+
+from .invoked import answered
 
 RANGES = ("range.0", "range.1", "range.2", "bias")
 LIGHTS = ("light.0", "light.1", "light.2", "bias")
 
 
-def tried(*arguments: object) -> str:
-    """Return the words of the command, whether it succeeds or refuses."""
-    result = CliRunner().invoke(app, ["try", *map(str, arguments)])
-    assert result.exception is None or result.exit_code == 1, result.output
-    return str(result.exception) if result.exception else result.output
+tried = partial(answered, "try")
 
 
 @pytest.fixture

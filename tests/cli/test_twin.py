@@ -1,24 +1,19 @@
 """`realitygap twin` as a user meets it."""
 
 import json
+from functools import partial
 
 import pytest
-from typer.testing import CliRunner
 
-from realitygap.cli import app
 from realitygap.errors import RealityGapError
 from realitygap.robots.twin import FAMILIES, family_rows, load_twin, sample_twin
+
+from .invoked import printed, refused
 
 pytestmark = pytest.mark.slow
 
 
-def twin(*words):
-    """What the command prints; its errors as they reach `main`, which prints them as one message."""
-    done = CliRunner().invoke(app, ["twin", *map(str, words)])
-    if done.exception is not None and not isinstance(done.exception, SystemExit):
-        raise done.exception
-    assert done.exit_code == 0, done.output
-    return done.output
+twin = partial(printed, "twin")
 
 
 def test_sample_prints_a_twin_or_writes_it(tmp_path):
@@ -67,9 +62,7 @@ def test_the_emulator_refuses_a_twin_that_it_cannot_move(tmp_path):
     file = tmp_path / "same.toml"
     twin("sample", "--family", "same", "-o", file)
     for path, said in ((file, "engine 'sim'"), (tmp_path / "none.toml", "There is no twin file")):
-        done = CliRunner().invoke(app, ["emulate", "scribbler", "--twin", str(path)])
-        assert isinstance(done.exception, RealityGapError)
-        assert said in str(done.exception)
+        assert said in refused("emulate", "scribbler", "--twin", path)
 
 
 def test_render_refuses_wrong_options(tmp_path):

@@ -35,7 +35,7 @@ def descriptor_of(port: object) -> int | None:
     if os.name != "posix":
         return None
     try:
-        return int(port.fileno())  # type: ignore[attr-defined]
+        return _descriptor(port)
     except (AttributeError, OSError):  # a port in this process, which needs no guardian
         return None
 

@@ -133,6 +133,24 @@ def explanation(error: BaseException, trace: TracebackType | None) -> str:
     return f"{where}{type(error).__name__}: {error}"
 
 
+class _PlainHook:
+    """The end of a program by an exception: ours are shown by one message, and others by the hook of before."""
+
+    def __init__(
+        self,
+        before: Callable[[type[BaseException], BaseException, TracebackType | None], object],
+        on_error: Callable[[], None],
+    ) -> None:
+        self._before, self._on_error = before, on_error
+
+    def __call__(self, kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
+        self._on_error()
+        if issubclass(kind, RealityGapError):
+            sys.stderr.write(printable(explanation(error, trace)) + "\n")
+        else:
+            self._before(kind, error, trace)
+
+
 def show_mistakes_plainly(on_error: Callable[[], None], on_cell: Callable[[], None]) -> None:
     """Make a mistake end a program, or a cell of a notebook, with one message and no traceback.
 
@@ -142,19 +160,9 @@ def show_mistakes_plainly(on_error: Callable[[], None], on_cell: Callable[[], No
         on_error: Called when a program, a line at the prompt or a cell ends with any exception.
         on_cell: Called when a cell begins.
     """
-    before = sys.excepthook
-    if getattr(before, "of_myro", False):
+    if isinstance(sys.excepthook, _PlainHook):
         return
-
-    def hook(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
-        on_error()
-        if issubclass(kind, RealityGapError):
-            sys.stderr.write(printable(explanation(error, trace)) + "\n")
-        else:
-            before(kind, error, trace)
-
-    hook.of_myro = True  # type: ignore[attr-defined]  # marks our own, to install it once
-    sys.excepthook = hook
+    sys.excepthook = _PlainHook(sys.excepthook, on_error)
     shell = notebook_shell()
     if shell is not None:
         shell.set_custom_exc((RealityGapError,), _in_notebook)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import math
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -94,8 +95,6 @@ class TwinCamera(ClosedOnExit):
 
 def _off_screen(width: int, height: int) -> Any:
     """Return something to draw on that is no screen."""
-    from importlib import import_module
-
     for driver in DRIVERS:
         with contextlib.suppress(Exception):  # each driver fails in its own way if its library is missing
             context = import_module(driver).GLContext(width, height)

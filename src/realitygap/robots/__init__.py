@@ -16,6 +16,7 @@ from ._contract import (
 from ._guardian import EXITS, Guardian, descriptor_of
 from ._guardian_process import GIVE_UP_S, SILENT_S
 from ._ports import (
+    Port,
     PortGuess,
     Terminal,
     is_in_this_program,
@@ -41,6 +42,7 @@ __all__ = [
     "Guardian",
     "Label",
     "Observation",
+    "Port",
     "PortDriver",
     "PortGuess",
     "ProgramRobot",

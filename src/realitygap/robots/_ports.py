@@ -23,6 +23,19 @@ _PSEUDO_TERMINAL = re.compile(
 _NUMBER = re.compile(r"\[Errno (\d+)\]|\((\d+), '")
 
 
+class Port(Protocol):
+    """The methods of a port that drivers use, with the names of `serial.Serial`."""
+
+    timeout: float | None
+
+    @property
+    def in_waiting(self) -> int: ...
+    def read(self, size: int = 1, /) -> bytes: ...
+    def write(self, data: bytes, /) -> int | None: ...
+    def open(self) -> None: ...
+    def close(self) -> None: ...
+
+
 class PortGuess(NamedTuple):
     """A port and its probable device.
 

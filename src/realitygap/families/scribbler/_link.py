@@ -20,11 +20,11 @@ from dataclasses import dataclass
 from typing import NamedTuple, TypeVar
 
 from realitygap.errors import ProtocolError, RobotError, RobotWarning
-from realitygap.robots import SILENT_S, Clock, Guardian, SystemClock, descriptor_of
+from realitygap.robots import SILENT_S, Clock, Guardian, Port, SystemClock, descriptor_of
 
 from . import _codec as codec
 from ._codec import Request
-from ._reading import GAP_S, Fault, HangUp, Port, read_answer
+from ._reading import GAP_S, Fault, HangUp, read_answer
 from .opcodes import COUNTED, JPEG_HEADER, PACKET, Op
 
 T = TypeVar("T")

@@ -8,14 +8,13 @@ import os
 import socket
 import time
 from pathlib import Path
-from typing import Any
 from urllib.parse import urlsplit
 
 import serial
 from serial.tools import list_ports
 
 from realitygap.errors import RobotError
-from realitygap.robots import GIVE_UP_S, Label, PortGuess, is_pseudo_terminal, reason_of, serial_port
+from realitygap.robots import GIVE_UP_S, Label, Port, PortGuess, is_pseudo_terminal, reason_of, serial_port
 
 from ._reading import GAP_S
 
@@ -91,7 +90,7 @@ class _Locked(Exception):  # noqa: N818
     """Another process has locked the port."""
 
 
-def open_port(name: str) -> Any:
+def open_port(name: str) -> Port:
     """Open a port with pyserial, with DTR low, as a cabled S2 requires.
 
     If the guardian of an ended program still holds the port, this waits for it.
@@ -110,16 +109,16 @@ def open_port(name: str) -> Any:
         time.sleep(LOCKED_S)
 
 
-def _open_once(name: str) -> Any:
+def _open_once(name: str) -> Port:
     if name.startswith("rfc2217://"):
         raise RobotError(
             f"{name} cannot be opened: RFC 2217 is not supported, as its ports cannot be handed to the process that "
             "stops a robot whose program was killed. Offer the port as raw TCP and name it socket://HOST:PORT."
         )
-    port: Any = None
     try:
-        port = serial_port(name, BAUD, GAP_S, WRITE_S)
-        port.dtr = False
+        unopened = serial_port(name, BAUD, GAP_S, WRITE_S)
+        unopened.dtr = False
+        port: Port = unopened
         port.open()
     except (OSError, ValueError, AttributeError) as error:
         if getattr(error, "errno", None) == errno.EAGAIN:

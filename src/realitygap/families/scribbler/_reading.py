@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Protocol
-
 from realitygap.errors import ProtocolError, RobotError, RobotTimeout
+from realitygap.robots import Port
 
 from ._codec import Request
 from .opcodes import COUNTED, JPEG_SCAN, LINE, PACKET
@@ -13,19 +12,6 @@ GAP_S = 0.5
 """Silence after which an answer that has begun has lost a byte [s]."""
 LONGEST_LINE = 512
 LONGEST_SCAN = 1 << 20
-
-
-class Port(Protocol):
-    """The methods of a port that the driver uses, with the names of `serial.Serial`."""
-
-    timeout: float | None
-
-    @property
-    def in_waiting(self) -> int: ...
-    def read(self, size: int = 1, /) -> bytes: ...
-    def write(self, data: bytes, /) -> int | None: ...
-    def open(self) -> None: ...
-    def close(self) -> None: ...
 
 
 class Fault(Exception):  # noqa: N818  # none leaves the driver

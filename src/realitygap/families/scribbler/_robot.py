@@ -5,10 +5,9 @@ from __future__ import annotations
 import weakref
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from realitygap.errors import RobotError, check_finite
-from realitygap.robots import EXITS, Clock, Command, Label, Observation, PortDriver, check_command
+from realitygap.robots import EXITS, Clock, Command, Label, Observation, Port, PortDriver, check_command
 from realitygap.world import Pose
 
 from . import _codec as codec
@@ -78,7 +77,7 @@ class Scribbler(Driving, Senses, Identity, SoundAndLight, Camera, Board, PortDri
 
     def __init__(
         self,
-        port: str | Any,
+        port: str | Port,
         *,
         step_s: float = 0.5,
         reading_max: float = 1700.0,

@@ -7,11 +7,11 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from realitygap.errors import ProtocolError, RobotError, RobotTimeout
 from realitygap.robots import SILENT_S as FROZEN_S
-from realitygap.robots import Guardian, descriptor_of
+from realitygap.robots import Guardian, Port, descriptor_of
 
 from . import _messages as messages
 from ._messages import Decoder, Kind, Message
@@ -83,7 +83,7 @@ class Link:
         name: Name for messages.
     """
 
-    def __init__(self, port: Any, name: str) -> None:
+    def __init__(self, port: Port, name: str) -> None:
         self.port = port
         self.name = name
         self.lock = threading.RLock()

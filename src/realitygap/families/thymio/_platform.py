@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import TYPE_CHECKING, ClassVar, Self
 
 from pydantic import Field, PrivateAttr
 
@@ -11,6 +11,7 @@ from realitygap.platforms import Opening, Platform, PortPlatform
 from realitygap.world import Arena, Body, RangeSensors, RobotModel, load_robot
 
 if TYPE_CHECKING:
+    from realitygap.robots import Port
     from realitygap.trials import Target
 
     from ._robot import Thymio
@@ -106,7 +107,7 @@ class ThymioPlatform(ThymioBody, PortPlatform):
         from ._robot import Thymio
         from .playground._port import open_playground
 
-        port: Any = self.port
+        port: str | Port = self.port
         if not self.needs_person:
             port = open_playground(self.port, self._arena)
         robot = Thymio(

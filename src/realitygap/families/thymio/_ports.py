@@ -5,12 +5,11 @@ from __future__ import annotations
 import errno
 import socket
 from collections.abc import Container
-from typing import Any
 
 from serial.tools import list_ports
 
 from realitygap.errors import RobotError
-from realitygap.robots import Label, PortGuess, is_pseudo_terminal, reason_of, serial_port
+from realitygap.robots import Label, Port, PortGuess, is_pseudo_terminal, reason_of, serial_port
 
 VENDOR = 0x0617
 PRODUCTS = {0x000A: "a Thymio", 0x000C: "a Thymio's dongle"}
@@ -41,14 +40,14 @@ def label_of(name: str, variables: Container[str]) -> Label:
     return "REAL" if is_device and "_vbat" in variables else "EMULATED"
 
 
-def open_port(name: str) -> Any:
+def open_port(name: str) -> Port:
     """Open a port with DTR high, as the robot needs it to listen.
 
     Raises:
         RobotError: It cannot be opened; the message says what to do.
     """
     try:
-        port = serial_port(name, BAUD, POLL_S, WRITE_S)
+        port: Port = serial_port(name, BAUD, POLL_S, WRITE_S)
         port.open()
         connection = getattr(port, "_socket", None)
         if isinstance(

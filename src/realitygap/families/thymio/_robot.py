@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from realitygap.errors import RobotError, RobotStopped, check_finite
-from realitygap.robots import EXITS, Command, Label, Observation, PortDriver, check_command
+from realitygap.robots import EXITS, Command, Label, Observation, Port, PortDriver, check_command
 from realitygap.world import Pose
 
 from ._clock import BoardClock
@@ -156,7 +156,7 @@ class Thymio(PortDriver):
 
     def __init__(
         self,
-        port: str | Any,
+        port: str | Port,
         *,
         step_s: float = 0.1,
         full_speed: int = 300,

@@ -9,9 +9,31 @@ from collections.abc import Callable
 import pytest
 
 from realitygap.cli import main
+from realitygap.study import parse_study, run_study
 from tests.commands import Done
 
 from .fake_port import open_fake
+
+STUDY = """
+[study]
+name = "tiny"
+title = "Tiny"
+replicates = 3
+[neat]
+settings = "rosenzweig-remy"
+population = 4
+generations = 3
+add_node = 0.5
+[platform.jyro]
+steps = 20
+[[condition]]
+name = "coverage-50"
+noise = 0.5
+[[condition]]
+name = "novelty-50"
+selection = "novelty"
+noise = 0.5
+"""
 
 
 @pytest.fixture
@@ -30,3 +52,9 @@ def no_terminal(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[s
         return Done(code, *capsys.readouterr())
 
     return run
+
+
+@pytest.fixture(scope="session")
+def results(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """Folder of a finished study of two conditions, three runs, and three generations, which no test changes."""
+    return str(run_study(parse_study(STUDY, "tiny.toml"), tmp_path_factory.mktemp("tiny")).folder.path)

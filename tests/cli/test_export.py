@@ -15,36 +15,8 @@ from realitygap.errors import RealityGapError
 from realitygap.evolution import Genome
 from realitygap.records import ResultsFolder
 from realitygap.runs import Condition, genome_of
-from realitygap.study import parse_study, run_study
 
 from .invoked import printed
-
-STUDY = """
-[study]
-name = "tiny"
-title = "Tiny"
-replicates = 3
-[neat]
-settings = "rosenzweig-remy"
-population = 4
-generations = 3
-add_node = 0.5
-[platform.jyro]
-steps = 20
-[[condition]]
-name = "coverage-50"
-noise = 0.5
-[[condition]]
-name = "novelty-50"
-selection = "novelty"
-noise = 0.5
-"""
-
-
-@pytest.fixture(scope="module")
-def results(tmp_path_factory):
-    return str(run_study(parse_study(STUDY, "tiny.toml"), tmp_path_factory.mktemp("tiny")).folder.path)
-
 
 export = partial(printed, "export")
 

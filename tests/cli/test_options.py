@@ -162,7 +162,7 @@ def test_options_that_messages_name_are_options_of_the_command_that_prints_them(
                 owner = [words for pair in named[::-1] for words in (pair, pair[:1]) if words in known]
                 owners = owner[:1] or printed_by.get(module, ())
                 lacking = [words for words in owners if found[0] not in known[words]]
-                is_of_one = module.startswith("cli/") and len(lacking) < len(
+                is_of_one = module.startswith(("cli/", "orders/")) and len(lacking) < len(
                     owners
                 )  # of a module with several
                 seen += 1

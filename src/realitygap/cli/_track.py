@@ -271,7 +271,9 @@ def _wanted(
             )
         return None
     if study is None and into is None:
-        raise StudyError("No file for the trial with its poses. Name one with --into, such as tracked.sqlite.")
+        raise StudyError(
+            "No file for the trial with its poses. Name one with --into, such as tracked.sqlite."
+        )
     return realitygap.study.trial_of_ledger(source, trial)
 
 

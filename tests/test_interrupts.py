@@ -199,7 +199,7 @@ def test_command_ends_with_130_after_an_interrupt_that_python_drops() -> None:
 def test_process_of_the_lab_ends_with_130_after_an_interrupt_that_python_drops() -> None:
     done = run(DROPS["callback from C"] + IN_A_PROCESS_OF_THE_LAB)
     assert done.returncode == 130, done.stderr
-    assert '"interrupted"' in done.stdout
+    assert '"Interrupted"' in done.stdout
 
 
 @pytest.mark.parametrize("place", [IN_A_COMMAND, IN_A_PROCESS_OF_THE_LAB])

@@ -72,6 +72,27 @@ def test_all_mistakes_are_shown_at_once_and_each_at_its_field(lab, visit):
         page.close()
 
 
+def test_no_message_moves_a_button_while_it_is_pressed(visit):
+    page = visit("gap")
+    page.get_by_label("Simulator", exact=True).fill("jyrro")
+    button = page.get_by_role("button", name="Measure the gap", exact=True)
+    button.scroll_into_view_if_needed()
+    box = button.bounding_box()
+    page.evaluate(
+        """() => {
+          window.sent = [];
+          const emit = socket.emit;
+          socket.emit = (...message) => (sent.push(message), emit.apply(socket, message));
+        }"""
+    )
+    page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    page.mouse.down()
+    assert page.evaluate("() => document.activeElement.tagName") != "INPUT", "the field has lost the focus"
+    assert page.evaluate("() => sent.filter(([kind]) => kind === 'event').length") == 0, "the check waits"
+    page.mouse.up()
+    expect(page.locator(".lab-summary:visible a")).to_have_count(1)
+
+
 def test_a_video_and_its_tags_are_refused_together(lab, visit):
     drive_paths(lab.root, steps=12)
     page = visit("study/by-robot/trials")

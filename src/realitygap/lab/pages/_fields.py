@@ -325,7 +325,11 @@ class Form:
         problem = ui.label("").classes("lab-problem")
         field = self._fields[key] = _Field(label, element, problem, note, check)
         self._mark(field, "")
-        element.on("blur", lambda: self._mark(field, self.problem_of(key) or self._refused_again(key)))
+        element.on(
+            "blur",
+            lambda: self._mark(field, self.problem_of(key) or self._refused_again(key)),
+            js_handler="() => whenReleased(() => emit())",
+        )
 
     def _mark(self, field: _Field, text: str) -> None:
         field.problem.text = text

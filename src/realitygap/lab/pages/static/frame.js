@@ -30,6 +30,15 @@
     probe();
   };
 
+  // A value is checked when its field is left, such as by pressing a button. A message would move that button away from the
+  // pointer before it is released, and the click would be lost. So the check waits for the release.
+  let isHeld = false;
+  addEventListener("pointerdown", () => { isHeld = true; }, true);
+  for (const end of ["pointerup", "pointercancel"]) {
+    addEventListener(end, () => { isHeld = false; setTimeout(() => dispatchEvent(new Event("lab-released"))); }, true);
+  }
+  window.whenReleased = (act) => (isHeld ? addEventListener("lab-released", act, { once: true }) : act());
+
   // A number and its unit stay on one line. Text that is copied, such as that of a file, keeps its spaces.
   const UNIT = /(\d) (?=(?:%|m?s|min|h|[cmk]?m|in|m?V|Hz|°|[kM]B|px)(?![\p{L}\p{N}_]))/gu;
   const join = (node) => {

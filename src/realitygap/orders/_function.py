@@ -46,9 +46,9 @@ def takes_order(
 
         parameters = [_parameter(field) for field in fields.values()]
         parameters += [parameter for parameter in others if parameter.name not in fields]
-        del call.__wrapped__  # whose source has other defaults than the signature
-        call.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
-        call.__doc__ = _docstring(model, inspect.cleandoc(function.__doc__ or ""))
+        _describe(
+            call, inspect.Signature(parameters), _docstring(model, inspect.cleandoc(function.__doc__ or ""))
+        )
         return call
 
     return decorate
@@ -75,13 +75,19 @@ def with_fields(
             return function(*args, **values)
 
         parameters = [*own, *(field.parameter for field in fields)]
-        del call.__wrapped__  # whose source has other defaults than the signature
-        call.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
         before, heading, after = inspect.cleandoc(function.__doc__ or "").partition("\n\nRaises:")
-        call.__doc__ = "\n".join([before, *map(_argument, fields)]) + heading + after
+        documentation = "\n".join([before, *map(_argument, fields)]) + heading + after
+        _describe(call, signature.replace(parameters=parameters), documentation)
         return call
 
     return decorate
+
+
+def _describe(function: Callable[..., Any], signature: inspect.Signature, documentation: str) -> None:
+    """Set what help, editors, and Typer show of a function made from an order."""
+    vars(function).pop("__wrapped__", None)  # its source has other defaults than the signature
+    function.__signature__ = signature  # type: ignore[attr-defined]
+    function.__doc__ = documentation
 
 
 def _argument(field: OrderField) -> str:

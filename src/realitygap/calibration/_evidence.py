@@ -202,10 +202,10 @@ def _as_rehearsal(trials: Sequence[TrialRecord], n_cells: int) -> Rehearsal:
         return np.array([[getattr(trial, name) for trial in trials]], dtype)
 
     return Rehearsal(
-        stacked("poses", np.float64),  # type: ignore[arg-type]  # observed in double precision
+        stacked("poses", np.float64),
         stacked("readings", np.float32),
         stacked("stalled", np.bool_),
-        stacked("wheels", np.float64) if all(len(t.wheels) for t in trials) else np.empty((1, len(trials), 0, 2)),  # type: ignore[arg-type]
+        stacked("wheels", np.float64) if all(len(t.wheels) for t in trials) else np.empty((1, len(trials), 0, 2)),
         stacked("commands", np.float32),
         cells,
     )  # fmt: skip

@@ -41,9 +41,10 @@ Finely = tuple[int, int]
 
 @dataclass(frozen=True)
 class Rehearsal:
-    """Robots (m) in k trials of t commands, in single precision; row 0 is the start.
+    """Robots (m) in k trials of t commands; row 0 is the start.
 
-    Values that are not stored have no steps.
+    Values that are not stored have no steps. Simulated values are in single precision, observed poses
+    and wheels in double.
 
     Attributes:
         poses: (m, k, t + 1, 3) x [m], y [m], heading [rad, -pi to pi]; before the robot was put back to an anchor.
@@ -55,10 +56,10 @@ class Rehearsal:
         cells: (m, k, c) bool, True for each cell of the arena's grid on the line.
     """
 
-    poses: NDArray[np.float32]
+    poses: NDArray[np.float32 | np.float64]
     readings: NDArray[np.float32]
     stalled: NDArray[np.bool_]
-    wheels: NDArray[np.float32]
+    wheels: NDArray[np.float32 | np.float64]
     commands: NDArray[np.float32]
     cells: NDArray[np.bool_]
 

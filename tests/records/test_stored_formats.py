@@ -76,6 +76,24 @@ def test_ledger_of_format_1_that_cannot_be_converted_stays_as_it_is(
     Ledger.open(ledger_1).close()
 
 
+@pytest.mark.parametrize("writable", [True, False])
+def test_ledger_of_format_1_may_be_converted_by_another_program_meanwhile(
+    ledger_1: Path, monkeypatch: pytest.MonkeyPatch, writable: bool
+) -> None:
+    before, check = rows_of(ledger_1), _ledger_file._check_once
+
+    def check_before_the_other(connection: sqlite3.Connection, path: Path) -> int:
+        version = check(connection, path)
+        monkeypatch.undo()
+        Ledger.open(path).close()
+        return version
+
+    monkeypatch.setattr(_ledger_file, "_check_once", check_before_the_other)
+    with Ledger.open(ledger_1, writable=writable) as ledger:
+        assert len(ledger.trials()) == 6
+    assert rows_of(ledger_1) == before
+
+
 def test_foreign_schema_in_a_ledger_of_format_1_is_refused_before_it_is_converted(ledger_1: Path) -> None:
     with contextlib.closing(sqlite3.connect(ledger_1)) as connection:
         connection.execute("CREATE TABLE more (x INTEGER)")

@@ -107,7 +107,7 @@ def connect(path: Path, *, writable: bool) -> sqlite3.Connection:
             connection.execute("PRAGMA trusted_schema = OFF")
             if _check_once(connection, path) == 1:
                 if writable:
-                    connection.executescript(FROM_1)
+                    _convert(connection)
                 else:
                     with contextlib.closing(connection) as old:
                         connection = _converted(old)
@@ -124,8 +124,18 @@ def _converted(old: sqlite3.Connection) -> sqlite3.Connection:
     """Return a copy, in memory, of a ledger of format 1 in the present format."""
     copy = sqlite3.connect(":memory:", isolation_level=None)
     old.backup(copy)
-    copy.executescript(FROM_1)
+    _convert(copy)
     return copy
+
+
+def _convert(connection: sqlite3.Connection) -> None:
+    """Convert a ledger of format 1, unless another program has done so since it was checked."""
+    try:
+        connection.executescript(FROM_1)
+    except sqlite3.Error:
+        connection.rollback()
+        if connection.execute("PRAGMA user_version").fetchone() != (LEDGER_FORMAT,):
+            raise
 
 
 def ledger_stamp(path: Path) -> tuple[Any, ...]:

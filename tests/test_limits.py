@@ -39,6 +39,7 @@ ALLOWED = {
     "records/_chunk.py": {"pl.read_parquet"},  # after check_size
     "records/_ledger_check.py": {"sqlite3.connect"},
     "records/_ledger_file.py": {"sqlite3.connect"},
+    "records/_trial_store.py": {"sqlite3.connect"},  # of a ledger in memory
     "records/_observations_file.py": {"json.loads"},  # of what was just written
     "study/_closing/plan.py": {"json.loads"},  # of what was just written
     "study/_transfer/strategies.py": {"json.loads"},  # of what was just written

@@ -47,8 +47,12 @@ def test_saved_trials_are_listed_corrected_voided_and_annotated(lab, visit):
     page.get_by_role("button", name="Void trial").click()
     page.get_by_text("void: it was pushed").wait_for()
     expect(page.get_by_role("button", name="Void trial")).to_be_disabled()
+    with open_ledger(file) as ledger:  # a command that drives
+        ledger.append(replace(trial(3), purpose="controller", cells=(13, 14)))
+    page.get_by_text("4 trials", exact=True).wait_for()
+    expect(row.get_by_role("checkbox")).to_be_checked()
     with open_ledger(file, writable=False) as log:
-        assert [each.state for each in log.trials()] == ["scored", "void", "scored"]
+        assert [each.state for each in log.trials()] == ["scored", "void", "scored", "scored"]
     assert {note["who"] for note in read_observations(file).notes} == {"anna"}
 
 

@@ -134,10 +134,10 @@ def test_digest_does_not_depend_on_processes_or_interruptions(
     processes: int,
 ) -> None:
     from realitygap.platforms.twin import _pool as _twin_pool
-    from realitygap.platforms.twin import _trials as _twin_trials
+    from realitygap.platforms.twin import _pooled
 
-    _twin_trials._last.clear()
-    _twin_trials._pools.clear()
+    _pooled._last.clear()
+    _pooled._pools.clear()
     monkeypatch.setattr(_twin_pool, "usable_processors", lambda: processes)
     study = study_on(file)
     first = study.model_copy(update={"about": study.about.model_copy(update={"replicates": 1})})
@@ -162,10 +162,10 @@ def test_a_twin_that_has_changed_is_refused(file: Path, results: ResultsFolder, 
     changed.write_text(file.read_text() + "\n# touched\n")
     with pytest.raises(StudyError, match=r"same: twin.sha256 is '\w+' there, '\w+' here"):
         run_study(study_on(changed), tmp_path / "r")
-    from realitygap.platforms.twin import _trials as _twin_trials
+    from realitygap.platforms.twin import _pooled
 
-    _twin_trials._last.clear()
-    _twin_trials._pools.clear()
+    _pooled._last.clear()
+    _pooled._pools.clear()
     with pytest.raises(StudyError, match="has changed: its SHA-256 begins with"):
         replay(condition, folder.scan().collect().row(0, named=True))
 

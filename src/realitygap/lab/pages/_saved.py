@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 from urllib.parse import quote
 
 from nicegui import run, ui
@@ -64,8 +63,16 @@ class _Page:
         name = Form().text("who", "Your name", self._who, explanation="Your name is saved with each entry.")
         name.props(f"debounce=400 maxlength={LONGEST_NAME}")
         name.on_value_change(lambda event: self._named(text_of(event)))
-        self._table, self._card = ui.refreshable(self._show_table), ui.refreshable(self._show_card)
-        self._table()
+        self._count = ui.label()
+        columns = [
+            {"name": key, "label": label, "field": key, "align": "left"} for key, label in _COLUMNS.items()
+        ]
+        # It stays when its rows change, and so does what is selected in it.
+        self._table = ui.table(rows=[], columns=columns, row_key="number", pagination=20, selection="single")
+        self._table.classes("lab-table").props("flat bordered dense wrap-cells")
+        self._table.on_select(lambda event: self._choose([row["number"] for row in event.selection]))
+        self._fill()
+        self._card = ui.refreshable(self._show_card)
         self._card()
         ui.timer(1.0, self._look)  # a command may save trials
 
@@ -85,11 +92,11 @@ class _Page:
             return
         if saved is not None:
             self._saved = saved
-            self._table.refresh()
+            self._fill()
 
-    def _show_table(self) -> None:
-        ui.label(counted(len(self._saved.trials), "trial"))
-        rows: list[dict[str, Any]] = [
+    def _fill(self) -> None:
+        self._count.text = counted(len(self._saved.trials), "trial")
+        self._table.rows = [
             {
                 "number": trial.trial,
                 "name": trial.name,
@@ -99,12 +106,6 @@ class _Page:
             }
             for trial in self._saved.trials
         ]
-        columns = [
-            {"name": key, "label": label, "field": key, "align": "left"} for key, label in _COLUMNS.items()
-        ]
-        table = ui.table(rows=rows, columns=columns, row_key="number", pagination=20, selection="single")
-        table.classes("lab-table").props("flat bordered dense wrap-cells")
-        table.on_select(lambda event: self._choose([row["number"] for row in event.selection]))
 
     def _choose(self, numbers: list[int]) -> None:
         self._chosen = numbers[0] if numbers else None

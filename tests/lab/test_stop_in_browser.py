@@ -112,9 +112,12 @@ class Motors:
         raise AssertionError("the motors do not turn")
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def emulated() -> Iterator[tuple[str, str]]:
-    """The port and the witness of an emulated robot in a process of its own."""
+    """The port and the witness of an emulated robot in a process of its own.
+
+    Each test has its own: a lab that has just ended may hold its port for a moment longer.
+    """
     command = ["-m", "realitygap", "emulate", "scribbler", "--tcp", "0", "--witness", "0", "--quiet"]
     with subprocess.Popen([sys.executable, *command], stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None

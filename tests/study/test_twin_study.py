@@ -176,6 +176,12 @@ def test_a_platform_without_a_file_is_no_twin() -> None:
         TwinPlatform(sha256="short")
 
 
+def processor_s(pid: int) -> float:
+    """Processor time of a process so far [s]."""
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
 @pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="looks for child processes in /proc")
 def test_ctrl_c_ends_a_study_on_a_twin_in_the_middle_of_a_run(file: Path, tmp_path: Path) -> None:
     text = f"""
@@ -205,7 +211,8 @@ def test_ctrl_c_ends_a_study_on_a_twin_in_the_middle_of_a_run(file: Path, tmp_pa
                     for pid in pids
                     if "platforms.twin._worker" in Path(f"/proc/{pid}/cmdline").read_text()
                 ]
-        time.sleep(5)  # the twin is up, and at work
+        while max(map(processor_s, children)) < 3.0 and time.monotonic() < until:
+            time.sleep(0.05)  # its imports take half as long, so then the twin is at work
         process.send_signal(signal.SIGINT)
         began = time.monotonic()
         _, said = process.communicate(timeout=60)

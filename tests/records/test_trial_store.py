@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 import shutil
 import sqlite3
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,6 +21,8 @@ from realitygap.records import (
     TrialRecord,
     _ledger_file,
     _ledger_reader,
+    is_observations,
+    ledger_stamp,
     open_ledger,
     open_saved_trials,
     read_observations,
@@ -330,3 +334,27 @@ def test_damaged_record_is_one_clear_error(path: Path) -> None:
     os.utime(path)
     with pytest.raises(RecordError, match="trial 1 is a trial without 'battery_v'"):
         read_observations(path)
+
+
+_LOCKED = """
+import fcntl, sys
+with open(sys.argv[1], "r+b") as file:
+    try:
+        fcntl.lockf(file, fcntl.LOCK_EX | fcntl.LOCK_NB, 1, 128)
+    except OSError:
+        print("locked")
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="locks of POSIX")
+def test_a_look_at_a_ledger_keeps_the_locks_of_its_connections(tmp_path):
+    """SQLite locks byte 128 of the index of writes while a program uses a ledger. Others truncate an unlocked index."""
+    path = tmp_path / "ledger.sqlite"
+    with Ledger.create(path) as ledger:
+        ledger.trials()
+        ledger_stamp(path)
+        assert is_observations(path)
+        done = subprocess.run(
+            [sys.executable, "-c", _LOCKED, f"{path}-shm"], capture_output=True, text=True, check=True
+        )
+    assert done.stdout == "locked\n"

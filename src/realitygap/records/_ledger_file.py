@@ -6,6 +6,7 @@ import contextlib
 import os
 import secrets
 import sqlite3
+import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -38,6 +39,10 @@ _INDEX_HEAD = 48
 
 _checked: dict[Path, tuple[tuple[Any, ...], LedgerError | int]] = {}
 """Result of the last check of each ledger, an error or its format, with the state of its files."""
+
+_peeked: dict[tuple[int, int], int] = {}
+"""Descriptors of files that `peek` has opened, by device and inode."""
+_peeking = threading.Lock()
 
 SYNCHRONOUS = "FULL"
 """Time at which SQLite waits for the disk: at every commit."""
@@ -150,9 +155,26 @@ def ledger_stamp(path: Path) -> tuple[Any, ...]:
         with contextlib.suppress(OSError):
             status = path.with_name(path.name + ending).stat()
             found.append((ending, status.st_dev, status.st_ino, status.st_mtime_ns, status.st_size))
-    with contextlib.suppress(OSError), path.with_name(path.name + "-shm").open("rb") as index:
-        found.append(index.read(_INDEX_HEAD))
+    with contextlib.suppress(OSError):
+        found.append(peek(path.with_name(path.name + "-shm"), _INDEX_HEAD))
     return tuple(found)
+
+
+def peek(path: Path, n: int) -> bytes:
+    """Return the first bytes of a file that may be SQLite's, and keep it open.
+
+    If a program closes a file, POSIX releases all locks that the program has on it, also those of SQLite's connections.
+    Then another program takes the ledger for unused, and truncates the index that this one has in its memory
+    (sqlite.org/howtocorrupt.html, section 2.2). So each file is opened once and never closed.
+    """
+    status = path.stat()
+    with _peeking:
+        key = (status.st_dev, status.st_ino)
+        if key not in _peeked:
+            _peeked[key] = os.open(path, os.O_RDONLY | getattr(os, "O_BINARY", 0))
+        descriptor = _peeked[key]
+        os.lseek(descriptor, 0, os.SEEK_SET)
+        return os.read(descriptor, n)
 
 
 def _check_once(connection: sqlite3.Connection, path: Path) -> int:

@@ -12,7 +12,7 @@ from realitygap.errors import RecordError
 from ._files import reading
 from ._inside import refuse_links
 from ._ledger import Ledger
-from ._ledger_file import create_file, make_empty
+from ._ledger_file import create_file, make_empty, peek
 from ._ledger_schema import APPLICATION
 from ._listing import LEDGER_NAME
 from ._lock import FolderLock
@@ -169,8 +169,8 @@ def is_observations(path: Path | str) -> bool:
 def _beginning(path: Path) -> bytes:
     if not path.is_file():
         return b""
-    with reading(path), path.open("rb") as file:
-        return file.read(200)
+    with reading(path):
+        return peek(path, 200)
 
 
 def read_observations(path: Path | str) -> Observations:

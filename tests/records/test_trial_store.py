@@ -340,21 +340,34 @@ _LOCKED = """
 import fcntl, sys
 with open(sys.argv[1], "r+b") as file:
     try:
-        fcntl.lockf(file, fcntl.LOCK_EX | fcntl.LOCK_NB, 1, 128)
+        fcntl.lockf(file, fcntl.LOCK_EX | fcntl.LOCK_NB, 1, int(sys.argv[2]))
     except OSError:
         print("locked")
 """
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="locks of POSIX")
-def test_a_look_at_a_ledger_keeps_the_locks_of_its_connections(tmp_path):
-    """SQLite locks byte 128 of the index of writes while a program uses a ledger. Others truncate an unlocked index."""
+@pytest.mark.parametrize(("ending", "byte"), [("", 0x40000002), ("-shm", 128)])
+def test_a_look_at_a_ledger_keeps_the_locks_of_its_connections(tmp_path, ending, byte):
+    """SQLite locks a byte of the ledger and one of its index of writes. Others truncate an unlocked index."""
     path = tmp_path / "ledger.sqlite"
     with Ledger.create(path) as ledger:
         ledger.trials()
         ledger_stamp(path)
         assert is_observations(path)
-        done = subprocess.run(
-            [sys.executable, "-c", _LOCKED, f"{path}-shm"], capture_output=True, text=True, check=True
-        )
+        words = [sys.executable, "-c", _LOCKED, f"{path}{ending}", str(byte)]
+        done = subprocess.run(words, capture_output=True, text=True, check=True)
     assert done.stdout == "locked\n"
+
+
+@pytest.mark.skipif(not Path("/proc/self/fd").exists(), reason="counts open files in /proc")
+def test_looks_at_a_ledger_do_not_use_up_descriptors(tmp_path):
+    path = tmp_path / "ledger.sqlite"
+    Ledger.create(path).close()
+    counts = []
+    for _ in range(5):  # SQLite removes the index with the last connection, and makes another
+        with Ledger.open(path) as ledger:
+            ledger.note("again", "anna")
+            assert len(ledger_stamp(path)) == 3
+            counts.append(len(list(Path("/proc/self/fd").iterdir())))
+    assert len(set(counts)) == 1

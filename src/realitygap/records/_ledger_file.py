@@ -6,6 +6,7 @@ import contextlib
 import os
 import secrets
 import sqlite3
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -40,9 +41,9 @@ _INDEX_HEAD = 48
 _checked: dict[Path, tuple[tuple[Any, ...], LedgerError | int]] = {}
 """Result of the last check of each ledger, an error or its format, with the state of its files."""
 
-_peeked: dict[tuple[int, int], int] = {}
-"""Descriptors of files that `peek` has opened, by device and inode."""
-_peeking = threading.Lock()
+_indexes: dict[tuple[int, int], int] = {}
+"""Open descriptors of indexes of recent writes, by device and inode."""
+_indexes_lock = threading.Lock()
 
 SYNCHRONOUS = "FULL"
 """Time at which SQLite waits for the disk: at every commit."""
@@ -156,25 +157,43 @@ def ledger_stamp(path: Path) -> tuple[Any, ...]:
             status = path.with_name(path.name + ending).stat()
             found.append((ending, status.st_dev, status.st_ino, status.st_mtime_ns, status.st_size))
     with contextlib.suppress(OSError):
-        found.append(peek(path.with_name(path.name + "-shm"), _INDEX_HEAD))
+        found.append(_peek(path.with_name(path.name + "-shm"), _INDEX_HEAD))
     return tuple(found)
 
 
-def peek(path: Path, n: int) -> bytes:
-    """Return the first bytes of a file that may be SQLite's, and keep it open.
+def _peek(path: Path, n: int) -> bytes:
+    """Return the first bytes of an index of recent writes.
 
     If a program closes a file, POSIX releases all locks that the program has on it, also those of SQLite's connections.
-    Then another program takes the ledger for unused, and truncates the index that this one has in its memory
-    (sqlite.org/howtocorrupt.html, section 2.2). So each file is opened once and never closed.
+    Then another program takes the index for unused, and truncates it while this one has it in its memory
+    (sqlite.org/howtocorrupt.html, section 2.2). So an index stays open until SQLite has removed it.
     """
-    status = path.stat()
-    with _peeking:
+    if sys.platform == "win32":  # which removes no file that is open, and keeps the locks
+        with path.open("rb") as index:
+            return index.read(n)
+    with _indexes_lock:
+        status = path.stat()
         key = (status.st_dev, status.st_ino)
-        if key not in _peeked:
-            _peeked[key] = os.open(path, os.O_RDONLY | getattr(os, "O_BINARY", 0))
-        descriptor = _peeked[key]
-        os.lseek(descriptor, 0, os.SEEK_SET)
-        return os.read(descriptor, n)
+        if key not in _indexes:
+            for old, descriptor in list(_indexes.items()):
+                if os.fstat(descriptor).st_nlink == 0:
+                    os.close(_indexes.pop(old))
+            _indexes[key] = os.open(path, os.O_RDONLY)
+        return os.pread(_indexes[key], n, 0)
+
+
+def is_ledger(path: Path) -> bool:
+    """Return whether a file is a ledger, of this version or another.
+
+    SQLite reads it, and keeps the locks of other connections of this program when it closes the file.
+    """
+    try:
+        with contextlib.closing(
+            sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro&immutable=1", uri=True)
+        ) as connection:
+            return bool(connection.execute("PRAGMA application_id").fetchone() == (APPLICATION,))
+    except sqlite3.Error:
+        return False
 
 
 def _check_once(connection: sqlite3.Connection, path: Path) -> int:

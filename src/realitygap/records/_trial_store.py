@@ -12,8 +12,7 @@ from realitygap.errors import RecordError
 from ._files import reading
 from ._inside import refuse_links
 from ._ledger import Ledger
-from ._ledger_file import create_file, make_empty, peek
-from ._ledger_schema import APPLICATION
+from ._ledger_file import create_file, is_ledger, make_empty
 from ._listing import LEDGER_NAME
 from ._lock import FolderLock
 from ._observations_file import Observations, ObservationsHead, read_lines
@@ -153,24 +152,18 @@ def _sha256(path: Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def _is_lines(path: Path) -> bool:
-    return b"realitygap observations" in _beginning(path)
-
-
 def is_observations(path: Path | str) -> bool:
     """Return whether a file begins as one with observed trials does, of this version or another."""
-    beginning = _beginning(Path(path))
-    is_ledger = beginning.startswith(b"SQLite format 3") and beginning[68:72] == APPLICATION.to_bytes(
-        4, "big"
-    )
-    return is_ledger or b"realitygap observations" in beginning
+    path = Path(path)
+    return path.is_file() and (is_ledger(path) or _is_lines(path))
 
 
-def _beginning(path: Path) -> bytes:
-    if not path.is_file():
-        return b""
-    with reading(path):
-        return peek(path, 200)
+def _is_lines(path: Path) -> bool:
+    """Return whether a file that is no ledger begins as lines of JSON do."""
+    if not path.is_file() or is_ledger(path):
+        return False
+    with reading(path), path.open("rb") as file:
+        return b"realitygap observations" in file.read(200)
 
 
 def read_observations(path: Path | str) -> Observations:
@@ -184,7 +177,7 @@ def read_observations(path: Path | str) -> Observations:
     path = Path(path)
     if not path.exists():
         raise RecordError(f"There is no file {path}. Name one with observed trials.")
-    if is_observations(path) and not _is_lines(path):
+    if is_ledger(path):
         with Ledger.open(path, writable=False) as ledger:
             return ledger.observations()
     return read_lines(path)

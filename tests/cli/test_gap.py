@@ -115,6 +115,7 @@ def test_terminal_and_report_state_the_same_estimates_intervals_and_p(printed, c
         (("gap", "sim", "jyro", "--controllers", "nobody"), ("Unknown study 'nobody'",)),
         (("gap", "sim:nowhere.toml", "jyro"), ("nowhere.toml",)),
         (("gap", "sim", "jyro", "--arena", "nowhere"), ("nowhere",)),
+        (("gap", "sim", "jyro", "--arena", "light"), ("jyro: arena 'light'", "round obstacles")),
         (("plan",), ("expected one of --effect, --margin, and --correlation",)),
         (("plan", "--effect", "0.1", "--margin", "0.1"), ("--effect, --margin",)),
         (("plan", "--effect", "0"), ("effect is 0",)),

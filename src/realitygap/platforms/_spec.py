@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, Literal
 
-from realitygap.errors import StudyError, did_you_mean
+from realitygap.errors import RealityGapError, StudyError, did_you_mean
 from realitygap.trials import OnLost, PortObserver, Pulse, Target
 from realitygap.world import Arena
 
@@ -135,4 +135,9 @@ def open_target(
                 "sim:FILE with a file that `realitygap calibrate` wrote from trials."
             )
         platform, how = drawn, replace(how, name=f"{spec}, {randomize}")
-    return platform.open(arena.alone, how)
+    try:
+        return platform.open(arena.alone, how)
+    except RealityGapError:
+        raise
+    except ValueError as error:  # of an arena or settings that it cannot have
+        raise StudyError(f"{how.name}: {str(error).rstrip('.')}.") from error

@@ -269,6 +269,11 @@ def speaking(path: Path, connection: sqlite3.Connection | None = None) -> Iterat
             ) from None
         raise LedgerError(_explain(path, error)) from error
     except (sqlite3.DatabaseError, UnicodeDecodeError) as error:
+        if isinstance(error, sqlite3.Error) and _name_of(error) == "SQLITE_NOTADB":
+            raise LedgerError(
+                f"{path} has no trials of realitygap, or its beginning is damaged. It was not changed. Restore it "
+                "from a copy, or name another file."
+            ) from error
         raise LedgerError(damaged(path, str(error))) from error
     except OverflowError as error:
         raise LedgerError(

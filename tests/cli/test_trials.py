@@ -101,7 +101,7 @@ def test_trial_of_any_store_is_shown_with_its_record_and_notes(kind, request):
     assert shown["trial"] == 1
     assert len(shown["record"]["commands"]) > 0
     assert shown["notes"][0]["who"] == "anna"
-    assert "a trial is missing" in run("trials", "show", source)
+    assert "The number of a trial is missing" in run("trials", "show", source)
 
 
 @pytest.mark.parametrize("kind", ["tried", "driven"])

@@ -13,6 +13,8 @@ from realitygap._terminal import echo
 from realitygap._wording import counted
 from realitygap.errors import RealityGapError, StudyError
 
+from ._options import export_option
+
 if TYPE_CHECKING:
     from realitygap.records import DerivedFrame
 
@@ -116,15 +118,7 @@ def export_trials(
         Path,
         typer.Argument(metavar="TRIALS", help="File of trials, or folder of results with a ledger."),
     ],
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            "-o",
-            "--out",
-            metavar="NAME",
-            help="File that ends in .jsonl, .parquet, or .mcap, or folder of a new bag.",
-        ),
-    ] = None,
+    out: Annotated[Path | None, export_option()] = None,
     trial: Annotated[
         list[int] | None,
         typer.Option(
@@ -163,9 +157,11 @@ def write_trials(
     source: Path, out: Path | None, trials: Sequence[int] = (), wheel_diameter_mm: float | None = None
 ) -> None:
     """Write trials in the format that the name of the output has, and print what was written."""
-    if out is None:
+    if out is None or out.suffix not in ("", ".jsonl", ".parquet", ".mcap"):
+        wrong = "" if out is None else f"{out} ends in {out.suffix}. "
         raise StudyError(
-            "Name the output with -o: a file that ends in .jsonl, .parquet, or .mcap, or a new folder for a bag."
+            f"{wrong}Name the output with -o: a file that ends in .jsonl, .parquet, or .mcap, or a new folder for a "
+            "bag."
         )
     if out.suffix in (".jsonl", ".parquet"):
         if wheel_diameter_mm is not None:

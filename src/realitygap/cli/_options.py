@@ -65,3 +65,15 @@ def _plain(value: object) -> object:
     if isinstance(value, Mapping):
         return {key: _plain(part) for key, part in value.items()}
     return [_plain(part) for part in value] if isinstance(value, list | tuple) else value
+
+
+def export_option(panel: str | None = None) -> OptionInfo:
+    """Return the option of the file to which trials are exported."""
+    option: OptionInfo = typer.Option(
+        "-o",
+        "--out",
+        metavar="NAME",
+        help="File that ends in .jsonl, .parquet, or .mcap, or folder of a new bag.",
+        rich_help_panel=panel,
+    )
+    return option

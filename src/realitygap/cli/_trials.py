@@ -18,7 +18,14 @@ from realitygap.errors import LedgerError, StudyError, did_you_mean
 
 from ._export import write_trials
 from ._grid_editor import pick_cells
-from ._options import print_json
+from ._options import (
+    Json,
+    correct_option,
+    export_option,
+    print_json,
+    second_option,
+    who_option,
+)
 from ._tables import wide_console
 
 if TYPE_CHECKING:
@@ -63,26 +70,9 @@ def trials(
             rich_help_panel=_ONLY_SCORE,
         ),
     ] = None,
-    who: Annotated[
-        str | None,
-        typer.Option(metavar="NAME", help="Name to record with each entry. [default: your account's name]"),
-    ] = None,
-    second: Annotated[
-        bool,
-        typer.Option(
-            "--second",
-            help="Enter the cells as a second count, only for the agreement.",
-            rich_help_panel=_ONLY_SCORE,
-        ),
-    ] = False,
-    correct: Annotated[
-        bool,
-        typer.Option(
-            "--correct",
-            help="Enter the cells as a correction, after the generation was closed. Only reports use it.",
-            rich_help_panel=_ONLY_SCORE,
-        ),
-    ] = False,
+    who: Annotated[str | None, who_option()] = None,
+    second: Annotated[bool, second_option(_ONLY_SCORE)] = False,
+    correct: Annotated[bool, correct_option(_ONLY_SCORE)] = False,
     text: Annotated[
         str | None,
         typer.Option(
@@ -91,17 +81,8 @@ def trials(
             rich_help_panel="Only for note and void",
         ),
     ] = None,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            "-o",
-            "--out",
-            metavar="NAME",
-            help="File that ends in .jsonl, .parquet, or .mcap, or folder of a new bag.",
-            rich_help_panel="Only for export",
-        ),
-    ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    out: Annotated[Path | None, export_option("Only for export")] = None,
+    as_json: Json = False,
 ) -> None:
     """List, show, score, annotate, and export trials.
 
@@ -153,7 +134,7 @@ def trials(
         if what == "list":
             _list(opened, as_json=as_json)
         elif what == "show":
-            _show(opened, _number(opened, _needed(trial, "a trial")), as_json=as_json)
+            _show(opened, _number(opened, _needed(trial, "The number of a trial")), as_json=as_json)
         elif what == "export":
             write_trials(source, out, () if trial is None else [_number(opened, trial)])
         elif what == "agreement":
@@ -165,11 +146,11 @@ def trials(
             opened.note(_needed(text, "--text"), name, None if trial is None else _number(opened, trial))
             echo("Noted.")
         elif what == "undo":
-            number = _number(opened, _needed(trial, "a trial"))
+            number = _number(opened, _needed(trial, "The number of a trial"))
             opened.undo(number)
             echo(f"The score of trial {number} is withdrawn. Enter a new one.")
         else:
-            number = _number(opened, _needed(trial, "a trial"))
+            number = _number(opened, _needed(trial, "The number of a trial"))
             opened.void(number, _needed(text, "--text"))
             echo(f"Trial {number} is void; it will be driven again.")
 
@@ -207,7 +188,7 @@ def _score(
     if file is not None:
         entries: Iterable[dict[int, list[int]]] = [_read_file(opened, file)]
     elif cells is not None:
-        entries = [{_number(opened, _needed(trial, "a trial")): _cells(cells, "--cells")}]
+        entries = [{_number(opened, _needed(trial, "The number of a trial")): _cells(cells, "--cells")}]
     else:
         entries = _pick(opened, trial, role)
     n_entered = 0
@@ -269,7 +250,7 @@ def _waiting(
     """Yield number, title, arena, and cells of before of the trial that is named, or of all that wait."""
     number = None
     if trial is not None or role == "correction":
-        number = _number(opened, _needed(trial, "a trial"))
+        number = _number(opened, _needed(trial, "The number of a trial"))
     if number is not None:
         waiting = [opened.trial(number)]
     else:

@@ -26,6 +26,7 @@ from realitygap.world import Arena, RobotModel
 
 from ._all_from_poses import WITH_SLIP, own_places, sensors_of
 from ._all_from_simulation import Effort, Posterior
+from ._one_thread import one_blas_thread
 from ._posterior import N_DRAWS, sample_posterior
 from ._prior import OFF_ENDS, PRIOR_PRECISION, Floats, Parameter, numbers_of, place_of, standard_of, values_at
 from ._shots import shots_of
@@ -89,6 +90,7 @@ class _Seen:
         return bool(self.finest[-1] == np.float32(FINEST["wheels"]))
 
 
+@one_blas_thread()
 def fit_from_commands(
     trials: Sequence[TrialRecord],
     ensemble: SimEnsemble,

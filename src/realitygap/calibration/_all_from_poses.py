@@ -16,6 +16,7 @@ from realitygap.records import TrialRecord
 from realitygap.world import Arena, RobotModel
 
 from ._all_from_simulation import Posterior
+from ._one_thread import one_blas_thread
 from ._posterior import N_DRAWS, sample_posterior
 from ._prior import OFF_ENDS, Floats, Parameter, place_of, standard_of, values_at
 from ._shots import Shooter, Shots, shots_of
@@ -36,6 +37,7 @@ LEAST_COMMANDS = 20
 SURELY = 0.03  # least probability of a stall, and of none
 
 
+@one_blas_thread()
 def fit_from_poses(
     trials: Sequence[TrialRecord],
     ensemble: SimEnsemble,

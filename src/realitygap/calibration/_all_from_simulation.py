@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from realitygap.world import RobotModel
 
 from ._evidence import Evidence, Vectors
+from ._one_thread import one_blas_thread
 from ._posterior import N_DRAWS
 from ._prior import Floats, Parameter, numbers_of, values_of
 from ._score import learn_compression
@@ -58,6 +59,7 @@ class Posterior:
     n_simulated: int
 
 
+@one_blas_thread()
 def fit_all(
     evidence: Sequence[Evidence],
     simulate: SimulateVectors,

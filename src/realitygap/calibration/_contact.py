@@ -16,6 +16,7 @@ from realitygap.world import Arena, RobotModel
 from ._fit import Fit
 from ._identify import identify_from
 from ._motion import N_DRAWS, fitted_parameter, nothing_known, observed_as
+from ._one_thread import one_blas_thread
 from ._posterior import sample_clusters
 from ._prior import CONTACT, MAD, Parameter, parameters_of, values_at
 from ._shooting import Problem, make_problem
@@ -38,6 +39,7 @@ FLIPS = 5.0  # robust standard deviations: beyond it a window took the other way
 CAP = 3.0  # robust standard deviations from which a difference counts no more, in the search for a beginning
 
 
+@one_blas_thread()
 def fit_contact(
     trials: Sequence[TrialRecord],
     simulate: Simulate,

@@ -12,6 +12,7 @@ from realitygap.world import Arena, Fitted, RobotModel
 
 from ._log_model import MotionLog
 from ._motion_log import LEAST_ROWS, fit_motion_logs, motion_log
+from ._one_thread import one_blas_thread
 from ._windows import is_near, outline_of
 
 LEFT, HEADING = "camera.left", "camera.heading"
@@ -53,6 +54,7 @@ class Marker:
         )
 
 
+@one_blas_thread()
 def fit_marker(
     trials: Sequence[TrialRecord], robot: RobotModel, arena: Arena, *, seed: int = 0
 ) -> Marker | None:

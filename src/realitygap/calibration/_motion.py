@@ -12,6 +12,7 @@ from realitygap.world import Arena, Fitted, RobotModel
 
 from ._fit import Fit
 from ._identify import Identified, advice_for, identify_from
+from ._one_thread import one_blas_thread
 from ._prior import (
     ENDS,
     MOTION,
@@ -55,6 +56,7 @@ def observed_as(trials: Sequence[TrialRecord], observe: Observe | None) -> list[
     return [trial if observe is None else trial.seen_as(observe) for trial in trials]
 
 
+@one_blas_thread()
 def fit_motion(
     trials: Sequence[TrialRecord],
     simulate: Simulate,

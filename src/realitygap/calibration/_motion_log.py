@@ -18,6 +18,7 @@ from ._log_fit import LogPosterior, LogProblem, rows_of, sample_log_posterior
 from ._log_model import MotionLog, Numbers, body_steps, read_late, seen_rows, wheel_ways
 from ._log_parameters import LogNumbers
 from ._log_prediction import PathErrors, Steps, last_seen, path_errors, positions, summary_of
+from ._one_thread import one_blas_thread
 from ._prior import ENDS, Deviation, is_identified
 from ._simulate import Floats
 
@@ -69,6 +70,7 @@ class MotionLogFit(HeldOutFit):
     by_log: tuple[LogPrediction | None, ...] = ()
 
 
+@one_blas_thread()
 def fit_motion_log(
     time_s: ArrayLike,
     commands: ArrayLike | None,
@@ -113,6 +115,7 @@ def fit_motion_log(
     )
 
 
+@one_blas_thread()
 def fit_motion_logs(
     logs: Sequence[MotionLog],
     robot: RobotModel,

@@ -20,6 +20,7 @@ from realitygap.trials import TrialPlan
 from realitygap.world import Arena, Fitted, Pose, RobotModel
 
 from ._fit import Fit
+from ._one_thread import one_blas_thread
 from ._posterior import N_DRAWS
 from ._prior import ENDS, is_identified
 from ._ruler import EXACT, Moved, moved_in
@@ -80,6 +81,7 @@ def path_plans(arena: Arena, n: int = 2 * REPEATS) -> list[TrialPlan]:
     ]
 
 
+@one_blas_thread()
 def fit_path(
     trials: Sequence[TrialRecord],
     simulate: Simulate,

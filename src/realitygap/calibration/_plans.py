@@ -11,6 +11,7 @@ from realitygap.evolution import Genome, NeatSettings, Population
 from realitygap.trials import TrialPlan
 from realitygap.world import Arena, Pose, RobotModel, distance_to_segment
 
+from ._one_thread import one_blas_thread
 from ._simulate import Floats
 
 STEPS = 100  # of a trial
@@ -281,6 +282,7 @@ def _changing_commands(
     return commands
 
 
+@one_blas_thread()
 def next_trials(
     places: Floats, informations: Sequence[Floats], n: int, goal: Floats | None = None
 ) -> list[int]:

@@ -13,6 +13,7 @@ from realitygap.errors import finite_numbers
 from realitygap.world import Fitted, RobotModel
 
 from ._fit import HeldOut, HeldOutFit
+from ._one_thread import one_blas_thread
 from ._prior import Deviation, is_identified
 from ._range_response import NAMES, file_numbers, numbers_in_file, numbers_to_fit, wall_reading
 from ._simulate import Bools, Floats, Ints
@@ -59,6 +60,7 @@ METHOD = (
 )
 
 
+@one_blas_thread()
 def fit_range_table(
     sensor: ArrayLike,
     distance_m: ArrayLike,
@@ -425,6 +427,7 @@ class RangeProblem:
         return rows
 
 
+@one_blas_thread()
 def choose_frame(
     sensor: ArrayLike,
     distance_m: ArrayLike,

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._evidence import Vectors
+from ._one_thread import one_blas_thread
 
 Floats = NDArray[np.float64]
 
@@ -84,6 +85,7 @@ def learn_compression(places: Floats, vectors: Vectors, finest: Vectors) -> Comp
     return made
 
 
+@one_blas_thread()
 def information_of(places: Floats, vectors: Vectors, finest: Vectors) -> Floats:
     """Return the Fisher information of a trial's expected observations about the parameters, (p, p).
 

@@ -11,6 +11,7 @@ import numpy as np
 from realitygap.calibration._posterior import level_ends, sample_posterior
 from realitygap.world import Fitted, RobotModel
 
+from .._one_thread import one_blas_thread
 from .._posterior import N_DRAWS
 from .._prior import ENDS, Parameter, is_identified
 from ._checks import Independence, independence, predictive_check
@@ -59,6 +60,7 @@ class SensorFit:
     curve: Mapping[str, Array]
 
 
+@one_blas_thread()
 def fit_sensor(
     robot: RobotModel,
     number: int,

@@ -15,7 +15,7 @@ import sys
 import time
 from pathlib import Path
 
-N_STOPPED = 2
+N_STOPPED = 2  # or half of the processes, if that is less
 STOP_S = 1 / 3
 
 
@@ -26,7 +26,7 @@ def main(command: list[str]) -> int:
     while process.poll() is None:
         running = [pid for pid in descendants(process.pid) if state_of(pid) not in "TZ"]
         stopped = [
-            pid for pid in rng.sample(running, min(N_STOPPED, len(running))) if send(pid, signal.SIGSTOP)
+            pid for pid in rng.sample(running, min(N_STOPPED, len(running) // 2)) if send(pid, signal.SIGSTOP)
         ]
         time.sleep(STOP_S)
         for pid in stopped:

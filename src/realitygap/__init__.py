@@ -2,10 +2,13 @@
 
 The names here are those that most people need; each is loaded when it is first used.
 
-    import realitygap
+    import realitygap as rg
 
-    result = realitygap.run_study("paper", replicates=20)
-    print(realitygap.summarize(result.folder))
+    results = rg.load_study("paper", replicates=20).run()
+    print(results.best())
+    results.plot().save("coverage.svg")
+    gap = rg.measure_gap("sim", "jyro", controllers=str(results.path))
+    print(gap.rms, gap.verdict)
 """
 
 from __future__ import annotations
@@ -37,6 +40,8 @@ if TYPE_CHECKING:
     from .report import summarize, watch, write_movie, write_report
     from .runs import Condition, replay
     from .study import Study, drive_study, load_study, run_study
+    from .study import gap_between as measure_gap
+    from .study import make_calibration as calibrate
     from .trials import simulate_case
     from .world import Case
 
@@ -50,8 +55,10 @@ _HOME = {
     "Population": "evolution",
     "ResultsFolder": "records",
     "Study": "study",
+    "calibrate": "study:make_calibration",
     "drive_study": "study",
     "load_study": "study",
+    "measure_gap": "study:gap_between",
     "replay": "runs",
     "run_study": "study",
     "simulate_case": "trials",
@@ -72,8 +79,10 @@ __all__ = [
     "ResultsFolder",
     "Study",
     "__version__",
+    "calibrate",
     "drive_study",
     "load_study",
+    "measure_gap",
     "replay",
     "run_study",
     "simulate_case",
@@ -116,7 +125,8 @@ def __getattr__(name: str) -> Any:
         return import_module(f".{name}", __name__)
     if name not in _HOME:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(f".{_HOME[name]}", __name__), name)
+    home, _, named_there = _HOME[name].partition(":")
+    return getattr(import_module(f".{home}", __name__), named_there or name)
 
 
 def __dir__() -> list[str]:

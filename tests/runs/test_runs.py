@@ -101,7 +101,7 @@ def test_a_row_of_other_settings_is_noticed():
         replay(Condition(name="a", jyro={"steps": 20, "turn_per_step": 0.9}), row)
     with pytest.raises(RecordError, match=r"belongs to condition 'a', and the condition is 'b'"):
         replay(Condition(name="b", noise=0.1), row)
-    with pytest.raises(RecordError, match="Or the row does not belong to this condition"):
+    with pytest.raises(RecordError, match="does not fit the settings of the condition"):
         replay(Condition(name="a", controller={"inputs": ["obstacle", "bias"]}), row)
 
 

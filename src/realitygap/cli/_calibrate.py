@@ -50,6 +50,8 @@ def calibrate(
 
 def _check(order: CalibrateOrder, camera: str | None, figure: Path | None) -> None:
     """Refuse wrong options of the command before a trial is lost."""
+    if order.out is None:
+        raise StudyError("No file for the calibration. Name one: -o FILE.toml")
     if order.data and camera is not None:
         raise StudyError("--camera is only for --robot. Leave it out with --from.")
     if figure is None:

@@ -6,6 +6,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import ClassVar, Literal
 
+from pydantic import model_validator
+
 from realitygap.robot_families import default_family, port_platforms
 
 from ._field import argument, option
@@ -54,12 +56,15 @@ class CalibrateOrder(Order):
 
     In Python: realitygap.study.calibrate_from_table("wall.sample", base="khepera")
 
-    In Python: realitygap.study.calibrate("sensors", target)
+    In Python: realitygap.calibrate("track", robot="twin:worn.toml").simulator()
     """
 
     command: ClassVar[str] = "calibrate"
 
-    what: str = argument("WHAT", help="Part of the robot: path, sensors, motion, contact or all.")
+    what: str = argument(
+        "WHAT",
+        help="Part of the robot: path, sensors, motion, contact or all. track, cells or encoders: all, from such data.",
+    )
     robot: str | None = option(
         None,
         help=f"Robot to measure: {port_platforms()}, twin:FILE, sim or sim:FILE.",
@@ -137,6 +142,14 @@ class CalibrateOrder(Order):
     seed: Seed = seed_option(0)
     arena: str = arena_option()
     witness: Witness = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _takes_what_is_seen(cls, values: dict[str, object]) -> dict[str, object]:
+        """Read an observation level in place of a part as all parts, observed at that level."""
+        what = values.get("what")
+        is_level = what in ("cells", "encoders", "track") and values.get("observe") in (None, what)
+        return values | {"what": "all", "observe": what} if is_level else values
 
     def conflicts(self) -> Iterator[tuple[str, str]]:
         """Yield the field and the message for each setting that others exclude."""

@@ -30,7 +30,7 @@ class GapOrder(Order):
 
     Example: realitygap gap sim:fit.toml twin:worn-1.toml --randomize posterior
 
-    In Python: realitygap.study.gap_between("sim", "jyro", n_controllers=10, trials=5)
+    In Python: realitygap.measure_gap("sim", "jyro", n_controllers=10, trials=5)
     """
 
     command: ClassVar[str] = "gap"

@@ -7,7 +7,6 @@ import inspect
 import os
 import re
 from collections.abc import Collection, Iterator, Mapping
-from pathlib import Path
 from typing import Any, ClassVar
 
 from pydantic import ConfigDict, model_validator
@@ -76,7 +75,8 @@ class Order(Settings):
     @classmethod
     def _takes_paths_as_text(cls, values: dict[str, object]) -> dict[str, object]:
         return {
-            name: os.fspath(value) if isinstance(value, Path) else value for name, value in values.items()
+            name: os.fspath(value) if isinstance(value, os.PathLike) else value
+            for name, value in values.items()
         }
 
     @classmethod

@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+import realitygap
 from realitygap.drawing import ShownAsCard, widget_of
 from realitygap.kernels.tasks.coverage import BORDER_SNAP, visit, visit_line
 from realitygap.world import (
@@ -144,6 +146,15 @@ class MovingTrial(ShownAsCard):
         bundle: Any = {} if widget is None else widget._repr_mimebundle_()
         data = bundle[0] if isinstance(bundle, tuple) else bundle  # with metadata, or without
         return {kind: content for kind, content in data.items() if kind.startswith("application/")}
+
+    def save(self, path: str | Path, *, speed: float = 1.0) -> Path:
+        """Write the trial as a film that ends in .gif or .mp4, and return its path.
+
+        Args:
+            path: File to write.
+            speed: 1 is as fast as the trial was; 2 is twice as fast.
+        """
+        return realitygap.playback.save_movie(self, path, speed=speed)
 
     @property
     def n_steps(self) -> int:

@@ -5,12 +5,14 @@ from __future__ import annotations
 import contextlib
 import threading
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import polars as pl
 
-from realitygap.errors import RecordError, RecordVersionError
+import realitygap
+from realitygap.errors import MissingExtraError, RecordError, RecordVersionError
 from realitygap.records._chunk import (
     Chunk,
     ChunkName,
@@ -35,11 +37,22 @@ from realitygap.records._published_results import PublishedResults
 from realitygap.records._seal import BrokenSeal, check_ends
 from realitygap.records._version import RESULTS_VERSION
 
+if TYPE_CHECKING:
+    import pandas
+
+_FACE = (
+    *("best", "conditions", "digest", "labels", "open", "paths", "path", "plot", "replay", "report", "scan"),
+    *("summary", "to_pandas", "to_polars"),
+)
+"""Members that completion offers. The others are for programs that write results."""
+
 
 class ResultsFolder(PublishedResults):
     """The results of one study: `study.json`, `trials/*.parquet`, `log.jsonl`, and with a robot `ledger.sqlite`.
 
-    Make one with `create` or `open`. Any number of processes may read while one writes; whatever is read was
+    `Study.run` returns one, and `open` reads one. To look at results: `best`, `summary`, `plot`, `paths`, `replay`,
+    `report`, `to_polars`, and `to_pandas`. The other methods are for programs that write results. They begin with
+    `create`. Any number of processes may read while one writes; whatever is read was
     published as a whole. Writing takes the lock by itself; `locked` keeps others out for longer.
     """
 
@@ -48,6 +61,86 @@ class ResultsFolder(PublishedResults):
         self._lock = FolderLock(path)
         self._publishing = threading.Lock()
         self._published: PublishedNames | None = None
+
+    def __fspath__(self) -> str:
+        return str(self._path)
+
+    def __dir__(self) -> list[str]:
+        return sorted(_FACE)
+
+    # looking at results: each verb is a function of a package above, called through the front door
+
+    def best(self) -> pl.DataFrame:
+        """Return the best trial of each condition, the highest score first, as `realitygap.report.best_trials`."""
+        return realitygap.report.best_trials(self)
+
+    def summary(self) -> pl.DataFrame:
+        """Return the median best coverage of each condition with its interval, as `realitygap.summarize`."""
+        return realitygap.summarize(self)
+
+    def plot(self) -> realitygap.report.Drawing:
+        """Draw the best score by generation, run by run, with medians. Coverage comes before the scores of other tasks.
+
+        Raises:
+            RecordError: The folder holds no trials yet, or a file in it is damaged.
+        """
+        return realitygap.report.draw_best(self)
+
+    def paths(self, condition: str | None = None, run: int | None = None) -> realitygap.report.Drawing:
+        """Draw the path of the best trial of each generation of one run, as `realitygap.report.draw_paths`.
+
+        Args:
+            condition: Condition. Default: the first one.
+            run: Run. Default: the typical one, whose best trial is the median.
+
+        Raises:
+            ValueError: There is no such condition or run; the message names those that exist.
+        """
+        return realitygap.report.draw_paths(self, condition, run)
+
+    def replay(
+        self,
+        condition: str | None = None,
+        run: int | None = None,
+        generation: int | None = None,
+        individual: int | None = None,
+    ) -> realitygap.playback.MovingTrial:
+        """Return one trial in motion, recomputed from its row: a player in a notebook, and `save` for a film.
+
+        Args:
+            condition: Condition. Default: the first one.
+            run: Run. Default: the typical one, whose best trial is the median.
+            generation: Generation of the run. Default: that of its best trial.
+            individual: Individual of the generation. Default: the best one by the task.
+
+        Raises:
+            ValueError: There is no such condition or trial; the message names those that exist.
+        """
+        return realitygap.report.choose_moving([self], None, condition, run, generation, individual)[1][0]
+
+    def report(self, out: str | Path | None = None) -> Path:
+        """Write the report of the study and return its path, as `realitygap.write_report`."""
+        return realitygap.write_report(self, out)
+
+    def to_polars(self) -> pl.DataFrame:
+        """Return all rows, one for each individual, as a Polars frame; `scan` reads them lazily."""
+        return self.read()
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """Return all rows, one for each individual, as a pandas frame.
+
+        Raises:
+            MissingExtraError: pandas or pyarrow is not installed.
+        """
+        for module in ("pandas", "pyarrow"):
+            try:
+                import_module(module)
+            except ImportError as error:
+                raise MissingExtraError(
+                    f"to_pandas needs {module}, which is not installed. Install both packages (pip install pandas "
+                    "pyarrow), or use to_polars."
+                ) from error
+        return self.read().to_pandas()
 
     # making
 

@@ -26,8 +26,9 @@ from realitygap.report._distance_figure import draw_distance, save_distance
 from realitygap.report._divergence_figure import compare_trials, save_divergence
 from realitygap.report._files import export_frame, export_individual
 from realitygap.report._formats import check_ending, save_drawing
+from realitygap.report._gap_figures import draw_gap_pairs
 from realitygap.report._gap_page import refuse_gap_page, write_gap_report
-from realitygap.report._generations_figure import draw_coverage, draw_scores
+from realitygap.report._generations_figure import draw_best, draw_coverage, draw_scores
 from realitygap.report._individuals_figure import draw_individuals
 from realitygap.report._lineage_figure import draw_lineage
 from realitygap.report._motion import Each, choose_moving, watch, write_movie
@@ -42,7 +43,7 @@ from realitygap.report._species_figure import draw_species
 from realitygap.report._summary import summarize, summarize_tasks
 from realitygap.report._table import TableOnPage
 from realitygap.report._tally import Tally, read_tally
-from realitygap.report._trial_figure import choose_trial, draw_trial
+from realitygap.report._trial_figure import best_trials, choose_trial, draw_trial
 from realitygap.report.charts.house import NARROW, Drawing
 
 __all__ = [
@@ -60,6 +61,7 @@ __all__ = [
     "audit_notes",
     "audit_paper",
     "audit_results",
+    "best_trials",
     "check_ending",
     "choose_moving",
     "choose_trial",
@@ -68,10 +70,12 @@ __all__ = [
     "compare_trials",
     "distance_notes",
     "draw_archive",
+    "draw_best",
     "draw_choices",
     "draw_closing",
     "draw_coverage",
     "draw_distance",
+    "draw_gap_pairs",
     "draw_individuals",
     "draw_lineage",
     "draw_networks",

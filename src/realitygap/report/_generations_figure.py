@@ -117,6 +117,22 @@ def draw_coverage(folder: Results, *, points: Points | None = None) -> Drawing:
     )
 
 
+def draw_best(folder: ResultsFolder | str | Path) -> Drawing:
+    """Draw the best score by generation: coverage if the study has it, otherwise the first score of its tasks.
+
+    Args:
+        folder: Results of a study, or the path to them.
+
+    Raises:
+        RecordError: there is no such folder, a file in it is damaged, or it holds no trials yet.
+    """
+    folder = folder if isinstance(folder, ResultsFolder) else ResultsFolder.open(folder)
+    other = draw_scores(folder)
+    if other and all(_score_of(condition) is not None for condition in labeled_conditions(folder)):
+        return other[0]
+    return draw_coverage(folder)
+
+
 def draw_scores(folder: ResultsFolder | str | Path) -> list[Drawing]:
     """Best score by generation, for conditions of other tasks than coverage.
 

@@ -108,6 +108,37 @@ def choose_trial(
     return ChosenTrial(tally.resolved(name), label_of(tally.condition(name)), row, tally.coverage_column)
 
 
+def best_trials(folder: Results) -> pl.DataFrame:
+    """Return the best trial of each condition that has runs, the highest score first.
+
+    Args:
+        folder: Results of a study, or the path to them.
+
+    Returns:
+        Columns `condition`, `label`, `run`, `generation`, `individual`, and `score`: the coverage, or the score of the
+        condition's task. A score that selected its trial is the best of many noisy ones, so luck is part of it.
+
+    Raises:
+        RecordError: there is no such folder, a file in it is damaged, or it holds no trials yet.
+    """
+    tally = read_tally(folder)
+    rows = []
+    for condition in tally.with_runs:
+        name = condition["name"]
+        run = int(tally.replicates(name)[np.argmax(tally.run_scores(name))])
+        best = choose_trial(tally, name, run)
+        numbers = {"run": run, **{key: best.row[key] for key in ("generation", "individual")}}
+        rows.append(
+            {
+                "condition": name,
+                "label": best.label,
+                **numbers,
+                "score": float(best.row[tally.score_column(name)]),
+            }
+        )
+    return pl.DataFrame(rows).sort("score", descending=True, maintain_order=True)
+
+
 def draw_trial(
     folder: Results,
     condition: str | None = None,

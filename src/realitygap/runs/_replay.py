@@ -73,7 +73,10 @@ def replay(condition: Condition | Mapping[str, Any], row: Mapping[str, Any]) -> 
     try:
         genome = genome_of(condition, row)
     except RecordError as error:
-        raise RecordError(f"{error} Or the row does not belong to this condition.") from error
+        raise RecordError(
+            f"The network of the row does not fit the settings of the condition. Give those of condition "
+            f"{row['condition']!r} of its study; if they are, the row was changed."
+        ) from error
     trajectory = trace_genome(
         condition.on,
         condition.arena.arena(),

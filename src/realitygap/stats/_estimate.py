@@ -79,6 +79,14 @@ class Estimate:
             values["refused"] = self.refused
         return values | dict(self.more)
 
+    def __float__(self) -> float:
+        if self.value is None:
+            raise ValueError(f"There is no number: {self.refused or 'n is too small for it.'}")
+        return self.value
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self}, n={self.n})"
+
     def __str__(self) -> str:
         if self.value is None:
             return "–"

@@ -32,7 +32,7 @@ def study_card(study: Study) -> Card:
         study.labels,
         f"{len(rows)} conditions × {about.replicates:,} runs, seed {about.seed}. {about.note}".strip(),
         parts=[Table(heads, rows)],
-        code=[f"realitygap.run_study(study, 'results/{about.name}')"],
+        code=[f"study.run('results/{about.name}')"],
     )
 
 

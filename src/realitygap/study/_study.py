@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import unicodedata
 from collections.abc import Iterable
+from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
+import realitygap
 from realitygap._version import __version__
 from realitygap.drawing import ShownAsCard
 from realitygap.runs import NAME_PATTERN, Condition
@@ -158,6 +160,30 @@ class Study(Settings, ShownAsCard):
     def n_physical(self) -> int:
         """Conditions that a robot drives."""
         return sum(condition.is_physical for condition in self.conditions)
+
+    def run(
+        self,
+        out: str | Path | None = None,
+        *,
+        replicates: int | None = None,
+        threads: int | None = None,
+        fresh: bool = False,
+        cluster: str | None = None,
+    ) -> realitygap.ResultsFolder:
+        """Run the simulated conditions, or what is missing of them, as `realitygap.run_study`; return the results.
+
+        Args:
+            out: Folder for the results. Default: `results/NAME`.
+            replicates: Number of runs per condition that replaces the study's.
+            threads: Number of threads. Default: the number of processors.
+            fresh: True to delete existing results in the folder first.
+            cluster: Cluster that replaces this machine's threads.
+        """
+        study = self
+        if replicates is not None:
+            about = self.about.model_dump() | {"replicates": replicates}
+            study = self.model_copy(update={"about": StudySection(**about)})
+        return realitygap.study.run_study(study, out, threads=threads, fresh=fresh, cluster=cluster).folder
 
     def description(self) -> dict[str, Any]:
         """Return the study as the folder of results keeps it (`study.json`)."""

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, PrivateAttr, model_validator
 
+import realitygap
 from realitygap._toml import toml_table
 from realitygap.drawing import Bar, Card, ShownAsCard, Table, card_of
 from realitygap.settings import Settings
@@ -154,6 +156,7 @@ class Calibration(Settings, ShownAsCard):
     notes: tuple[str, ...] = Field((), description="Notes on the fit, each a sentence.")
     evidence: dict[str, Any] = Field({}, description="Data of the figures.")
     order: dict[str, Any] = Field({}, description="Settings of the command that made the calibration.")
+    _file: str | None = PrivateAttr(None)
 
     @model_validator(mode="after")
     def _draws_go_together(self) -> Self:
@@ -172,6 +175,30 @@ class Calibration(Settings, ShownAsCard):
         state = "rejected" if self.misspecified else "ok"
         counts = f"{self.trials} trials, {n_identified}/{len(self.fitted)} identified"
         return f"{type(self).__name__}({self.kind!r}, {counts}, {state})"
+
+    def simulator(self, path: str | Path | None = None) -> str:
+        """Return the platform that simulates the calibrated robot, such as `sim:fit.toml`.
+
+        Args:
+            path: File to write the calibration to first. Default: the file that it has already.
+
+        Raises:
+            ValueError: It has no file yet, and no path is given.
+        """
+        if path is not None:
+            realitygap.study.save_calibration(path, self)
+        elif (path := self._file) is None:
+            raise ValueError("This calibration has no file yet. Name one: simulator('fit.toml')")
+        return f"sim:{path}"
+
+    def in_file(self, path: str | Path) -> Self:
+        """Return the calibration that is in a file, which `simulator` names."""
+        copy = self.model_copy()
+        copy._file = str(path)
+        return copy
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Calibration) and dict(self) == dict(other)
 
     @property
     def held_out(self) -> dict[str, Any]:

@@ -110,7 +110,7 @@ def read_calibration(robot: str | Path) -> Calibration | None:
 def _as_calibration(values: Mapping[str, Any], origin: str) -> Calibration:
     """Return the calibration in a file's values. A robot file in the same folder gets that folder in its path."""
     made = _checked(origin, lambda: Calibration(**values))
-    return made.model_copy(update={"robot": str(_beside(made.robot, origin))})
+    return made.model_copy(update={"robot": str(_beside(made.robot, origin))}).in_file(origin)
 
 
 def _calibrated(calibration: Calibration, origin: str, chain: list[str]) -> dict[str, Any]:

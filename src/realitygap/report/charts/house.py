@@ -14,8 +14,10 @@ import xml.etree.ElementTree as ET
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import realitygap
 from realitygap._foreign_text import page_text
 from realitygap.drawing import FONT, Ink
 from realitygap.report.charts.marks import Panel, frames_of
@@ -96,8 +98,15 @@ class Drawing:
     marks: tuple[Panel, ...] = field(default=(), repr=False, compare=False)
     frames: tuple[tuple[float, ...], ...] = field(default=(), repr=False, compare=False)
 
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({shorten(self.alt, 80)!r})"
+
     def _repr_svg_(self) -> str:
         return self.svg
+
+    def save(self, path: str | Path) -> Path:
+        """Write the figure to a file that ends in .svg, .pdf, or .png, and return its path."""
+        return realitygap.report.save_drawing(self, path)
 
     def in_width(self, width: float) -> Drawing:
         """Return the same figure in another width [in], for the same page.

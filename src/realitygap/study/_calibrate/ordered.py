@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 from realitygap.errors import DescriptionError, StudyError
@@ -27,6 +28,8 @@ def make_calibration(
     tell: Tell | None = None,
 ) -> Calibration:
     """Fit the simulator to a robot and write the calibration, as `realitygap calibrate`.
+
+    Without `out`, the file is in `results` and is named after the robot. The same call resumes its trials.
 
     Args:
         observer: Observer of a robot without a witness, who reports what it drew.
@@ -61,18 +64,21 @@ def make_calibration(
         made = _measured(order, out, observer, operator, pulse, tell)
     made = made.model_copy(update={"order": order.record()})
     save_calibration(out, made)
-    return made
+    return made.in_file(out)
 
 
 def _checked(order: CalibrateOrder) -> Path:
     """Return the file to write, after all checks of files, before a trial is lost.
 
     Raises:
-        StudyError: There is no name for the file, it cannot be written, or it is no calibration.
+        StudyError: The file cannot be written, or it is no calibration.
     """
     out = order.out
     if out is None:
-        raise StudyError("No file for the calibration. Name one: -o FILE.toml")
+        robot = (order.robot or str(order.data[0])).removesuffix(".toml")
+        words = " ".join(filter(None, (robot, order.what, order.observe)))
+        out = Path("results") / (re.sub(r"\W+", "-", words).strip("-") + ".toml")
+        out.parent.mkdir(exist_ok=True)
     if out.exists():
         _refuse_other_files(out)
     if not out.resolve().parent.is_dir():

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
+import realitygap
 from realitygap.drawing import ShownAsCard
 from realitygap.errors import StudyError
 from realitygap.gap import Why
 from realitygap.orders import GapOrder, takes_order
 from realitygap.platforms import RecordedTarget, class_of, open_target, split_spec
+from realitygap.stats import Estimate
 from realitygap.tasks import Task
 from realitygap.trials import PortObserver, Pulse
 from realitygap.world import Arena, Calibration, load_arena
@@ -38,6 +41,39 @@ class GapBetween(ShownAsCard):
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}{repr(self.study.result).removeprefix('GapResult')}"
+
+    @property
+    def level(self) -> Estimate:
+        """Mean score on the target minus that on the simulator."""
+        return self.study.result.level
+
+    @property
+    def rms(self) -> Estimate:
+        """RMS gap: the typical size of a controller's difference, without the noise of trials."""
+        return self.study.result.rms
+
+    @property
+    def rank_correlation(self) -> Estimate:
+        """Spearman's correlation over controllers between both platforms."""
+        return self.study.result.srcc
+
+    @property
+    def noise_ceiling(self) -> Estimate:
+        """Rank correlation that noise alone would leave of a perfect one."""
+        return self.study.result.noise_ceiling
+
+    @property
+    def verdict(self) -> str:
+        """The finding in a sentence."""
+        return self.study.result.verdict
+
+    def plot(self) -> realitygap.report.Drawing:
+        """Draw the mean score of each controller on both platforms, with intervals. On the line there is no gap."""
+        return realitygap.report.draw_gap_pairs(self.study)
+
+    def report(self, path: str | Path = "gap.html") -> Path:
+        """Write the report of the gap and return its path, as `realitygap.report.write_gap_report`."""
+        return realitygap.report.write_gap_report(self, path)
 
 
 @takes_order(GapOrder)

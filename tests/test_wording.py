@@ -54,10 +54,11 @@ def test_a_difference_reads_as_its_two_sides_do():
     assert wording.equivalence_verdict(True, 0.02, difference).startswith("equivalent within ±0.02")
 
 
-def test_a_gap_from_few_controllers_has_a_size_without_a_claim():
-    few, none = mean_interval([0.1, 0.2]), Estimate.refusal(2, "too few")
-    assert "too few controllers" in wording.gap_size_verdict(few, few)
-    assert "unknown" in wording.gap_size_verdict(none, none)
-    shown = Estimate(0.1, 0.05, 0.2, 9)
-    assert "does worse" in wording.gap_size_verdict(shown, Estimate(-0.1, -0.2, -0.05, 9))
-    assert wording.gap_size_verdict(Estimate(0.01, 0.0, 0.03, 9), shown).startswith("no gap is shown")
+def test_platforms_have_names_in_words():
+    assert wording.platform_in_words("twin:runs/worn-1.toml", "TWIN") == "the twin worn-1"
+    assert wording.platform_in_words("sim:fit.toml", "SIM") == "sim with fit"
+    assert wording.platform_in_words("jyro", "SIM") == "jyro"
+    assert (
+        wording.platform_in_words("scribbler:emulator://s2?speed=off", "EMULATED") == "the emulated scribbler"
+    )
+    assert wording.platform_in_words("scribbler:/dev/rfcomm0", "REAL") == "the robot scribbler"

@@ -145,7 +145,7 @@ def bracketed(estimate: Estimate, digits: int = 3, missing: str = "") -> str:
     return (
         missing
         if estimate.ends is None
-        else "[" + ", ".join(f"{end:.{digits}f}" for end in estimate.ends) + "]"
+        else "[" + ", ".join(f"{end:.{digits}f}" for end in estimate.ends).replace("-", "−") + "]"
     )
 
 
@@ -349,45 +349,87 @@ def equivalence_verdict(is_equivalent: bool, margin: float, difference: Estimate
     return f"{shown} within ±{margin:g} (90 %: {span(difference, signs=True)})"
 
 
-def gap_size_verdict(rms: Estimate, level: Estimate) -> str:
-    """Return the size of a gap and its direction, without a period; no gap if the interval of the size begins at 0."""
-    if rms.value is None:
-        side = _direction(level)
-        return "the size of the gap is unknown" + ("" if side.endswith("both sides") else side)
-    if rms.ends is None:
-        return f"the transfer gap is {rms.value:.3f} RMS, from too few controllers for an interval"
-    if rms.ends[0] <= 0:
-        return f"no gap is shown (RMS at most {rms.high:.3f})"
-    return f"the transfer gap is {rms} RMS over {rms.n} controllers{_direction(level)}"
+RANKS_ALIKE = 0.8
+"""Rank correlation from which a ranking is trusted: its whole interval must be at least that high."""
 
 
-def _direction(level: Estimate) -> str:
-    if level.value is None or level.ends is None:
-        return ""
-    if level.ends[1] < 0:
-        return f", and the target does worse by {-level.value:.3f}"
-    if level.ends[0] > 0:
-        return f", and the target does better by {level.value:.3f}"
-    return ", to both sides"
+def platform_in_words(spec: str, label: str) -> str:
+    """Return a platform in words, such as `the twin worn-1` for `twin:worn-1.toml`."""
+    name, _, rest = spec.partition(":")
+    if not rest:
+        return name
+    if "://" in rest or name not in ("sim", "twin", "recorded"):
+        return f"the {'emulated ' if label == 'EMULATED' else 'robot ' if label == 'REAL' else ''}{name}"
+    stem = rest.replace("\\", "/").rpartition("/")[2].rpartition(".")[0] or rest
+    return {"sim": f"sim with {stem}", "twin": f"the twin {stem}"}.get(name, f"the recorded trials {stem}")
 
 
-def gap_order_verdict(correlation: Estimate, ceiling: Estimate, disattenuated: Estimate) -> str:
-    """Return the correlation over controllers and what noise allows, without a period; empty if it is refused."""
-    if correlation.value is None:
-        return ""
-    text = f"the correlation over controllers is {correlation.value:.2f}"
-    if ceiling.value is None or disattenuated.value is None:
-        return text
-    return f"{text} where noise allows {ceiling.value:.2f}"
-
-
-def gap_equivalence_verdict(equivalence: Estimate) -> str:
-    """Return whether two platforms are shown to be equivalent in level, without a period; empty if it is untested."""
+def gap_equivalence(equivalence: Estimate) -> str:
+    """Return whether the level is shown to be equivalent, with its interval of 90 %; empty if that is not tested."""
     margin, is_equivalent = equivalence.more.get("margin"), equivalence.more.get("equivalent")
     if margin is None or is_equivalent is None:
         return ""
-    shown = "are equivalent in level" if is_equivalent else "are not shown to be equivalent in level"
-    return f"they {shown} at a margin of {margin:g}"
+    return (
+        f"{'' if is_equivalent else 'not '}shown within ±{margin:g}, 90 % interval {bracketed(equivalence)}"
+    )
+
+
+def level_verdict(
+    sim: str, target: str, score: str, level: Estimate, rms: Estimate, equivalence: Estimate
+) -> str:
+    """Return whether a simulator can be trusted for the mean score of controllers, as sentences.
+
+    Args:
+        sim, target: The two platforms in words.
+        score: Score of controllers.
+        level: Mean difference, target minus simulator.
+        rms: Root mean square of differences, which is stated if the level is not refuted.
+        equivalence: Result of the test of equivalence.
+    """
+    of, margin = f"the level of {score}", equivalence.more.get("margin")
+    if level.value is None or level.ends is None:
+        return f"Too few controllers to judge {of}."
+    low, high = level.ends
+    single = f" Single controllers differ by {with_interval(rms)} RMS." if (rms.low or 0.0) > 0 else ""
+    if equivalence.more.get("equivalent"):
+        figures = f"it is equivalent within ±{margin:g}, and differs by {with_interval(level)}."
+        return f"Trust {sim} for {of}: {figures}{single}"
+    if low <= 0 <= high:
+        difference = f"difference in {of} between {sim} and {target}"
+        shown = (
+            f"No {difference}"
+            if margin is None
+            else f"Neither a {difference} nor equivalence within ±{margin:g}"
+        )
+        return f"{shown} is shown: {with_interval(level)}.{single}"
+    lower = level.value < 0
+    size, *ends = (abs(number) for number in (level.value, *((high, low) if lower else (low, high))))
+    return (
+        f"Don’t trust {sim} for {of}: it is {size:.3f} [{ends[0]:.3f}, {ends[1]:.3f}] "
+        f"{'lower' if lower else 'higher'} on {target}."
+    )
+
+
+def rank_verdict(raw: Estimate, ceiling: Estimate, without: Estimate) -> str:
+    """Return whether a simulator can be trusted for the ranking of controllers, as a sentence.
+
+    Args:
+        raw: Rank correlation of both platforms.
+        ceiling: The noise ceiling.
+        without: The rank correlation without noise, whose interval decides if there is one.
+    """
+    if raw.value is None or raw.ends is None:
+        return "Too few controllers to judge the ranking."
+    noise = "" if ceiling.value is None else f", and noise allows {ceiling.value:.3f}"
+    figures = f"the rank correlation is {with_interval(raw)}{noise}."
+    low, high = without.ends or raw.ends
+    if low >= RANKS_ALIKE:
+        return f"Trust the simulator’s ranking of controllers: {figures}"
+    if low > 0:
+        return f"Trust the simulator’s ranking of controllers only in part: {figures}"
+    if high < RANKS_ALIKE:
+        return f"Don’t trust the simulator’s ranking of controllers: {figures}"
+    return f"The simulator’s ranking of controllers is undecided: {figures}"
 
 
 def reproduces(is_misspecified: bool) -> str:

@@ -51,7 +51,7 @@ def test_json_has_every_measure_with_estimate_low_high_and_n(printed):
     assert found["misspecified"] is None
     assert found["replay"]["n"] == 6
     assert len(found["replay"]["distance"]["low"]) == 101
-    assert "SIM jyro" in found["verdict"]
+    assert "jyro" in found["verdict"]
 
 
 def test_the_page_and_the_trials_are_kept(printed):
@@ -75,10 +75,17 @@ def test_kept_trials_say_how_many_the_next_question_takes(printed, command):
     assert "Minimum number of trials on the target" in out
 
 
-def test_the_table_ends_with_the_verdict(command):
-    code, out, err = command("gap", "sim", "sim", "--n-controllers", "5", "--trials", "2")
+def test_at_most_twelve_lines_state_title_verdict_labels_n_and_what_follows(command):
+    words = ("gap", "sim", "sim", "--n-controllers", "5", "--trials", "2")
+    code, out, err = command(*words)
     assert (code, err) == (0, "")
-    assert out.rstrip().splitlines()[-1].startswith("Between SIM sim and SIM sim, ")
+    lines = out.splitlines()
+    assert len(lines) <= 12
+    assert lines[0].endswith(": sim against sim")
+    assert "the level of coverage" in lines[1]
+    assert "SIM, 5 controllers, 2 trials of each" in out
+    assert "--full" in lines[-1]
+    assert lines[1] in command(*words, "--full")[1]
 
 
 NUMBER = re.compile(r"[-−]?\d\.\d{3}")
@@ -87,7 +94,9 @@ NUMBER = re.compile(r"[-−]?\d\.\d{3}")
 def test_terminal_and_report_state_the_same_estimates_intervals_and_p(printed, command):
     """Each measure has one estimate, one interval, and one p, wherever it is shown."""
     folder, _ = printed
-    out = command(*SMALL, "--margin", "0.05", "--observe", "track", "-o", "trials.sqlite", cwd=folder)[1]
+    out = command(
+        *SMALL, "--margin", "0.05", "--observe", "track", "-o", "trials.sqlite", "--full", cwd=folder
+    )[1]
     page = (folder / "gap.html").read_text("utf-8")
     words = html.unescape(re.sub("<[^>]+>", " ", page))
     rows = {line[2:34].strip(): line[34:] for line in out.splitlines() if line.startswith("  ")}

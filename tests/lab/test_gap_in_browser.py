@@ -47,7 +47,7 @@ def test_gap_is_measured_with_its_progress_and_mistakes_are_shown_at_their_field
     page.get_by_text(re.compile(r"\d+ of 30 trials")).wait_for()
     page.get_by_text("Complete.", exact=True).wait_for(timeout=180_000)
     page.reload()
-    page.get_by_text("Correlation", exact=True).wait_for()
+    page.get_by_text("Rank correlation", exact=True).wait_for()
     for trials in (2, 3):  # one interval for each report
         page.get_by_text(f"{trials} trials", exact=True).wait_for()
     terms = page.locator(".lab-facts dt", has_text=re.compile("^Correlation$"))

@@ -52,7 +52,7 @@ WITH = {
 ONLY_IN_THE_COMMAND = {
     "calibrate": {"camera", "figure", "allow_code", "as_json"},
     "closing-the-gap": {"as_json", "open_page"},
-    "gap": {"camera", "report", "allow_code", "as_json"},
+    "gap": {"camera", "report", "full", "allow_code", "as_json"},
     "plan": {"allow_code", "as_json"},
     "transfer": {"allow_code", "as_json"},
     "try": {"allow_code", "as_json"},

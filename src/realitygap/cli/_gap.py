@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import sys
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -32,6 +32,7 @@ def gap(
     report: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Page to write, with figures and tables (.html).")
     ] = None,
+    full: Annotated[bool, typer.Option("--full", help="Print all measures.")] = False,
     allow_code: AllowPlatforms = False,
     as_json: Json = False,
 ) -> None:
@@ -68,14 +69,44 @@ def gap(
             values |= {} if part is None else {name: part.to_dict()}
         print_json(values)
         return
-    _print(result, found.study.replay)
+    if full:
+        _print_all(result, found.study.replay)
+    else:
+        _print(result)
     if found.why is not None:
         _print_why(found.why)
-    if report is None and sys.stdout.isatty():
-        echo("With --report gap.html, the command also writes these numbers and figures as a page.")
+    elif not full:
+        echo(_next(order, report))
 
 
-def _print(result: GapResult, replay: ReplayError | None) -> None:
+def _print(result: GapResult) -> None:
+    """Print title, verdict, main measures, labels, and n."""
+    echo(f"Gap in {result.score}: {result.title}")
+    echo(result.verdict)
+    for title, words in result.main_measures:
+        echo(f"  {title:18}{words}")
+    one, other = result.trials
+    trials = f"{one}" if one == other else f"{one} and {other}"
+    echo(
+        f"{' and '.join(dict.fromkeys(result.labels))}, {counted(result.level.n, 'controller')}, {trials} trials of "
+        "each on both platforms, 95 % intervals"
+    )
+    for note in result.notes:
+        echo(note)
+
+
+def _next(order: GapOrder, report: Path | None) -> str:
+    """Return how to get more of this result, and the command that may follow."""
+    words = f"All measures: --full. {'Page: --report gap.html' if report is None else f'Page: {report}'}."
+    name, _, calibration = order.sim.partition(":")
+    if name != "sim" or calibration or order.target.partition(":")[0] in ("jyro", "recorded"):
+        return words
+    robot = shlex.quote(order.target)
+    return f"{words} Next: realitygap calibrate all --robot {robot} -o fit.toml"
+
+
+def _print_all(result: GapResult, replay: ReplayError | None) -> None:
+    """Print all measures."""
     one, other = result.trials
     echo(
         f"The transfer gap from {result.source} ({result.labels[0]}) to {result.target} ({result.labels[1]}): "
@@ -96,7 +127,7 @@ def _print(result: GapResult, replay: ReplayError | None) -> None:
 
 
 def _print_row(title: str, found: Estimate) -> None:
-    number = "-" if found.value is None else f"{found.value:.3f}"
+    number = "–" if found.value is None else f"{found.value:.3f}".replace("-", "−")
     p = found.more.get("p")
     more = "" if p is None else p_equation(p)
     echo(f"  {title:32}{number:>8}  {bracketed(found):17} {more}".rstrip())
@@ -111,7 +142,8 @@ def _print_why(why: Why) -> None:
     )
     for k in why.order:
         fall, n = why.falls[k], why.numbers[k]
-        echo(f"  {why.parts[k]:16}{fall.value:>8.3f}  {bracketed(fall):17} {counted(n, 'number')}")
+        value = f"{fall.value:.3f}".replace("-", "−")
+        echo(f"  {why.parts[k]:16}{value:>8}  {bracketed(fall):17} {counted(n, 'number')}")
     echo(why.advice)
 
 

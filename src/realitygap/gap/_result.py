@@ -6,7 +6,14 @@ import json
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
-from realitygap._wording import gap_equivalence_verdict, gap_order_verdict, gap_size_verdict
+from realitygap._wording import (
+    gap_equivalence,
+    level_verdict,
+    platform_in_words,
+    rank_verdict,
+    reproduces,
+    with_interval,
+)
 from realitygap.drawing import ShownAsCard
 from realitygap.stats import Estimate
 
@@ -33,12 +40,15 @@ class Measure(NamedTuple):
 SHOWN: tuple[Measure, ...] = (
     Measure(
         "rms",
-        "RMS gap without noise",
+        "RMS gap",
         "RMS gap",
         "root mean square over controllers of the difference in {score}, with noise subtracted",
     ),
     Measure(
-        "level", "level: target less simulator", "Level", "mean difference in {score}, target less simulator"
+        "level",
+        "level: target minus simulator",
+        "Level",
+        "mean difference in {score}, target minus simulator",
     ),
     Measure(
         "a12",
@@ -48,13 +58,13 @@ SHOWN: tuple[Measure, ...] = (
     ),
     Measure(
         "srcc",
-        "correlation over controllers",
-        "Correlation",
+        "rank correlation",
+        "Rank correlation",
         "Spearman’s, over controllers, of the mean {score}",
     ),
     Measure(
         "noise_ceiling",
-        "  noise allows at most",
+        "  noise ceiling",
         "Noise ceiling",
         "the correlation that noise leaves of a perfect one, by split halves",
     ),
@@ -102,7 +112,7 @@ MEASURES = tuple(each.name for each in SHOWN if each.name not in _LATE)
 class GapResult(ShownAsCard):
     """The gap between two platforms: the transfer gap, of the same controllers on both.
 
-    Differences are target less simulator: below 0 where the target does worse than the simulator says.
+    Differences are target minus simulator: below 0 where the target does worse than the simulator says.
 
     Attributes:
         source: Name of the simulator.
@@ -159,9 +169,37 @@ class GapResult(ShownAsCard):
         return self.rms.low is not None and self.rms.low > 0
 
     @property
+    def title(self) -> str:
+        """The two platforms in words."""
+        return " against ".join(self._names)
+
+    @property
     def verdict(self) -> str:
-        """The whole in one sentence."""
-        return _verdict_of(self)
+        """Whether the simulator can be trusted for level and for ranking."""
+        sentences = [
+            level_verdict(*self._names, self.score, self.level, self.rms, self.equivalence),
+            rank_verdict(self.srcc, self.noise_ceiling, self.srcc_disattenuated),
+        ]
+        if self.misspecified:
+            sentences.append(reproduces(is_misspecified=True))
+        return " ".join(sentences)
+
+    @property
+    def _names(self) -> tuple[str, str]:
+        """The simulator and the target in words."""
+        sim, target = map(platform_in_words, (self.source, self.target), self.labels)
+        return sim, target
+
+    @property
+    def main_measures(self) -> list[tuple[str, str]]:
+        """Name and value of the measures that matter most, in words."""
+        ceiling = f", noise ceiling {with_interval(self.noise_ceiling)}"
+        return [
+            ("level", _words(self.level)),
+            ("RMS gap", _words(self.rms)),
+            ("rank correlation", _words(self.srcc) + ("" if self.noise_ceiling.value is None else ceiling)),
+            ("equivalence", gap_equivalence(self.equivalence) or self.equivalence.refused),
+        ]
 
     def to_dict(self) -> dict[str, Any]:
         """Return the measures, `misspecified`, `verdict`, and what they are of; `score` if that is not coverage."""
@@ -187,14 +225,7 @@ class GapResult(ShownAsCard):
         return json.dumps(self.to_dict(), indent=2)
 
 
-def _verdict_of(result: GapResult) -> str:
-    """Return the result in one sentence, without what n controllers cannot support."""
-    parts = [
-        gap_size_verdict(result.rms, result.level),
-        gap_order_verdict(result.srcc, result.noise_ceiling, result.srcc_disattenuated),
-        gap_equivalence_verdict(result.equivalence),
-    ]
-    if result.misspecified:
-        parts.append("the simulator cannot reproduce the observations with any numbers")
-    where = f"Between {result.labels[0]} {result.source} and {result.labels[1]} {result.target}"
-    return f"{where}, " + "; ".join(part for part in parts if part) + "."
+def _words(estimate: Estimate) -> str:
+    """Return a measure with its interval, and the reason if one of them is missing."""
+    words = with_interval(estimate)
+    return f"{words}  {estimate.refused}" if estimate.refused else words

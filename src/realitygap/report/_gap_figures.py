@@ -118,7 +118,7 @@ def draw_gap_differences(gap: GapStudy) -> Drawing:
     margin = gap.result.equivalence.more.get("margin")
     band = f" The gray band is the margin of equivalence, ±{margin:g}." if margin else ""
     caption = (
-        f"{score[0].upper()}{score[1:]} on {target.name} ({target.label}) less that on {source.name} ({source.label}) "
+        f"{score[0].upper()}{score[1:]} on {target.name} ({target.label}) minus that on {source.name} ({source.label}) "
         f"of each of {source.n} controllers in order, {target.trials} and {source.trials} trials each, with intervals "
         f"of 95 % for each by itself. Blue: the level, {level}.{band}"
     )
@@ -192,7 +192,7 @@ def draw_gap_maps(gap: GapStudy) -> Drawing | None:
     panels = (
         (f"{source.label} {shorten(source.name, 20)}", maps.source, most),
         (f"{target.label} {shorten(target.name, 20)}", maps.target, most),
-        (f"{target.label} less {source.label}", maps.difference, apart),
+        (f"{target.label} minus {source.label}", maps.difference, apart),
     )
 
     def draw(width: float) -> Sheet:

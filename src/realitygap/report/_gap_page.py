@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from realitygap._version import __version__
-from realitygap._wording import between, p_equation, reproduces
+from realitygap._wording import bracketed, p_equation, reproduces
 from realitygap.errors import RecordError
 from realitygap.gap import SHOWN, GapResult
 from realitygap.records import is_special, refuse_results, write_whole
@@ -29,7 +29,7 @@ _APART = (
     (
         "reevolved",
         "Re-evolved gap",
-        "champions evolved and tried on the target less those of the simulator, there",
+        "champions evolved and tried on the target minus those of the simulator, there",
     ),
     ("luck", "Luck of selection", "what champions lose on fresh seeds where they were selected"),
 )
@@ -145,8 +145,8 @@ def _row(result: GapResult, name: str, title: str, meaning: str) -> Row:
     explained = meaning.format(score=result.score)
     return (
         title,
-        "–" if estimate.value is None else f"{estimate.value:.3f}",
-        between(estimate),
+        "–" if estimate.value is None else f"{estimate.value:.3f}".replace("-", "−"),
+        bracketed(estimate, missing="–"),
         str(estimate.n),
         "" if p is None else p_equation(p).removeprefix("p ").removeprefix("= "),
         Cell(f"{explained}. ", more=estimate.refused) if estimate.refused else explained,

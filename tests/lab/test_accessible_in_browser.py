@@ -12,7 +12,7 @@ from realitygap.study import parse_study, run_study
 
 from .conftest import open_advanced, open_fold
 from .page_checks import faults, keyboard, states, watch_states
-from .robot_study import begin_sitting, make_study
+from .robot_study import await_trial, begin_sitting, make_study
 from .sheets import drive_sheet, photo_of
 
 pytestmark = pytest.mark.slow
@@ -103,7 +103,7 @@ def test_pages_of_a_connected_robot_are_accessible(lab, look):
     make_study(lab.root)
     page = look("study/by-robot/trials")
     begin_sitting(page)
-    page.get_by_role("button", name="Start trial").wait_for()
+    await_trial(page, 1)
     assert faults(page, lab.root) == []
     assert keyboard(page) == []
     open_fold(page, "Robot")

@@ -44,7 +44,7 @@ def test_a_whole_study_is_driven_and_counted_by_taps_on_a_phone(lab, visit):
     make_study(lab.root)
     page = visit(PAGE, size=PHONE, has_touch=True)
     begin_sitting(page)
-    page.get_by_role("button", name="Start trial").wait_for()
+    await_trial(page, 1)
     assert "coverage-robot" not in page.content(), "counting is blind"
     page.evaluate("scrollTo(0, 0)")
     for action in ("Start trial", "Stop robot"):
@@ -218,7 +218,7 @@ def test_robot_changes_hands_when_its_operator_agrees_and_everyone_can_stop_it(l
     make_study(lab.root)
     page = visit(PAGE)
     begin_sitting(page)
-    page.get_by_role("button", name="Start trial").wait_for()
+    await_trial(page, 1)
     other = visit(PAGE)
     other.get_by_text("anna is operating the robot. You are watching.").wait_for()
     assert other.get_by_role("button", name="Start trial").is_disabled()
@@ -328,4 +328,4 @@ def test_open_page_comes_back_with_the_new_token_when_the_lab_was_started_again(
     page.get_by_role("button", name="Open the lab").click()
     page.wait_for_url(lab.address + PAGE)
     begin_sitting(page)
-    page.get_by_role("button", name="Start trial").wait_for()
+    await_trial(page, 1)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from .conftest import open_advanced, open_fold
-from .robot_study import begin_sitting, ledger_of, make_study, tap
+from .robot_study import await_trial, begin_sitting, ledger_of, make_study, tap
 from .sheets import drive_paths, film_of, true_cells
 
 pytestmark = pytest.mark.slow
@@ -57,4 +57,4 @@ def test_a_camera_that_cannot_be_is_told_and_a_sitting_begins_without(lab, visit
     if field.is_visible():
         field.fill("")
     begin_sitting(page)
-    page.get_by_role("button", name="Start trial").wait_for()
+    await_trial(page, 1)

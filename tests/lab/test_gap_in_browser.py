@@ -50,7 +50,7 @@ def test_gap_is_measured_with_its_progress_and_mistakes_are_shown_at_their_field
     page.get_by_text("Rank correlation", exact=True).wait_for()
     for trials in (2, 3):  # one interval for each report
         page.get_by_text(f"{trials} trials", exact=True).wait_for()
-    terms = page.locator(".lab-facts dt", has_text=re.compile("^Correlation$"))
+    terms = page.locator(".lab-facts dt", has_text=re.compile("^Rank correlation$"))
     assert re.fullmatch(r"−?\d\.\d{3} \[−?\d\.\d{3}, −?\d\.\d{3}\]", terms.locator("+ dd").inner_text())
     scatter = page.locator(".lab-scatter svg")
     words = page.locator(".lab-scatter .lab-curves-words")

@@ -64,6 +64,16 @@ def test_list_of_commands_cuts_no_line_at_any_width():
             assert f"{command.name} {command.summary}" in words
 
 
+def test_list_of_commands_begins_with_five_and_ends_with_advanced_ones():
+    names = {title: [command.name for command in commands] for title, commands in _commands.SECTIONS.items()}
+    first, *_, last = names
+    assert len(names[first]) == 5
+    advanced = {"simulate", "audit-results", "audit-distance", "bench", "digest", "lens", "closing-the-gap"}
+    assert (last, set(names[last])) == ("Advanced", advanced)
+    lines = _commands.root_help(80).splitlines()
+    assert lines.index(f"{first}:") < 6
+
+
 def members() -> Iterator[tuple[list[str], Any]]:
     """Yield the words of each command and group, and the command itself."""
     for name, group in APP.commands.items():

@@ -41,61 +41,63 @@ class Command:
     passes_options_on: bool = False
 
 
+START = "Start here"
+
 SECTIONS: dict[str, tuple[Command, ...]] = {
-    "Run a study": (
+    START: (
         Command("demo", "Take a two-minute tour with an emulated robot.", "_demo", "demo"),
         Command("run", "Run a study, or resume one that was interrupted.", "_study", "run"),
-        Command("drive", "Drive the conditions of a study that are on a robot.", "_drive", "drive"),
-        Command("new-study", "Write a study file to change: a template, or a copy.", "_study", "new_study"),
+        Command("gap", "Measure the gap between a simulator and a target.", "_gap", "gap"),
+        Command("calibrate", "Fit the simulator to a robot.", "_calibrate", "calibrate"),
         Command("lab", "Serve the web interface for studies, robots, and trials.", "_lab", "lab"),
     ),
-    "Look at results": (
+    "Studies and their results": (
+        Command("new-study", "Write a study file to change: a template, or a copy.", "_study", "new_study"),
+        Command("drive", "Drive the conditions of a study that are on a robot.", "_drive", "drive"),
         Command("report", "Write the HTML report of a study.", "_results", "report"),
         Command("show", "Draw a run, trial, network, arena, or robot.", "_show", "show"),
         Command("export", "Export a network as JSON, ONNX, C, Aseba, or a graph.", "_export", "export"),
-        Command(
-            "export-trials",
-            "Write driven trials as JSON, Parquet, MCAP, or bags.",
-            "_export",
-            "export_trials",
-        ),
-        Command("digest", "Print the hash of a study's results.", "_results", "digest"),
     ),
-    "Measure and close the gap": (
-        Command("gap", "Measure the gap between a simulator and a target.", "_gap", "gap"),
+    "The gap": (
         Command("plan", "Estimate how many controllers and trials you need.", "_gap", "plan"),
-        Command("import", "Turn a log of a real robot into trials.", "_import", "import_log"),
-        Command("calibrate", "Fit the simulator to a robot.", "_calibrate", "calibrate"),
         Command("transfer", "Compare strategies that transfer controllers.", "_transfer", "transfer"),
-        Command("closing-the-gap", "Measure and shrink the gap to many robots.", "_transfer", "closing"),
         Command("try", "Drive one exported controller on any platform.", "_transfer", "try_genome"),
         Command("again", "Repeat a measurement from its result.", "_order", "again", True),
+        Command("import", "Turn a log of a real robot into trials.", "_import", "import_log"),
         Command("twin", "Sample and inspect MuJoCo twins (pseudo-reality).", "_twin", "twin"),
     ),
-    "Use a robot": (
+    "Robots": (
         Command("robot", "Connect to a robot and send it commands.", "_robot", "robot"),
         Command("emulate", "Emulate a robot on a pseudo-terminal or TCP port.", "_emulate", "emulate"),
         Command("platforms", "List the platforms that can run trials.", "_platforms", "platforms"),
-        Command("trials", "List, show, score, annotate, and export trials.", "_trials", "trials"),
+        Command("arena", "Convert an arena from or to a map of ROS.", "_arena", "arena"),
     ),
-    "Score physical trials": (
+    "Trials of a robot": (
+        Command("trials", "List, show, score, annotate, and export trials.", "_trials", "trials"),
         Command(
             "print-sheet",
             "Write the paper sheet of an arena (PDF, true scale).",
             "_print_sheet",
             "print_sheet",
         ),
+        Command("print-tags", "Write the tags for the camera (PDF, true scale).", "_track", "print_tags"),
         Command("score", "Read the crossed cells from a photo of a sheet.", "_score", "score"),
         Command("track", "Track a tagged robot in a video or camera stream.", "_track", "track"),
-        Command("print-tags", "Write the tags for the camera (PDF, true scale).", "_track", "print_tags"),
-        Command("lens", "Calibrate a camera lens from a checkerboard video.", "_track", "lens"),
+        Command(
+            "export-trials",
+            "Write driven trials as JSON, Parquet, MCAP, or bags.",
+            "_export",
+            "export_trials",
+        ),
     ),
-    "Check and compare": (
+    "Advanced": (
+        Command("simulate", "Run one case file as the Jyro simulator does.", "_platforms", "simulate"),
         Command("audit-results", "Report what a small table of results can show.", "_audit", "audit_results"),
         Command("audit-distance", "Report what a behavior distance weighs.", "_audit", "audit_distance"),
-        Command("arena", "Convert an arena from or to a map of ROS.", "_arena", "arena"),
-        Command("simulate", "Run one case file as the Jyro simulator does.", "_platforms", "simulate"),
         Command("bench", "Measure the speed of this machine.", "_bench", "bench"),
+        Command("digest", "Print the hash of a study's results.", "_results", "digest"),
+        Command("lens", "Calibrate a camera lens from a checkerboard video.", "_track", "lens"),
+        Command("closing-the-gap", "Measure and shrink the gap to many robots.", "_transfer", "closing"),
     ),
 }
 COMMANDS = tuple(command for commands in SECTIONS.values() for command in commands)
@@ -112,17 +114,14 @@ def root_help(columns: int) -> str:
     width = max(NARROWEST, min(columns, WIDEST) - 2)
     lines = ["Usage: realitygap [OPTIONS] COMMAND [ARGS]...", ""]
     lines += textwrap.wrap(PURPOSE, width, initial_indent="  ", subsequent_indent="  ")
-    lines += ["", "Options:"]
-    for option, meaning in OPTIONS.items():
-        lines += _entry(f"  {option:<20}  ", meaning, width)
     for title, commands in SECTIONS.items():
         lines += ["", f"{title}:"]
         for command in commands:
             lines += _entry(f"  {command.name:<15} ", command.summary, width)
-    lines += [
-        "",
-        f"  Start with: {launcher()} demo --open",
-        "",
-        "  `realitygap COMMAND --help` describes a command.",
-    ]
+        if title == START:
+            advice = f"`{launcher()} demo --open` is a good start. `realitygap COMMAND --help` has examples."
+            lines += ["", *_entry("  ", advice, width)]
+    lines += ["", "Options:"]
+    for option, meaning in OPTIONS.items():
+        lines += _entry(f"  {option:<20}  ", meaning, width)
     return "\n".join(lines) + "\n"

@@ -63,6 +63,8 @@ html_theme_options = {
     }
     for theme, colors in token_colors().items()
 }
+html_static_path = ["static"]
+html_css_files = ["pages.css"]
 html_title = f"realitygap {__version__}"
 html_show_sphinx = False
 html_copy_source = False
@@ -146,10 +148,13 @@ def keep_units(app, doctree):
 
 
 def make_accessible(app, page, template, context, doctree):
-    """Let the keyboard scroll blocks of code and tables, and give the headings of the navigation their level."""
+    """Let the keyboard scroll code and tables, give headings their level, and show the contents on narrow screens."""
     if "body" in context:
         body = context["body"].replace("<pre>", '<pre tabindex="0">')
         context["body"] = body.replace('<div class="table-wrapper', '<div tabindex="0" class="table-wrapper')
+        if context.get("display_toc") and "hide-toc" not in (context.get("meta") or {}):
+            here = '<details class="here"><summary>On this page</summary>' + context["toc"] + "</details>"
+            context["body"] = context["body"].replace("</h1>", "</h1>" + here, 1)
     tree = context.get("furo_navigation_tree", "")
     context["furo_navigation_tree"] = tree.replace('role="heading"', 'role="heading" aria-level="2"')
 

@@ -440,6 +440,27 @@ def test_groups_of_the_sidebar_have_at_most_seven_pages():
     assert len(set(flat)) == len(flat)
 
 
+def test_doors_of_the_landing_page_and_words_of_a_search_lead_to_their_pages():
+    landing = (DOCS / "index.md").read_text("utf-8")
+    doors = re.findall(r":::\{grid-item-card\} (.*?)\n(.*?)\n:::\n", landing, re.DOTALL)
+    assert [title for title, _ in doors] == ["Teach", "Research", "Repeat the paper", "My robot"]
+    for title, door in doors:
+        links = re.findall(r"\]\(([^)]+)\)", door)
+        assert len(links) >= 3, title
+        assert all((DOCS / link).exists() for link in links), title
+    searched = {
+        "plot": "how-to/figures.md",
+        "teach": "tutorials/lesson.md",
+        "sim2real": "how-to/gap.md",
+        "setup": "how-to/install.md",
+        "pandas": "how-to/python.md",
+        "slurm": "how-to/cluster.md",
+    }
+    for word, page in searched.items():
+        keywords = re.search(r"^    keywords: (.*)$", (DOCS / page).read_text("utf-8"), re.MULTILINE)[1]
+        assert word in keywords.lower(), word
+
+
 def test_nothing_that_is_installed_asks_for_an_address():
     for path in (ROOT / "src").rglob("*.*"):
         if path.suffix in {".py", ".toml", ".css", ".jinja"}:

@@ -67,6 +67,15 @@ def fixed(value: float, digits: int) -> str:
     return f"{value:.{digits}f}" if abs(value) < 1e9 else f"{value:.4g}"
 
 
+MISSING = "–"
+"""Stands for a number or an interval that does not exist."""
+
+
+def number(value: float | None, digits: int = 3) -> str:
+    """Return a measured number, such as `0.306` or `−0.089`: a leading zero, three decimals, and a true minus."""
+    return MISSING if value is None else fixed(value, digits).replace("-", "−")
+
+
 def joined(names: Sequence[str]) -> str:
     """Return names as a list in words; of more than two, the first two and the number of the others."""
     if len(names) > 2:
@@ -128,9 +137,9 @@ def span(estimate: Estimate, digits: int = 3, *, signs: bool = False) -> str:
 def with_interval(estimate: Estimate, *, signs: bool = False) -> str:
     """Return a number with its interval in brackets, if it has one; a dash without a number."""
     if estimate.value is None:
-        return "–"
+        return MISSING
     numbers = [estimate.value, *(estimate.ends or ())]
-    texts = (signed(number) if signs else f"{number:.3f}".replace("-", "−") for number in numbers)
+    texts = (signed(each) if signs else number(each) for each in numbers)
     value, *ends = texts
     return f"{value} [{ends[0]}, {ends[1]}]" if ends else value
 

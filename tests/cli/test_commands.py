@@ -205,7 +205,7 @@ def test_option_version_prints_the_version():
 def test_run_prints_a_summary_and_where_things_are(tmp_path):
     done = realitygap("run", "paper", "--replicates", "6", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
-    for text in ("coverage-10", "novelty-50", "random-80", "SIM", ".154 .222 .166", "54 of 54 runs"):
+    for text in ("coverage-10", "novelty-50", "random-80", "SIM", "0.154 0.222", "54 of 54 runs"):
         assert text in done.stdout
     assert "results/paper" in done.stdout
     assert len(max(done.stdout.splitlines(), key=len)) <= 100

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from realitygap._wording import FEW_RUNS, fixed
+from realitygap._wording import FEW_RUNS, MISSING, number
 
 if TYPE_CHECKING:
     import polars as pl
@@ -45,12 +46,12 @@ def summary_table(summary: pl.DataFrame, title: str) -> Table:
         cells = [row["condition"], f"{row['n']:,}"]
         for measure in ("line", "ends"):
             median, q25, q75, low, high = (
-                _number(row[f"{measure}_{name}"]) for name in ("median", "q25", "q75", "low", "high")
+                number(row[f"{measure}_{name}"]) for name in ("median", "q25", "q75", "low", "high")
             )
-            is_unseen = median == "-" and row["n"]
+            is_unseen = median == MISSING and row["n"]
             cells.append("not seen" if is_unseen else _spread(median, (low, high), (q25, q75)))
         if published:
-            cells.append(" ".join(_number(value) for value in row["published"] or []))
+            cells.append(textwrap.fill(" ".join(number(value) for value in row["published"] or []), 11))
         table.add_row(*cells)
     return table
 
@@ -70,7 +71,7 @@ def task_table(summary: pl.DataFrame, title: str) -> Table:
     table.add_column("run", no_wrap=True)
     for row in summary.iter_rows(named=True):
         first, last, median, q25, q75, low, high = (
-            _number(row[name]) for name in ("first", "last", "median", "q25", "q75", "low", "high")
+            number(row[name]) for name in ("first", "last", "median", "q25", "q75", "low", "high")
         )
         spread = _spread(median, (low, high), (q25, q75))
         table.add_row(row["condition"], f"{row['n']:,}", first, last, spread)
@@ -79,9 +80,9 @@ def task_table(summary: pl.DataFrame, title: str) -> Table:
 
 def _spread(median: str, ends: tuple[str, str], middle: tuple[str, str]) -> str:
     """Return a median with its interval, and the quartiles below. Without an interval, they have their name."""
-    if ends[0] != "-":
+    if ends[0] != MISSING:
         return f"{median} [{ends[0]}, {ends[1]}]\n{middle[0]} to {middle[1]}"
-    return f"{median} {FEW_RUNS}\nQ1–Q3 {middle[0]}–{middle[1]}" if median != "-" else median
+    return f"{median} {FEW_RUNS}\nQ1–Q3 {middle[0]}–{middle[1]}" if median != MISSING else median
 
 
 def calibration_table(calibration: Calibration) -> Table:
@@ -113,14 +114,8 @@ def table_of(title: str, caption: str = "") -> Table:
         caption_justify="left",
         title_style="bold",
         box=box.SIMPLE_HEAD,
+        pad_edge=False,
     )
-
-
-def _number(value: float | None) -> str:
-    if value is None:
-        return "-"
-    text = fixed(value, 3)
-    return text.replace("0.", ".", 1) if abs(value) < 1 else text
 
 
 def held_out_table(held_out: dict[str, Any], label: str) -> Table:
@@ -135,7 +130,7 @@ def held_out_table(held_out: dict[str, Any], label: str) -> Table:
         table.add_column(name, justify="right")
     for name, error in held_out["errors"].items():
         more = [held_out["more"][key].get(name) for key in held_out["more"]]
-        table.add_row(name, f"{error:.3g}", *("-" if x is None else f"{x:.3g}" for x in more))
+        table.add_row(name, f"{error:.3g}", *(MISSING if x is None else f"{x:.3g}" for x in more))
     return table
 
 

@@ -53,14 +53,22 @@ class RunningLab:
         is_forking: Whether its child processes are forked instead of new Pythons.
         limits: Limits of its process, such as `resource.RLIMIT_NOFILE`, and their values.
         port: Where it listens; 0 for any free port.
+        has_class: Whether it has a class.
     """
 
     def __init__(
-        self, root: Path, *, is_forking: bool = True, limits: dict[int, int] | None = None, port: int = 0
+        self,
+        root: Path,
+        *,
+        is_forking: bool = True,
+        limits: dict[int, int] | None = None,
+        port: int = 0,
+        has_class: bool = False,
     ) -> None:
         self.root = root
         self._is_forking = is_forking
         self._limits = limits
+        self._has_class = has_class
         self.address = ""
         self.token = ""
         self._port = port
@@ -68,9 +76,13 @@ class RunningLab:
 
     def start(self) -> None:
         self._process, printed = begin(
-            self.root, self._port, is_forking=self._is_forking, limits=self._limits
+            self.root,
+            self._port,
+            is_forking=self._is_forking,
+            limits=self._limits,
+            has_class=self._has_class,
         )
-        self.address, _, self.token = printed.partition("?token=")
+        self.address, _, self.token = printed.replace("class/board", "").partition("?token=")
         self._port = int(self.address.rstrip("/").rpartition(":")[2])
 
     @property

@@ -105,7 +105,9 @@ async def slow_counts() -> None:
     Counts.score = score_slowly  # type: ignore[method-assign]
 
 
-def serve(root: Path, port: int, told: Connection, is_forking: bool, limits: dict[int, int]) -> None:
+def serve(
+    root: Path, port: int, told: Connection, is_forking: bool, limits: dict[int, int], has_class: bool
+) -> None:
     """Serve the lab of a folder; say its address."""
     for limit, value in limits.items():
         resource.setrlimit(limit, (value, value))
@@ -122,11 +124,16 @@ def serve(root: Path, port: int, told: Connection, is_forking: bool, limits: dic
             told.send(line.split()[1])
 
     with contextlib.suppress(KeyboardInterrupt):  # as the command does
-        open_lab(root, port=port, show=False, tell=tell)
+        open_lab(root, port=port, host="127.0.0.1", show=False, tell=tell, classroom=has_class)
 
 
 def begin(
-    root: Path, port: int, *, is_forking: bool = True, limits: dict[int, int] | None = None
+    root: Path,
+    port: int,
+    *,
+    is_forking: bool = True,
+    limits: dict[int, int] | None = None,
+    has_class: bool = False,
 ) -> tuple[BaseProcess, str]:
     """Begin to serve; the process, and its address.
 
@@ -135,10 +142,11 @@ def begin(
         port: Of the lab.
         is_forking: Whether the lab's child processes are forked; a new Python takes seconds of a processor.
         limits: Limits of the process, such as `resource.RLIMIT_NOFILE`, and their values.
+        has_class: Whether the lab has a class.
     """
     context = fork_context()
     here, there = context.Pipe(duplex=False)
-    process = context.Process(target=serve, args=(root, port, there, is_forking, limits or {}))
+    process = context.Process(target=serve, args=(root, port, there, is_forking, limits or {}, has_class))
     process.start()
     there.close()
     try:

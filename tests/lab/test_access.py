@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from realitygap.lab._access import FOREIGN_HEADERS, LARGEST_BODY, Access
+from realitygap.lab._access import CLASS_FILES, CLASS_SOCKET, FOREIGN_HEADERS, LARGEST_BODY, Access
 
 COOKIE = "realitygap_lab_8321"
 OWN = {"host": "127.0.0.1:8321", "cookie": f"{COOKIE}=secret"}
@@ -151,3 +151,40 @@ def test_files_of_a_results_folder_are_served_in_a_sandbox():
     _, headers, _ = asked(access(), path="/foreign", headers=OWN)
     assert headers[b"content-security-policy"].startswith(b"sandbox allow-scripts; default-src 'none'")
     assert headers[b"x-content-type-options"] == b"nosniff"
+
+
+STRANGER = {"host": "127.0.0.1:8321"}
+
+
+def with_class() -> Access:
+    return Access(page, "secret", port=8321, is_local=True, has_class=True)
+
+
+def test_student_needs_no_token_for_the_page_of_the_class_and_its_websocket():
+    assert all(asked(with_class(), path=path, headers=STRANGER)[0] == 200 for path in CLASS_FILES)
+    assert asked(with_class(), type="websocket", path=CLASS_SOCKET, headers=STRANGER)[0] == 101
+
+
+@pytest.mark.parametrize(
+    "path", ["/", "/class/board", "/class/", "/class/../", "/robot", "/stop", "/lab-files/frame.js"]
+)
+def test_student_can_open_nothing_else(path):
+    assert asked(with_class(), path=path, headers=STRANGER)[0] == 403
+    assert asked(with_class(), path=path, method="POST", headers=STRANGER)[0] == 403
+    assert asked(with_class(), type="websocket", path=path, headers=STRANGER)[0] == 0
+
+
+def test_student_cannot_post_to_the_page_of_the_class():
+    assert asked(with_class(), path="/class", method="POST", headers=STRANGER)[0] == 403
+
+
+def test_page_of_another_site_cannot_open_the_websocket_of_the_class():
+    foreign = {**STRANGER, "origin": "http://evil.example"}
+    assert asked(with_class(), type="websocket", path=CLASS_SOCKET, headers=foreign)[0] == 0
+    other_host = {"host": "evil.example:8321"}
+    assert asked(with_class(), type="websocket", path=CLASS_SOCKET, headers=other_host)[0] == 0
+
+
+def test_lab_without_a_class_has_no_open_page():
+    assert all(asked(access(), path=path, headers=STRANGER)[0] == 403 for path in CLASS_FILES)
+    assert asked(access(), type="websocket", path=CLASS_SOCKET, headers=STRANGER)[0] == 0

@@ -18,12 +18,20 @@ def lab(
         int, typer.Option(min=0, max=65535, metavar="N", help="Port to answer at; 0 takes a free port.")
     ] = 8321,
     host: Annotated[
-        str,
+        str | None,
         typer.Option(
             metavar="H",
-            help="Address to answer at. 0.0.0.0 also answers phones in the same network and prints a QR code.",
+            help="Address to answer at. 0.0.0.0 also answers phones in the same network and prints a QR code. "
+            "[default: 127.0.0.1; with --class 0.0.0.0]",
         ),
-    ] = "127.0.0.1",
+    ] = None,
+    classroom: Annotated[
+        bool,
+        typer.Option(
+            "--class",
+            help="Add a class: students scan a code and drive emulated robots from their phones, without the token.",
+        ),
+    ] = False,
     allow_code: Annotated[
         bool,
         typer.Option(
@@ -44,9 +52,19 @@ def lab(
 
     Example: realitygap lab results --host 0.0.0.0
 
+    Example: realitygap lab class --class
+
     In Python: realitygap.lab.open_lab("results")
     """
-    realitygap.lab.open_lab(folder, port=port, host=host, show=not no_open, tell=_say, allow_code=allow_code)
+    realitygap.lab.open_lab(
+        folder,
+        port=port,
+        host=host,
+        show=not no_open,
+        tell=_say,
+        allow_code=allow_code,
+        classroom=classroom,
+    )
 
 
 def _say(line: str) -> None:

@@ -23,6 +23,13 @@ LARGEST_BODY = 32 * 1024 * 1024
 _TALK = "/_nicegui_ws/"
 """Address of the websockets of pages. Other transports at this address are refused, because they would pass
 unchecked."""
+CLASS_SOCKET = "/class/ws"
+"""Address of the websockets of students, which need no token; their messages have a check of their own."""
+CLASS_FILES = frozenset(
+    {"/class", "/class/class.css", "/class/class.js", "/class/drive_pad.js", "/lab-player/player.css"}
+    | {"/lab-player/player.js", "/lab-tokens/tokens.css"}
+)
+"""Addresses that a student can read without the token."""
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
 
 _POLICY = (
@@ -79,10 +86,12 @@ class Access:
             ports, and two labs must not overwrite each other's.
         is_local: Whether the lab answers this machine alone. It then refuses all other host names, so that no page
             from elsewhere can pose as the lab's by pointing its own name here.
+        has_class: Whether students can open the page of the class, and nothing else, without the token.
     """
 
-    def __init__(self, app: Any, token: str, *, port: int, is_local: bool) -> None:
+    def __init__(self, app: Any, token: str, *, port: int, is_local: bool, has_class: bool = False) -> None:
         self.app = app
+        self._has_class = has_class
         self.cookie = f"realitygap_lab_{port}"
         self._token = token
         self._is_local = is_local
@@ -92,7 +101,15 @@ class Access:
         if scope["type"] == "http":
             await self._http(scope, receive, send)
         elif scope["type"] == "websocket":
-            if self._is_known_host(scope) and self._has_token(scope) and self._is_own(scope):
+            if (
+                self._has_class
+                and scope["path"] == CLASS_SOCKET
+                and self._is_known_host(scope)
+                and self._is_own(scope)
+            ):
+                _note_shown(scope)
+                await self.app(scope, receive, send)
+            elif self._is_known_host(scope) and self._has_token(scope) and self._is_own(scope):
                 _note_shown(scope)
                 await self.app(scope, checked(receive, send), send)
             else:
@@ -111,7 +128,7 @@ class Access:
         if given is not None and _same(given, self._token):
             _note_shown(scope)
             await self._let_in(scope, send)
-        elif not self._has_token(scope):
+        elif not self._has_token(scope) and not self._is_of_class(scope):
             await self._stop(scope, send, is_wrong=given is not None)
         else:
             _note_shown(scope)
@@ -145,6 +162,9 @@ class Access:
 
     def _has_token(self, scope: Scope) -> bool:
         return any(_same(value, self._token) for value in _cookies(scope, self.cookie))
+
+    def _is_of_class(self, scope: Scope) -> bool:
+        return self._has_class and scope["method"] in ("GET", "HEAD") and scope["path"] in CLASS_FILES
 
     def _given_token(self, scope: Scope) -> str | None:
         """The token in the address, or in an address that was pasted in its place; None if there is none."""

@@ -278,9 +278,8 @@ class _Driver:
 
     def _drive(self, wish: messages.Drive) -> None:
         """Set the speeds of the wheels; the listening thread calls this."""
-        move, turn = _share(wish.move), _share(wish.turn)
         with self._lock:
-            self._wheels = (_share(move - turn), _share(move + turn))
+            self._wheels = wheels_of(wish.move, wish.turn)
             self._told_s = time.monotonic()
 
     def _stop(self, _wish: messages.Release | messages.Stop | None = None) -> None:
@@ -353,6 +352,12 @@ def _png(robot: Any) -> str:
     data = io.BytesIO()
     Image.fromarray(robot.picture()).save(data, "PNG")
     return base64.b64encode(data.getvalue()).decode()
+
+
+def wheels_of(move: float, turn: float) -> tuple[float, float]:
+    """Return the speeds of the left and the right wheel, -1..1, for a position of the drive pad."""
+    move, turn = _share(move), _share(turn)
+    return _share(move - turn), _share(move + turn)
 
 
 def _share(part: float) -> float:

@@ -13,6 +13,7 @@ from realitygap.records import existing_trials, refuse_links
 
 from ._calibration import CalibrationJob, calibration_mistakes
 from ._checks import Checks
+from ._class import Classroom
 from ._control import RobotControl, Visitor
 from ._counts import Counts
 from ._drawing import Drawer
@@ -49,6 +50,7 @@ class Lab:
         calibration: The calibration that goes on, or was last; None before.
         videos: The video of each study that is tracked, or was last, by the study's name.
         lives: The robot that a network of each study drives for those who look, by the study's name.
+        classroom: The class; None if the lab has none.
         version: Counts changes, so that a page knows when to look.
     """
 
@@ -69,6 +71,7 @@ class Lab:
         self._photos: dict[str, Photos] = {}
         self.videos: dict[str, VideoJob] = {}
         self.lives: dict[str, LiveJob] = {}
+        self.classroom: Classroom | None = None
 
     def changed(self) -> None:
         """Something has changed; may be called from any thread."""
@@ -290,6 +293,8 @@ class Lab:
 
     def close(self) -> None:
         """End all processes, robots first."""
+        if self.classroom is not None:
+            self.classroom.close()
         with self._lock:
             single: list[Job | None] = [self.gap, self.calibration]
             jobs = [

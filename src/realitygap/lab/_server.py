@@ -39,10 +39,11 @@ def open_lab(
     folder: str | Path = "results",
     *,
     port: int = DEFAULT_PORT,
-    host: str = "127.0.0.1",
+    host: str | None = None,
     show: bool = True,
     tell: Callable[[str], None] = print,
     allow_code: bool = False,
+    classroom: bool = False,
 ) -> None:
     """Serve the page of the studies in a folder until Ctrl-C.
 
@@ -50,10 +51,11 @@ def open_lab(
         folder: Of the studies' folders; made where it is not there. Nothing outside it is read or written.
         port: 0 to 65535; 0 takes one that is free.
         host: Address to answer at. Every visitor needs the token, which is printed with the address, also on this
-            machine's loopback: any account of this machine can reach it.
+            machine's loopback: any account of this machine can reach it. Default: 127.0.0.1; with a class 0.0.0.0.
         show: Whether to open the page in the browser.
         tell: Takes the lines for whoever started it.
         allow_code: Whether studies may run Python files of tasks, which are in the folder.
+        classroom: Whether there is a class: students drive emulated robots from their phones, without the token.
 
     Raises:
         StudyError: The folder cannot be made, or is the folder of one study.
@@ -61,6 +63,7 @@ def open_lab(
         ValueError: A port that there is not.
     """
     from_extra("nicegui", "lab")
+    host = host or ("0.0.0.0" if classroom else "127.0.0.1")
     port = whole_number("port", port, 0, 65535)
     root = _root(Path(folder))
     listener = _listen(host, port)
@@ -69,10 +72,13 @@ def open_lab(
         addresses = [_address(name, listener, token) for name in _names(host)]
         is_local = host in LOOPBACK
         port = listener.getsockname()[1]
+        if classroom:
+            addresses = [address.replace("/?", "/class/board?") for address in addresses]
+        students = addresses[0].partition("/board")[0] if classroom else ""
         lab, server = _prepare(
-            root, token, port, is_local=is_local, allow_code=allow_code
+            root, token, port, is_local=is_local, allow_code=allow_code, students=students
         )  # takes some seconds
-        _tell_addresses(root, addresses, is_local, tell)
+        _tell_addresses(root, addresses, is_local, tell, students)
         if show:
             entry = while_served.enter_context(_entry(addresses[0], root))
             threading.Timer(0.5, _show, (entry, tell)).start()
@@ -137,13 +143,17 @@ def _address(name: str, listener: socket.socket, token: str) -> str:
     return f"{SCHEME}://{shown}:{listener.getsockname()[1]}/?token={token}"
 
 
-def _tell_addresses(root: Path, addresses: list[str], is_local: bool, tell: Callable[[str], None]) -> None:
+def _tell_addresses(
+    root: Path, addresses: list[str], is_local: bool, tell: Callable[[str], None], students: str
+) -> None:
     tell(f"The lab shows the studies in {root}. Ctrl-C ends it.")
     for address in addresses:
         tell(f"Open {address}")
-        if not is_local:
+        if not is_local and not students:
             tell(_qr_code(address))
-    tell("Everyone who has this address can start studies and drive the robot. Keep it secret.")
+    if students:
+        tell(f"Students open {students} without the token. The page of the class shows its code.")
+    tell("Everyone who has the address with the token can start studies and drive the robot. Keep it secret.")
 
 
 def _qr_code(text: str) -> str:
@@ -154,18 +164,23 @@ def _qr_code(text: str) -> str:
     return drawn.getvalue().rstrip("\n")
 
 
-def _prepare(root: Path, token: str, port: int, *, is_local: bool, allow_code: bool) -> tuple[Any, Any]:
+def _prepare(
+    root: Path, token: str, port: int, *, is_local: bool, allow_code: bool, students: str
+) -> tuple[Any, Any]:
     """The lab, and what will serve it."""
     import uvicorn
     from fastapi import FastAPI
     from nicegui import app as nicegui_app
     from nicegui import run, ui
 
+    from ._class import Classroom
     from ._connections import Strangers, guarded_protocol, most_strangers
     from ._lab import Lab
     from .pages import add_pages
 
     lab = Lab(root, allow_code=allow_code)
+    if students:
+        lab.classroom = Classroom(root, students)
     run.thread_pool = ThreadPoolExecutor(THREADS)
     nicegui_app.config.quasar_config["loadingBar"]["skipHijack"] = (
         True  # pages show by themselves how far an upload is
@@ -188,7 +203,7 @@ def _prepare(root: Path, token: str, port: int, *, is_local: bool, allow_code: b
         logging.getLogger(name).addFilter(_in_one_line)
     most = most_strangers()
     config = uvicorn.Config(
-        Access(app, token, port=port, is_local=is_local),
+        Access(app, token, port=port, is_local=is_local, has_class=bool(students)),
         http=guarded_protocol(Strangers(most)),
         backlog=most,  # so many are accepted together, before the first of them can be closed
         log_level="warning",

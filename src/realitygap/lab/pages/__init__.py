@@ -9,6 +9,7 @@ from nicegui import app
 from realitygap.lab._lab import Lab
 
 from ._calibrate import add_calibrate
+from ._class import add_class
 from ._control import add_stop
 from ._error_pages import add_error_pages
 from ._gap import add_gap
@@ -39,6 +40,7 @@ def add_pages(lab: Lab) -> None:
         add_gap,
         add_calibrate,
         add_saved,
+        add_class,
     )
     for add in (*pages, add_stop, add_error_pages):
         add(lab)

@@ -57,7 +57,8 @@ def framed(
     with ui.header(elevated=False).classes("lab-header"):
         ui.link("realitygap lab", "/").classes("lab-brand")
         with ui.element("nav").props('aria-label="Pages"'):
-            for path, name in _PAGES.items():
+            pages = _PAGES if lab.classroom is None else {**_PAGES, "/class/board": "Class"}
+            for path, name in pages.items():
                 link = ui.link(name, path)
                 if path == here:
                     link.props('aria-current="page"')

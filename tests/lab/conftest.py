@@ -225,3 +225,20 @@ def open_fold(page, title) -> None:
             return
         fold.locator(".lab-fold").click()
         page.wait_for_timeout(1000)
+
+
+def enter(page, label, text) -> None:
+    """Enter a text in a field; if the field offers texts, choose it, or type one that is not offered."""
+    field = page.get_by_label(label, exact=True).first
+    picker = page.locator(".lab-picker", has=field).first
+    field.wait_for()
+    if picker.count() == 0:
+        field.fill(text)
+        return
+    select = picker.locator("select")
+    offered = select.evaluate("it => [...it.options].map(({value}) => value)")
+    if text in offered:
+        select.select_option(text)
+        return
+    select.select_option(index=len(offered) - 1)
+    picker.locator("input").fill(text)

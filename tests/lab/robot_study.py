@@ -10,7 +10,7 @@ from typing import Any
 from realitygap.records import LEDGER_NAME, Ledger, ResultsFolder
 from realitygap.study import parse_study
 
-from .conftest import playwright
+from .conftest import enter, playwright
 
 CONNECT = re.compile("Connect robot|Reconnect")
 FAST = "emulator://s2?fluke=2&speed=off"
@@ -49,7 +49,7 @@ def begin_sitting(page: Any, port: str = FAST, who: str = "anna") -> None:
     name = page.get_by_label("Your name")
     if name.input_value() != who:  # then it is not shown any more
         name.fill(who)
-    page.get_by_label("Port", exact=True).fill(port)
+    enter(page, "Port", port)
     page.get_by_role("button", name=CONNECT).click()
 
 

@@ -10,7 +10,7 @@ from realitygap.emulator import serve_tcp
 from realitygap.families.scribbler.emulator import Emulator
 from realitygap.study import parse_study, run_study
 
-from .conftest import open_advanced, open_fold
+from .conftest import enter, open_advanced, open_fold
 from .page_checks import faults, keyboard, states, watch_states
 from .robot_study import await_trial, begin_sitting, make_study
 from .sheets import drive_sheet, photo_of
@@ -52,11 +52,11 @@ def test_pages_without_a_study_are_accessible(lab, look):
 
 def test_a_gap_with_a_mistake_while_it_is_measured_and_its_result(lab, look):
     page = look("gap")
-    page.get_by_label("Simulator").fill("sim:/etc/passwd")
+    enter(page, "Simulator", "sim:/etc/passwd")
     page.get_by_role("button", name="Measure the gap").click()
     page.locator(".lab-field .lab-problem", has_text="outside").wait_for()
     assert faults(page, lab.root) == []
-    page.get_by_label("Simulator").fill("sim")
+    enter(page, "Simulator", "sim")
     page.get_by_label("Trials per controller").fill("3")
     page.get_by_role("button", name="Measure the gap").click()
     page.get_by_role("button", name="Stop", exact=True).wait_for()

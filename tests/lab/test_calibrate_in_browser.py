@@ -14,7 +14,7 @@ from realitygap.records import read_observations
 from realitygap.study._calibrate.kinds import KINDS
 from realitygap.world import load_arena, load_robot, read_calibration
 
-from .conftest import FOR_CHILDREN, PHONE
+from .conftest import FOR_CHILDREN, PHONE, enter
 
 pytestmark = pytest.mark.slow
 
@@ -35,7 +35,7 @@ if "realitygap.lab._work" in sys.orig_argv:
 
 def begin(page, kind: str = "sensors", **fields: str) -> None:
     for label, value in fields.items():
-        page.get_by_label(label, exact=True).first.fill(value)
+        enter(page, label, value)
     page.get_by_role("button", name="Next", exact=True).click()
     page.locator(f'[data-kind="{kind}"]').click()
     page.get_by_role("button", name="Calibrate", exact=True).click()
@@ -159,7 +159,7 @@ def test_no_calibration_is_written_or_read_outside_the_folder(lab, visit):
         ({"Name": "mine", "Robot": "twin:/etc/passwd"}, "would be a file outside"),
     ):
         for label, value in fields.items():
-            page.get_by_label(label, exact=True).first.fill(value)
+            enter(page, label, value)
         page.get_by_role("button", name="Next", exact=True).click()
         page.get_by_text(message).last.wait_for()
     assert list(lab.root.iterdir()) == []

@@ -6,7 +6,7 @@ import pytest
 
 from realitygap.study import parse_study, run_study
 
-from .conftest import expect, open_advanced, open_fold
+from .conftest import enter, expect, open_advanced, open_fold
 from .robot_study import make_study
 from .sheets import drive_paths
 from .test_live_in_browser import TEXT
@@ -63,7 +63,7 @@ def test_all_mistakes_are_shown_at_once_and_each_at_its_field(lab, visit):
             page.get_by_role("tab", name="Replay").click()
         open_advanced(page, page.get_by_label(list(fields)[-1], exact=True).first)
         for label, (text, _) in fields.items():
-            page.get_by_label(label, exact=True).first.fill(text)
+            enter(page, label, text)
         page.get_by_role("button", name=button, exact=True).click()
         for label, (_, message) in fields.items():
             field = page.locator(".lab-field", has=page.get_by_label(label, exact=True)).first
@@ -74,7 +74,7 @@ def test_all_mistakes_are_shown_at_once_and_each_at_its_field(lab, visit):
 
 def test_no_message_moves_a_button_while_it_is_pressed(visit):
     page = visit("gap")
-    page.get_by_label("Simulator", exact=True).fill("jyrro")
+    enter(page, "Simulator", "jyrro")
     button = page.get_by_role("button", name="Measure the gap", exact=True)
     button.scroll_into_view_if_needed()
     box = button.bounding_box()
@@ -98,7 +98,7 @@ def test_a_video_and_its_tags_are_refused_together(lab, visit):
     page = visit("study/by-robot/trials")
     open_fold(page, "Score from photo or video")
     page.get_by_text("Score from a video").click()
-    page.get_by_label("Video", exact=True).fill("none.mp4")
+    enter(page, "Video", "none.mp4")
     page.get_by_label("Tags", exact=True).fill("lens=/etc/passwd")
     page.get_by_role("button", name="Track video").click()
     expect(page.locator(".lab-summary:visible a")).to_have_count(2)

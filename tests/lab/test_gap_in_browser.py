@@ -9,7 +9,7 @@ import pytest
 from realitygap.lab._gap import rounds
 from realitygap.records import read_observations
 
-from .conftest import expect, open_advanced
+from .conftest import enter, expect, open_advanced
 
 pytestmark = pytest.mark.slow
 
@@ -18,7 +18,7 @@ def measure(page, **fields: str) -> None:
     if "Name" in fields:
         open_advanced(page, page.get_by_label("Name", exact=True))
     for label, value in fields.items():
-        page.get_by_label(re.compile(f"^{label.replace('_', ' ')}")).first.fill(value)
+        enter(page, label.replace("_", " "), value)
     page.get_by_role("button", name="Measure the gap").click()
 
 

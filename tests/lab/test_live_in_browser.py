@@ -7,7 +7,7 @@ import pytest
 from realitygap.robots.twin import sample_twin
 from realitygap.study import parse_study, run_study
 
-from .conftest import PHONE, expect
+from .conftest import PHONE, enter, expect
 
 pytestmark = pytest.mark.slow
 
@@ -48,7 +48,7 @@ def test_a_network_drives_live_and_can_be_played_when_it_is_stopped(lab, visit):
     page = visit("study/seen", size=PHONE)
     page.get_by_role("tab", name="Replay").click()
     for platform, label in PLATFORMS.items():
-        page.get_by_label("Platform", exact=True).fill(platform)
+        enter(page, "Platform", platform)
         page.get_by_role("button", name="Drive live").click()
         live = page.locator(".rg-live")
         expect(live.locator(".rg-label")).to_have_text(label)

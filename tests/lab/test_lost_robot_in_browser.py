@@ -11,7 +11,7 @@ import pytest
 
 from realitygap.records import read_observations, those_that_count
 
-from .conftest import open_advanced, open_fold
+from .conftest import enter, open_advanced, open_fold
 from .robot_study import CONNECT, ledger_of, make_study, pass_preflight, start_trial
 from .test_calibrate_in_browser import begin as calibrate
 
@@ -82,7 +82,7 @@ def test_robot_lost_in_a_trial_of_a_study_is_shown_and_the_study_resumes(lab, vi
     robot.start(speed=2)
     page = visit("study/by-robot/trials")
     page.get_by_label("Your name").fill("anna")
-    page.get_by_label("Port", exact=True).fill(robot.port)
+    enter(page, "Port", robot.port)
     open_advanced(page, page.get_by_label("Witness"))
     page.get_by_label("Witness").fill(robot.witness)
     page.get_by_role("button", name=CONNECT).click()
@@ -121,7 +121,7 @@ def test_robot_lost_in_a_trial_of_a_study_is_shown_and_the_study_resumes(lab, vi
 def test_robot_lost_in_a_gap_keeps_its_trials_and_the_gap_resumes(lab, visit, robot):
     robot.start(speed=20)
     page = visit("gap")
-    page.get_by_label("Target").fill(f"scribbler:{robot.port}")
+    enter(page, "Target", f"scribbler:{robot.port}")
     for label in ("Controllers", "Trials per controller"):
         page.get_by_label(label, exact=True).fill("2")
     open_advanced(page, page.get_by_label("Witness"))

@@ -13,7 +13,7 @@ import pytest
 from realitygap.emulator import connect_witness
 from realitygap.study import parse_study, run_study
 
-from .conftest import PHONE, expect, open_advanced
+from .conftest import PHONE, enter, expect, open_advanced
 from .page_checks import covered
 from .test_robot_in_browser import hold
 from .test_studies_in_browser import TINY, start
@@ -251,7 +251,7 @@ def test_escape_stops_from_any_page_whatever_has_the_focus(visit, emulated, moto
 
 def test_page_without_the_lab_shows_the_stop_and_disables_everything_else(visit):
     page = visit("gap", forgive=["net::ERR", "WebSocket", "reloading", "Failed to load"])
-    page.get_by_label("Target").fill("twin:mine.toml")
+    enter(page, "Target", "twin:mine.toml")
     assert not page.locator(".lab-stop").is_visible()
     page.context.set_offline(True)
     page.evaluate("window.socket.io.engine.close()")
@@ -263,5 +263,5 @@ def test_page_without_the_lab_shows_the_stop_and_disables_everything_else(visit)
     page.context.set_offline(False)
     page.get_by_text("Reconnecting…").wait_for(state="hidden")
     page.locator(".lab-stop").wait_for(state="hidden")
-    expect(page.get_by_label("Target")).to_have_value("twin:mine.toml")
+    expect(page.get_by_label("Target", exact=True)).to_have_value("twin:mine.toml")
     expect(page.get_by_text("No gaps measured yet.")).to_be_visible()

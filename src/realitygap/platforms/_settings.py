@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any, ClassVar, Self
 
 from pydantic import Field
@@ -82,6 +83,11 @@ class PlatformSettings(Settings):
             ValueError: There is no such file, or it cannot be used.
         """
         return cls(**({cls.rest_setting: rest} if rest else {}))
+
+    @classmethod
+    def kind_of_file(cls, path: Path) -> str:
+        """Return the kind of a file that `NAME:FILE` can name, such as twin; empty for other files."""
+        return ""
 
     @property
     def spec(self) -> str:

@@ -6,18 +6,19 @@ import re
 from functools import partial
 from typing import Any
 
-from nicegui import ui
+from nicegui import run, ui
 from starlette.requests import Request
 
 from realitygap.drawing import Ink, themed_color
 from realitygap.lab import _messages as messages
 from realitygap.lab._calibration import CalibrationJob, calibration_mistakes
+from realitygap.lab._choices import Choices, model_choices, platform_choices
 from realitygap.lab._control import Visitor
 from realitygap.lab._gap import PLACING_S
 from realitygap.lab._lab import Lab
 from realitygap.orders import CalibrateOrder
-from realitygap.platforms import emulated_robots
-from realitygap.robot_families import default_family, port_platforms
+from realitygap.robot_families import default_family
+from realitygap.robots import list_ports, split_port
 from realitygap.world import Fitted, load_arena
 
 from ._control import show_holder
@@ -61,14 +62,26 @@ def add_calibrate(lab: Lab) -> None:
     """Add the page."""
 
     @ui.page("/calibrate", response_timeout=30)
-    def calibrate(request: Request) -> None:
+    async def calibrate(request: Request) -> None:
+        choices = await run.io_bound(_choices_of, lab) or {}
         with framed(lab, "Calibrate", "/calibrate"):
-            _Page(lab, visitor_of(request)).show()
+            _Page(lab, visitor_of(request), choices).show()
+
+
+def _choices_of(lab: Lab) -> dict[str, Choices]:
+    """Return what the fields of the form offer, by field."""
+    ports = [guess._replace(port=_platform_at(guess.port)) for guess in list_ports()]
+    return {"robot": platform_choices(lab.root, "robot", ports), "base": model_choices(lab.root)}
+
+
+def _platform_at(port: str) -> str:
+    """Return the platform of the robot at a port."""
+    return port if split_port(port)[0] else default_family().named(port)
 
 
 class _Page:
-    def __init__(self, lab: Lab, visitor: Visitor) -> None:
-        self._lab = lab
+    def __init__(self, lab: Lab, visitor: Visitor, choices: dict[str, Choices]) -> None:
+        self._lab, self._choices = lab, choices
         self._mistakes = partial(calibration_mistakes, lab.root)
         self._visitor = visitor
         self._chart: ui.echart | None = None
@@ -173,10 +186,9 @@ class _Page:
             form.text_of(
                 _FIELDS["robot"],
                 "sim",
-                ["sim", *emulated_robots()],
+                self._choices.get("robot"),
                 is_needed=True,
-                explanation=f"{port_platforms()}, twin:FILE, sim, or sim:FILE. Emulated robots: "
-                f"{', '.join(emulated_robots())}.",
+                explanation="A robot at a port needs a person next to it.",
             )
             form.text("name", "Name", "my-robot", parse=needed, explanation="Name of the calibration file.")
             ui.button("Next", on_click=self._go_to_kinds).props("unelevated no-caps")
@@ -195,7 +207,7 @@ class _Page:
             with ui.expansion("Advanced").classes("lab-expansion"):
                 for key, field in _FIELDS.items():
                     if key != "robot":
-                        form.field_of(field)
+                        form.field_of(field, self._choices.get(key))
 
         async def start() -> None:
             if not await form.submit(begin, self._mistakes) and any(

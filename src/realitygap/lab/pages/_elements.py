@@ -10,10 +10,12 @@ from typing import Any, TypeVar
 
 from nicegui import events
 from nicegui.element import Element
+from nicegui.elements.mixins.value_element import ValueElement
 from pydantic import ConfigDict, TypeAdapter, ValidationError, with_config
 from typing_extensions import TypedDict
 
 from realitygap.drawing import hex_of, line_pen, themed_color
+from realitygap.lab._choices import Choices
 from realitygap.lab._messages import Curve, ScorePairs
 from realitygap.playback import PackedScene, PackedTrial
 from realitygap.world import Arena
@@ -183,6 +185,28 @@ def ink_of(pen: str) -> str:
         return hex_of(name)
     except (KeyError, ValueError):
         return "#000000"
+
+
+class Picker(ValueElement[str], component="picker.js"):
+    """A choice from groups of texts; the last entry is for a text that the visitor types.
+
+    Args:
+        choices: The groups; empty ones are left out.
+        value: Initial text.
+        name: Name of the field.
+        hint: Shown in the line for a text of one's own while that is empty.
+    """
+
+    LOOPBACK = False
+
+    def __init__(self, choices: Choices, value: str, name: str, hint: str = "") -> None:
+        super().__init__(value=value)
+        groups = [[title, list(words.items())] for title, words in choices.items() if words]
+        self._props |= {"groups": groups, "name": name, "hint": hint}
+
+    def _event_args_to_value(self, e: events.GenericEventArguments) -> str:
+        """Take a text only: some other program may send something else."""
+        return e.args if isinstance(e.args, str) else ""
 
 
 class Curves(Element, component="curves.js"):

@@ -11,10 +11,12 @@ from typing import Any
 from nicegui import run, ui
 from nicegui.elements.mixins.value_element import ValueElement
 
+from realitygap.lab._choices import Choices
 from realitygap.lab._mistakes import FormError, Mistakes
 from realitygap.orders import Limits, OrderField
 from realitygap.settings import shown
 
+from ._elements import Picker
 from ._notices import WRONG
 
 FindMistakes = Callable[[dict[str, Any]], Mistakes]
@@ -75,18 +77,18 @@ class Form:
         value: str = "",
         *,
         explanation: str = "",
-        options: Sequence[str] = (),
+        choices: Choices | None = None,
         placeholder: str = "",
         parse: Callable[[str], Any] = str,
-    ) -> ui.input:
-        """Add a line of text.
+    ) -> ValueElement[Any]:
+        """Add a line of text, or a choice of texts.
 
         Args:
             key: Key of the field.
             label: Label, above the field.
             value: Initial text.
             explanation: Explanation, below the field.
-            options: Texts that are proposed.
+            choices: Texts to choose from; the visitor can also type another one.
             placeholder: Text that is shown while the field is empty, such as the default.
             parse: Returns the value of the text; raises a ValueError if it has none, as `needed` does for an empty one.
         """
@@ -96,7 +98,11 @@ class Form:
             return parse(entered)
 
         with self._around(label):
-            element = ui.input(value=value, autocomplete=list(options) or None, placeholder=placeholder)
+            element: ValueElement[Any] = (
+                ui.input(value=value, placeholder=placeholder)
+                if choices is None
+                else Picker(choices, value, label, placeholder)
+            )
             self._add(key, label, element, explanation, check)
         return element
 
@@ -164,8 +170,8 @@ class Form:
 
     # fields of an order
 
-    def field_of(self, field: OrderField) -> None:
-        """Add a field of an order, as its type needs."""
+    def field_of(self, field: OrderField, choices: Choices | None = None) -> None:
+        """Add a field of an order, as its type needs; `choices` are those of a text."""
         if field.kind is bool:
             self.choice(field.name, field.face.label, {False: "No", True: "Yes"}, field.default, field.help)
         elif field.choices:
@@ -176,23 +182,23 @@ class Form:
         elif field.kind in (int, float):
             self.number_of(field)
         else:
-            self.text_of(field)
+            self.text_of(field, choices=choices)
 
     def text_of(
         self,
         field: OrderField,
         value: str = "",
-        options: Sequence[str] = (),
+        choices: Choices | None = None,
         *,
         explanation: str = "",
         is_needed: bool = False,
-    ) -> ui.input:
+    ) -> ValueElement[Any]:
         """Add a text of an order.
 
         Args:
             field: The field.
             value: Initial text. Default: that of the field.
-            options: Texts that are proposed.
+            choices: Texts to choose from; the visitor can also type another one.
             explanation: Explanation, below the field. Default: help of the field.
             is_needed: Whether the field must not be empty, although the order allows that.
         """
@@ -201,7 +207,7 @@ class Form:
             field.face.label,
             value or field.default or "",
             explanation=explanation or field.help,
-            options=options,
+            choices=_with_default(field, choices),
             placeholder=field.face.default_is,
             parse=needed if is_needed or not field.is_optional else lambda text: text or None,
         )
@@ -347,6 +353,13 @@ class Form:
         field.input.props["no-error-icon"] = True
         field.input.props["hide-bottom-space"] = True
         field.input.update()
+
+
+def _with_default(field: OrderField, choices: Choices | None) -> Choices | None:
+    """Return choices with that of the default, if the field may be empty."""
+    if choices is None or not field.is_optional:
+        return choices
+    return {"Default": {"": field.face.default_is.capitalize() or "None"}} | dict(choices)
 
 
 def _control(element: ui.element) -> str:

@@ -13,13 +13,12 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, PlainTextResponse, Response
 
 from realitygap.lab._access import FOREIGN_HEADERS
+from realitygap.lab._choices import Choices, controller_choices, platform_choices
 from realitygap.lab._control import Visitor
 from realitygap.lab._gap import GapJob, gap_mistakes, plan_words
 from realitygap.lab._lab import Lab
 from realitygap.lab._messages import ScorePairs
 from realitygap.orders import GapOrder
-from realitygap.platforms import emulated_robots
-from realitygap.robot_families import default_family
 
 from ._elements import Scatter
 from ._fields import Form, needed
@@ -39,9 +38,11 @@ def add_gap(lab: Lab) -> None:
     @ui.page("/gap", response_timeout=30)
     async def gap(request: Request) -> None:
         reports = await run.io_bound(lab.gap_reports) or []
+        choices = await run.io_bound(_choices_of, lab) or {}
         sim = request.query_params.get("sim", "")
         with framed(lab, "Gap", "/gap", is_wide=True):
-            _Page(lab, visitor_of(request), reports, sim if re.fullmatch(CALIBRATED, sim) else "sim").show()
+            sim = sim if re.fullmatch(CALIBRATED, sim) else "sim"
+            _Page(lab, visitor_of(request), reports, sim, choices).show()
 
     @app.get("/gaps/{name}")
     def report(name: str) -> Response:
@@ -50,6 +51,15 @@ def add_gap(lab: Lab) -> None:
             return PlainTextResponse("There is no such report.", 404)
         headers = {**FOREIGN_HEADERS, "cache-control": "no-store"}
         return FileResponse(path, media_type="text/html", headers=headers)
+
+
+def _choices_of(lab: Lab) -> dict[str, Choices]:
+    """Return what the fields of the form offer, by field."""
+    return {
+        "sim": platform_choices(lab.root, "simulator"),
+        "target": platform_choices(lab.root, "target"),
+        "controllers": controller_choices(lab.studies.names()),
+    }
 
 
 @dataclass(frozen=True)
@@ -70,8 +80,11 @@ class _Work:
 
 
 class _Page:
-    def __init__(self, lab: Lab, visitor: Visitor, reports: list[str], sim: str) -> None:
+    def __init__(
+        self, lab: Lab, visitor: Visitor, reports: list[str], sim: str, choices: dict[str, Choices]
+    ) -> None:
         self._lab, self._visitor, self._reports, self._sim = lab, visitor, reports, sim
+        self._choices = choices
 
     def show(self) -> None:
         hint(
@@ -113,12 +126,18 @@ class _Page:
     def _show_form(self) -> None:
         self._form = form = Form()
         form.summary()
-        form.text_of(_FIELDS["sim"], self._sim, ["sim", "jyro"])
+        form.text_of(
+            _FIELDS["sim"],
+            self._sim,
+            self._choices.get("sim"),
+            explanation="Simulator whose predictions are checked.",
+        )
         self._target = form.text_of(
             _FIELDS["target"],
             "jyro",
-            explanation=f"jyro, twin:FILE, or an emulated robot: {', '.join(emulated_robots())}. An emulator in "
-            f"another program, such as {default_family().named('socket://HOST:PORT')}, also needs its witness.",
+            self._choices.get("target"),
+            explanation="Robot, twin, or simulator that counts as reality. An emulator in another program also needs "
+            "its witness.",
         )
         with ui.element("div").classes("lab-fields"):
             self._numbers = {key: form.number_of(_FIELDS[key]) for key in _NUMBERS}
@@ -129,7 +148,7 @@ class _Page:
             self._margin = form.number_of(_FIELDS["margin"])
             for key, field in _FIELDS.items():
                 if key not in ("sim", "target", "margin", *_NUMBERS):
-                    form.field_of(field)
+                    form.field_of(field, self._choices.get(key))
         self._plan = ui.label("").classes("lab-plan").props('role="status"')
         hint(
             "Detectable: 80 of 100 measurements find the difference, if controllers vary as in simulation. The command "

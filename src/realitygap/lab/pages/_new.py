@@ -17,6 +17,7 @@ from starlette.requests import Request
 from realitygap._wording import counted, duration
 from realitygap.errors import StudyError
 from realitygap.lab._checks import Check, TextResult
+from realitygap.lab._choices import Choices, platform_choices
 from realitygap.lab._files import LONGEST_TEXT
 from realitygap.lab._form import (
     TITLES,
@@ -103,6 +104,7 @@ def add_new(lab: Lab) -> None:
     @ui.page("/new", response_timeout=30)
     async def new(request: Request) -> None:
         await run.io_bound(lab.checks.prepare)
+        platforms = await run.io_bound(platform_choices, lab.root, "study") or {}
         draft = _Draft()
         platform = request.query_params.get("platform", "")
         if re.fullmatch(CALIBRATED, platform):
@@ -110,12 +112,13 @@ def add_new(lab: Lab) -> None:
                 condition["platform"] = platform
                 condition.pop("noise", None)  # the calibrated robot has its own
         with framed(lab, "New study", "", above=[("Studies", "/")]):
-            _Page(lab, draft).show()
+            _Page(lab, draft, platforms).show()
 
 
 class _Page:
-    def __init__(self, lab: Lab, draft: _Draft) -> None:
+    def __init__(self, lab: Lab, draft: _Draft, platforms: Choices) -> None:
         self._lab = lab
+        self._platforms = platforms
         self._draft = draft
         self._check: Check | None = None
         self._estimate: Check | None = None
@@ -361,6 +364,9 @@ class _Page:
             text,
             explanation=explanation,
             placeholder=placeholder,
+            choices={"Default": {"": f"Default: {placeholder}"}} | dict(self._platforms)
+            if field.place == "condition.platform"
+            else None,
             parse=lambda text: _parsed(field, text),
         )
         written.props("debounce=300")

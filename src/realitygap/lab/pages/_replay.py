@@ -9,12 +9,12 @@ from typing import Any
 from nicegui import ui
 
 from realitygap.errors import StudyError
+from realitygap.lab._choices import Choices
 from realitygap.lab._lab import Lab
 from realitygap.lab._live import LiveJob, live_mistakes
 from realitygap.lab._messages import ReplayRefused, TrialChoice
 from realitygap.lab._watcher import Watcher
 from realitygap.orders import Limits
-from realitygap.platforms import emulated_robots
 
 from ._elements import Player
 from ._fields import Form
@@ -76,14 +76,14 @@ class Replays:
         name: Name of the study.
         watcher: Computes replays.
         conditions: Names of its conditions.
-        files: Files of the lab's folder that are proposed as twins.
+        platforms: Platforms on which a network can be driven live.
     """
 
     def __init__(
-        self, lab: Lab, name: str, watcher: Watcher, conditions: list[str], files: list[str]
+        self, lab: Lab, name: str, watcher: Watcher, conditions: list[str], platforms: Choices
     ) -> None:
         self._lab, self._name, self._watcher = lab, name, watcher
-        self._conditions, self._files = conditions, files
+        self._conditions, self._platforms = conditions, platforms
         self._key = secrets.token_hex(8)
         self._is_computing = self._has_played = False
         self._choices: list[TrialChoice] = []
@@ -112,8 +112,7 @@ class Replays:
             form.text(
                 "platform",
                 "Platform",
-                options=["sim", "jyro", *emulated_robots(), *(f"twin:{name}" for name in self._files)],
-                explanation="For example sim, jyro, or twin:FILE. Default: the platform of the condition.",
+                choices={"Default": {"": "The platform of the condition"}} | dict(self._platforms),
             )
         find = partial(live_mistakes, self._lab.root)
         ui.button("Drive live", on_click=lambda: form.submit(self._drive, find)).props("outline no-caps")

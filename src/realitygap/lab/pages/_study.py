@@ -13,9 +13,9 @@ from realitygap._wording import counted
 from realitygap.drawing import themed_file
 from realitygap.errors import RealityGapError
 from realitygap.lab._access import FOREIGN_HEADERS
+from realitygap.lab._choices import Choices, platform_choices
 from realitygap.lab._counts import Counts
 from realitygap.lab._figure_cache import read_thumbnail
-from realitygap.lab._files import plain_files
 from realitygap.lab._lab import Lab
 from realitygap.lab._messages import TrialCard
 from realitygap.lab._standing import Standing
@@ -35,8 +35,6 @@ from ._status import Progress
 
 MOST_REPLICATES = 1_000_000_000
 """Largest number of runs per condition that a study takes."""
-MOST_FILES = 200
-"""Number of files of the lab's folder that are proposed."""
 LOOK_S = 0.5
 """Time between two looks at the study's folder [s]."""
 
@@ -102,7 +100,7 @@ class _Opened:
     watcher: Watcher
     counts: Counts | None
     conditions: list[str]
-    files: list[str]
+    platforms: Choices
 
 
 def _open(lab: Lab, name: str) -> _Opened | None:
@@ -120,13 +118,13 @@ def _open(lab: Lab, name: str) -> _Opened | None:
         counts = lab.counts(name) if state.has_robot else None
     if counts is not None:
         counts.look()
-    files = sorted(path.name for path in plain_files(lab.root, (".toml",)))[:MOST_FILES]
+    platforms = platform_choices(lab.root, "target")
     watcher = lab.watcher(name)
     if state.n_all_done:  # saved figures are on the page from the start
         watcher.look(state.done, is_running=standing.word in GROWING)
     elif standing.word == "Running":
         lab.drawer.prepare()
-    return _Opened(standing, watcher, counts, conditions, files)
+    return _Opened(standing, watcher, counts, conditions, platforms)
 
 
 class _Starting:
@@ -164,7 +162,7 @@ class _Page:
         self._name = name = standing.state.name
         self._counts, self._watcher = opened.counts, opened.watcher
         self._results = Results(standing, opened.watcher, opened.conditions)
-        self._replays = Replays(lab, name, opened.watcher, opened.conditions, opened.files)
+        self._replays = Replays(lab, name, opened.watcher, opened.conditions, opened.platforms)
         self._has_report = standing.state.has_report
         self._replicates = standing.state.replicates
         self._is_writing = self._is_looking = False

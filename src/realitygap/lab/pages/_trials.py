@@ -13,6 +13,7 @@ from starlette.requests import Request
 from realitygap._wording import counted
 from realitygap.errors import RealityGapError
 from realitygap.lab import _messages as messages
+from realitygap.lab._choices import port_choices
 from realitygap.lab._control import Visitor
 from realitygap.lab._counts import CountedTrial, Counts
 from realitygap.lab._lab import Lab
@@ -379,9 +380,10 @@ class _Page:
                 "port",
                 "Port",
                 last.port if last is not None and is_lost else likely[0] if likely else self._emulated,
-                options=[*(guess.port for guess in found), self._emulated],
+                choices=port_choices(found, self._emulated),
                 parse=needed,
-                explanation="For example /dev/rfcomm0 or COM3. Place the robot on free floor first.",
+                placeholder="/dev/rfcomm0 or COM3",
+                explanation="Place the robot on free floor first.",
             )
             with ui.row().classes("lab-row"):
                 text = "Reconnect" if is_lost else "Connect robot"

@@ -91,7 +91,8 @@ class Videos:
         )
         form = Form()
         form.summary()
-        form.text("video", "Video", found[-1] if found else "", options=found, parse=needed)
+        videos = {"Videos in this folder": {name: name for name in found}}
+        form.text("video", "Video", found[-1] if found else "", choices=videos, parse=needed)
         form.text(
             "tags",
             "Tags",

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 
+from realitygap.errors import DescriptionError
 from realitygap.robots import Robot
 from realitygap.trials import PlatformTrials
-from realitygap.world import Arena, check_drawn_starts
+from realitygap.world import Arena, check_drawn_starts, load_robot, read_calibration
 
 from .._fleet import Fleet
 from .._platform import Platform
@@ -29,6 +31,15 @@ class SimPlatform(SimSettings):
     any of them another value, or a distribution from which it is drawn for each trial, run, or study. All other numbers
     are those of the robot file, which gives their sources.
     """
+
+    @classmethod
+    def kind_of_file(cls, path: Path) -> str:
+        """Return "calibration" or "robot file"; empty for other files."""
+        try:
+            load_robot(path)
+            return "robot file" if read_calibration(path) is None else "calibration"
+        except DescriptionError:
+            return ""
 
     def inputs(self, arena: Arena) -> tuple[str, ...]:
         """Return the names of all inputs that networks can have here."""

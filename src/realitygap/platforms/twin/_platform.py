@@ -5,12 +5,13 @@ from __future__ import annotations
 import subprocess
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar, Self
 
 from pydantic import Field
 
 from realitygap._limits import MOST_TOML_BYTES
-from realitygap.errors import require_extra
+from realitygap.errors import DescriptionError, require_extra
 from realitygap.evolution import ControllerInterface, inputs_of_robot
 from realitygap.robots import Robot
 from realitygap.robots.twin import load_twin
@@ -71,6 +72,15 @@ class TwinPlatform(Platform):
         json_schema_extra={"hidden": True},
     )
     steps: int = Field(100, ge=1, le=100_000, description="Steps of a trial.")
+
+    @classmethod
+    def kind_of_file(cls, path: Path) -> str:
+        """Return "twin" for the file of a twin; empty for other files."""
+        try:
+            load_twin(path)
+        except DescriptionError:
+            return ""
+        return "twin"
 
     @property
     def label(self) -> str:

@@ -63,9 +63,9 @@ def sent(sink: io.StringIO) -> list[Message]:
     [
         Answer(3, "void"),
         Answer(2, lengths={"ahead": "13 3/4"}),
-        Senses({"range": [0.0, 6400.0]}, stalled=False, moves=True, pose=[0.1, -0.2, 3.0]),
+        Senses({"range": [0.0, 6400.0]}, stalled=False, moves=True, cells=[12], pose=[0.1, -0.2, 3.0]),
         Failure("a name with \udcff, and \N{GREEK SMALL LETTER ALPHA}"),
-        RobotPose([float("inf"), 0.0, 0.0]),
+        RobotPose([float("inf"), 0.0, 0.0], []),
     ],
 )
 def test_message_that_is_sent_is_the_one_that_comes(message):

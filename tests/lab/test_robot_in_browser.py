@@ -15,7 +15,7 @@ from realitygap.families.scribbler.emulator import Emulator
 from realitygap.families.thymio.playground._playground import why_not
 
 from .conftest import NEW_PYTHONS, PHONE, expect, playwright
-from .page_checks import wrong_bars
+from .page_checks import covered, wrong_bars
 
 pytestmark = pytest.mark.slow
 
@@ -74,6 +74,25 @@ def test_it_drives_while_the_handle_is_held_and_stands_when_it_is_let_go(visit):
     hold(page)
     page.mouse.up()
     page.get_by_text("Standing", exact=True).wait_for()
+
+
+def test_hand_driving_fits_one_screen_of_a_phone_and_counts_cells(visit):
+    page = visit("robot", size=(390, 800), has_touch=True)
+    connect(page)
+    clock = page.locator(".lab-drive-where").get_by_text(
+        re.compile(r"Driven for \d+\.\d\ss · \d+ of 72 cells")
+    )
+    for part in (page.locator(".lab-sketch"), clock, page.locator(".lab-pad"), page.locator(".lab-stop")):
+        part.wait_for()
+        assert covered(part) == []
+    hold(page)
+    box = page.locator(".lab-pad").bounding_box()
+    page.mouse.move(box["x"] + box["width"] / 2, box["y"] - 200, steps=5)
+    page.get_by_text(re.compile(r"([2-9]|\d\d) of 72 cells")).wait_for()
+    assert page.evaluate("() => scrollY") == 0
+    page.mouse.up()
+    n = page.locator(".lab-sketch .lab-marked").count()
+    assert clock.inner_text().endswith(f"{n} of 72 cells")
 
 
 @NEW_PYTHONS

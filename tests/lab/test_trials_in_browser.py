@@ -192,6 +192,8 @@ def test_an_aborted_trial_stops_the_robot_and_is_asked_about(lab, visit):
     begin_sitting(page, SLOW)
     start_trial(page, 1)
     page.get_by_text(re.compile(r"Step ([3-9]|\d\d) of 200")).wait_for()
+    page.get_by_text(re.compile(r"Entered: \d+ of 72 cells")).wait_for()
+    assert page.locator(".lab-sketch .lab-marked").count() > 0
     page.get_by_role("button", name="Stop robot").click()
     page.get_by_text("The trial was interrupted: aborted by the operator").wait_for()
     page.get_by_role("button", name="Count as driven").click()

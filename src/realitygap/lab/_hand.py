@@ -88,6 +88,7 @@ class Hand(Job):
         picture: PNG in base64; empty before.
         arena: Where an emulated robot drives; None where nobody sees it.
         line: (x, y) [m] where it has been.
+        driven_s: Time for which its motors ran since it was placed [s].
         doing: What it is doing since a visitor asked for it; empty otherwise.
         refusal: Why it did not do what it was asked for last; empty if it did.
         n_stops: How often somebody pressed stop.
@@ -116,6 +117,7 @@ class Hand(Job):
         self.picture = ""
         self.arena: Arena | None = None
         self.line: list[list[float]] = []
+        self.driven_s = 0.0
         self.doing: messages.Activity | None = None
         self.refusal = ""
         self.n_live = 0
@@ -175,7 +177,10 @@ class Hand(Job):
             case messages.HandMet():
                 self._meet(message)
             case messages.Senses():
-                self.senses, self._answered_s = message, time.monotonic()
+                now = time.monotonic()
+                if self._answered_s is not None and message.moves:
+                    self.driven_s += now - self._answered_s
+                self.senses, self._answered_s = message, now
                 self.n_live += 1
                 pose = message.pose
                 if pose is not None and (not self.line or self.line[-1] != pose[:2]):
@@ -187,7 +192,7 @@ class Hand(Job):
             case messages.Picture():
                 self.picture, self.doing = message.png, None
             case messages.Placed():
-                self.line, self.doing = [], None
+                self.line, self.driven_s, self.doing = [], 0.0, None
             case messages.Refused():
                 self.refusal, self.doing = message.text, None
             case _:
@@ -319,14 +324,16 @@ class _Driver:
         robot = self._robot
         seen = robot.observe()
         others = {kind: list(getattr(robot, kind)()) for kind in self._kinds}
-        pose = None if self._witness is None else list(self._witness.pose())
+        witness = self._witness
+        pose = None if witness is None else list(witness.pose())
+        cells = [] if witness is None else list(witness.cells())
         if hasattr(robot, "volts") and time.monotonic() - self._battery_s > BATTERY_S:
             self._battery_s = time.monotonic()
             volts = float(robot.volts())
             if not math.isnan(volts):
                 self._channel.say(messages.Battery(round(volts, 2)))
         self._channel.say(
-            messages.Senses({"range": list(seen.raw), **others}, seen.stalled, self._moves, pose)
+            messages.Senses({"range": list(seen.raw), **others}, seen.stalled, self._moves, cells, pose)
         )
 
     def _fulfill(self, what: messages.Activity) -> None:

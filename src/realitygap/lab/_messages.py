@@ -564,9 +564,10 @@ class Step(Report):
 
 
 class RobotPose(Report):
-    """The pose of an emulated robot [m, rad]."""
+    """The pose of an emulated robot [m, rad], and the cells that it has entered."""
 
     pose: list[float]
+    cells: list[int]
 
 
 class TrialDriven(Report):
@@ -623,12 +624,14 @@ class Senses(Report):
         readings: Raw readings by kind of sensor; `range` for the range sensors.
         stalled: Whether the robot is blocked.
         moves: Whether its motors run.
+        cells: Cells that it has entered, if it is emulated.
         pose: Its pose [m, rad], if it is emulated.
     """
 
     readings: dict[str, list[float]]
     stalled: bool
     moves: bool
+    cells: list[int]
     pose: list[float] | None = None
 
 

@@ -61,7 +61,7 @@ class _Live:
         # the trial ends with the emulator, and the loop that drives reports it
         with contextlib.suppress(RobotError):
             while not ended.wait(LIVE_S):
-                self._channel.say(messages.RobotPose(list(witness.pose())))
+                self._channel.say(messages.RobotPose(list(witness.pose()), list(witness.cells())))
 
 
 class _Shown:

@@ -61,6 +61,7 @@ class StudyJob(Job):
         card: Of the trial that is being driven; None while none is.
         step: Its last step.
         line: (x, y) [m] where an emulated robot has been in it; `pose` is where it is.
+        cells: Cells that it has entered.
         label: Of the robot: REAL or EMULATED; empty before one was met.
         preflight: What its pre-flight found.
         camera_note: What the camera above the robot did not see last; empty if it saw everything.
@@ -85,6 +86,7 @@ class StudyJob(Job):
         self.step: messages.Step | None = None
         self.pose: list[float] | None = None
         self.line: list[list[float]] = []
+        self.cells: list[int] = []
         self.label = ""
         self.preflight: messages.PreflightResult | None = None
         self.camera_note = ""
@@ -117,13 +119,14 @@ class StudyJob(Job):
                 self.preflight = message
             case messages.TrialBegun():
                 self._answered_s = time.monotonic()
-                self.card, self.step, self.line = message.card, None, []
+                self.card, self.step = message.card, None
+                self.pose, self.line, self.cells = None, [], []
             case messages.Step():
                 self.step = message
                 self._answered_s = None if self.card is None else time.monotonic()
                 self.n_live += 1
             case messages.RobotPose():
-                self.pose = message.pose
+                self.pose, self.cells = message.pose, message.cells
                 self.n_live += 1
                 if not self.line or self.line[-1] != message.pose[:2]:
                     self.line = [*self.line[-MOST_POINTS:], message.pose[:2]]

@@ -125,6 +125,7 @@ class CellGrid(Element, component="cell_grid.js"):
     ) -> None:
         super().__init__()
         self._grid = grid = arena.grid
+        self._n_points = 0
         xs = [x for wall in arena.walls for x in (wall[0], wall[2])] or [grid.x, grid.right_end]
         ys = [y for wall in arena.walls for y in (wall[1], wall[3])] or [grid.y, grid.upper_end]
         low, high = self._in_cells((min(xs), min(ys))), self._in_cells((max(xs), max(ys)))
@@ -146,10 +147,20 @@ class CellGrid(Element, component="cell_grid.js"):
         if change is not None:
             self.on("change", lambda event: self._changed(event, change))
 
-    def follow(self, pose: Sequence[float] | None, points: Sequence[Sequence[float]], *, anew: bool) -> None:
-        """Show where the robot is [m, rad], and a further piece of its line [m]."""
-        at = None if pose is None else [*self._in_cells(pose), round(pose[2], 3)]
-        self.run_method("follow", at, [self._in_cells(each) for each in points], anew)
+    def follow(self, pose: Sequence[float], line: Sequence[Sequence[float]], cells: Sequence[int]) -> str:
+        """Show a robot, and return the number of its cells in words.
+
+        Args:
+            pose: Its pose [m, rad].
+            line: (x, y) [m] where it has been. Only the points after those of the last call are sent.
+            cells: Cells that it has entered.
+        """
+        anew = len(line) < self._n_points or self._n_points == 0
+        points = line if anew else line[self._n_points :]
+        self._n_points = len(line)
+        at = [*self._in_cells(pose), round(pose[2], 3)]
+        self.run_method("follow", at, [self._in_cells(point) for point in points], anew, list(cells))
+        return f"{len(cells)} of {self._grid.n_cells} cells"
 
     def put(self, cells: Iterable[int]) -> None:
         """Mark these cells and no others."""

@@ -63,7 +63,6 @@ class _Page:
         self._ports = ports
         self._families = families
         self._n_shown = -1
-        self._n_points = 0
         self._pad: DrivePad | None = None
         self._gauges: dict[str, list[_Gauge]] = {}
         self._replies: dict[str, ui.label] = {}
@@ -213,22 +212,23 @@ class _Page:
             self._facts.show()
 
     def _show_panels(self, hand: Hand) -> None:
-        """Show the pad and the actions on the left, the position and the readings on the right."""
+        """Show the position, the pad, the actions, and the readings."""
         self._grid: CellGrid | None = None
-        self._n_points = 0
         with ui.element("div").classes("lab-drive"):
-            with ui.column().classes("lab-cards"):
+            with ui.column().classes("lab-cards lab-drive-where"):
+                if hand.arena is not None:
+                    section("Position")
+                    self._grid = CellGrid(
+                        hand.arena, ink="red", name="Position of the emulated robot"
+                    ).classes("lab-sketch")
+                self._clock = ui.label("").classes("lab-value lab-finding")
+            with ui.column().classes("lab-cards lab-drive-pad"):
                 section("Drive")
                 self._show_pad(hand)
             if not hand.is_over:
                 with ui.column().classes("lab-cards lab-drive-actions"):
                     self._show_actions(hand)
             with ui.column().classes("lab-cards lab-senses") as self._senses:
-                if hand.arena is not None:
-                    section("Position")
-                    self._grid = CellGrid(
-                        hand.arena, ink="red", name="Position of the emulated robot"
-                    ).classes("lab-sketch")
                 section("Sensors")
                 self._motion = ui.label("Standing").props('role="status"')
                 family = find_family(split_port(hand.port)[0]) or default_family()
@@ -316,11 +316,9 @@ class _Page:
         self._motion.text = ("Driving" if senses.moves else "Standing") + (
             ", blocked" if senses.stalled else ""
         )
+        self._clock.text = f"Driven for {hand.driven_s:.1f} s"
         if self._grid is not None and senses.pose is not None:
-            line = hand.line
-            anew = len(line) < self._n_points or self._n_points == 0
-            self._grid.follow(senses.pose, line if anew else line[self._n_points :], anew=anew)
-            self._n_points = len(line)
+            self._clock.text += f" · {self._grid.follow(senses.pose, hand.line, senses.cells)}"
 
     def _drive(self, pull: Pull) -> None:
         hand = self._lab.robot.hand

@@ -141,7 +141,6 @@ class Driving:
     def __init__(self, job: StudyJob, card: messages.TrialCard, counts: Counts) -> None:
         self._job, self._card, self._counts = job, card, counts
         self._n_shown = -1
-        self._n_points = 0
 
     def show(self) -> None:
         """Show it."""
@@ -154,6 +153,7 @@ class Driving:
             self._step_words = ui.label("")
             self._silence = Silence()
             self._grid = CellGrid(arena, ink=card["pen"], name="Position of the robot").classes("lab-sketch")
+            self._cells = ui.label("").classes("lab-value")
             ui.button("Abort trial", on_click=self._job.stop_robot, color="negative").props(
                 "unelevated no-caps"
             ).classes("lab-primary")
@@ -174,9 +174,5 @@ class Driving:
                 f"Step {step.step + 1} of {step.n_steps}: sees {seen}{stalled}; "
                 f"move {step.move:+.2f}, turn {step.turn:+.2f}"
             )
-        line = job.line
-        anew = len(line) < self._n_points or self._n_points == 0
-        points = line if anew else line[self._n_points :]
-        self._n_points = len(line)
         if job.pose is not None:
-            self._grid.follow(job.pose, points, anew=anew)
+            self._cells.text = f"Entered: {self._grid.follow(job.pose, job.line, job.cells)}"

@@ -113,8 +113,9 @@ export default {
       event.preventDefault();
     },
     // called by the server while a trial goes on
-    follow(pose, points, anew) {
+    follow(pose, points, anew, cells) {
       this.robot = pose;
+      this.marked = new Set(cells);
       this.drawn = anew ? points : this.drawn.concat(points);
     },
   },

@@ -255,7 +255,7 @@ def directions(summary: dict[str, Any]) -> str:
   Nolfi (1995) bring simulation and robot closer by sampling the robot's own sensors and motors, as calibration does.
 * Koos, Mouret & Doncieux (2013): a few trials on the target are spent on learning where the simulation is wrong. They
   find controllers that transfer. Here, the same number of trials changes the simulation itself, chooses among
-  champions, or is all that evolution has. Coverage on the twin, less that of `plain`: {gains}.
+  champions, or is all that evolution has. Coverage on the twin minus the coverage of `plain`: {gains}.
   This study does not include their own strategy, `transferability`.
 * Ligot & Birattari (2019): pseudo-reality, another simulator in place of the robot, reproduces which design methods
   lose performance in reality. This makes this study a test, and also limits it: an order of methods may be the same

@@ -44,6 +44,65 @@ GOOD = [
 ]
 
 
+PAIRS = [
+    ("It is the typical run and not a picked one.", "We show the median run."),
+    (
+        "not shown; n finds 0.031 in 80 %, this difference takes 566 runs",
+        "Inconclusive: 100 runs detect 0.031 with 80 % power; this difference would need about 566.",
+    ),
+    (
+        "a piece of line that several runs share is stronger",
+        "Darker segments are shared by several runs.",
+    ),
+    ("picked because it has most species … and so most to see", "the run with the most species"),
+    (
+        "Up to 4 together; a generation's number takes all of it.",
+        "Select up to four trials; click a generation number to select its row.",
+    ),
+    (
+        "correlation over controllers is 0.39 where noise allows 0.99",
+        "The rank correlation is 0.39; trial noise alone would permit 0.99.",
+    ),
+    (
+        "There were three rows to be the closest, so chance had three times to do it.",
+        "This is the most extreme of three comparisons, so chance plays a part.",
+    ),
+    ("a box for a body", "a box-shaped body"),
+    ("a blocked robot freezes", "a blocked robot stops dead"),
+    (
+        "its scripts show trials and values, and send nothing",
+        "Self-contained: works offline and sends no data.",
+    ),
+    (
+        "No cell was entered: the line crosses at least the cell of the start.",
+        "Mark at least the start cell before saving.",
+    ),
+    (
+        "No controller was selected for its score where it can be tried again.",
+        "Not measured: pass champions with `--controllers STUDY`.",
+    ),
+    (
+        "The goal for rank violations was missed with cells.",
+        "Scored by cells, the calibrated simulator misranked controllers more often than our goal allows.",
+    ),
+    ("coverage on the twin less that in simulation", "coverage on the twin minus coverage in simulation"),
+    ("A drawing of the settings; n and interval do not apply.", "Drawn from the study's settings."),
+]
+
+
+def test_prose_check_finds_riddles_in_every_kind_of_text_and_not_their_better_forms(prose, tmp_path):
+    kinds = {
+        "page.md": "# Title\n\n{}\n",
+        "message.py": 'raise ValueError(f"{{n}} {}")\n',
+        "page.html.jinja": "{{% if x %}}<p>{}</p>{{% endif %}}\n",
+        "player.js": "const hint = `${{n}} {}`;\n",
+    }
+    for name, template in kinds.items():
+        for found, better in PAIRS:
+            assert findings(prose, tmp_path, name, template.format(found)), (name, found)
+            assert not findings(prose, tmp_path, name, template.format(better)), (name, better)
+
+
 def test_prose_check_finds_each_fault_in_a_page(prose, tmp_path):
     for text in BAD:
         assert len(findings(prose, tmp_path, "page.md", f"# Title\n\n{text}\n")) == 1, text

@@ -2,7 +2,8 @@
 
 The check reads Markdown, the first lines of docstrings, and help texts. It counts listed words, openings that
 invert a sentence, sentences over 30 words, long summaries of commands, and option helps that do not begin with
-the thing. A baseline holds the present count of each file; a new file starts at 0.
+the thing. In messages, templates, and scripts of pages it counts riddles and other words for a measure. A baseline
+holds the present count of each file; a new file starts at 0.
 
     python tools/prose.py            compare with the baseline
     python tools/prose.py --update   lower the baseline to the present counts; counts that rose stay refused
@@ -37,6 +38,22 @@ WORDS = re.compile(
     r")\b",
     re.IGNORECASE,
 )
+RIDDLES = re.compile(
+    r"(?<!\w)("
+    # A less B, where "minus" or "compared with" is meant
+    r"less (that|those|SIM|TWIN|EMULATED|REAL|simulat(or|ion)|the (other|first|second|objective)|second|\{\})"
+    # a letter that acts, and sentences cut until their logic is gone
+    r"|n finds|this difference takes|chance had|and so most to|where noise allows|noise allows at most"
+    r"|where it can be|was missed with|and send nothing|a box for a body|robot freezes|share is stronger"
+    r"|the cell of the start"
+    # pronouns and possessives in place of the thing's name
+    r"|takes all of it|to be the closest|['’]s number takes|the typical run and"
+    # captions that answer a referee who has not asked
+    r"|picked|(n and )?intervals? do(es)? not apply|is no proof|whatever they are|and not an? \w+ one"
+    r")(?!\w)"
+)
+"""What a colleague has to read twice, in any text that a person sees."""
+
 BAD_HELP = re.compile(r"^(Of|By|Where|What|Whether|Who|To|In|For|How|Also|Not|With|At)\b")
 
 
@@ -79,7 +96,11 @@ def main() -> int:
 def tracked() -> list[str]:
     """Return the names of the files that hold prose."""
     listed = subprocess.run(
-        ["git", "ls-files", "*.md", "src/*.py"], cwd=ROOT, capture_output=True, text=True, check=True
+        ["git", "ls-files", "*.md", "src/*.py", "src/*.jinja", "src/*.js"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=True,
     )
     return [name for name in listed.stdout.splitlines() if (ROOT / name).is_file()]
 
@@ -87,8 +108,15 @@ def tracked() -> list[str]:
 def findings(path: Path) -> Iterator[tuple[int, str]]:
     """Yield the line and a description of each finding in a file."""
     source = path.read_text("utf-8")
-    texts = markdown(source) if path.suffix == ".md" else python(source, in_cli="cli" in path.parts)
+    if path.suffix in (".jinja", ".js"):
+        texts = page(source) if path.suffix == ".jinja" else script(source)
+    else:
+        texts = markdown(source) if path.suffix == ".md" else python(source, in_cli="cli" in path.parts)
     for text in texts:
+        if match := RIDDLES.search(" ".join(text.words.split())):
+            yield text.line, f"'{match[0]}': {text.words[:60]}"
+        if text.kind == "string":
+            continue
         if text.kind == "summary" and len(text.words) > LONGEST_SUMMARY:
             yield (
                 text.line,
@@ -136,8 +164,11 @@ def markdown(source: str) -> Iterator[Text]:
 
 
 def python(source: str, *, in_cli: bool) -> Iterator[Text]:
-    """Yield first lines of docstrings, and the values of `help=` and `description=`."""
-    for node in ast.walk(ast.parse(source)):
+    """Yield first lines of docstrings, the values of `help=` and `description=`, and other texts."""
+    tree = ast.parse(source)
+    parts = {id(part) for node in ast.walk(tree) if isinstance(node, ast.JoinedStr) for part in node.values}
+    parts |= {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
+    for node in ast.walk(tree):
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
             text = ast.get_docstring(node)
             if text:
@@ -148,6 +179,10 @@ def python(source: str, *, in_cli: bool) -> Iterator[Text]:
                 for paragraph in text.split("\n\n")[1:] if is_command else ():
                     if not paragraph.startswith(("Example:", "In Python:")):
                         yield Text("text", node.body[0].lineno, paragraph)
+        elif isinstance(node, ast.JoinedStr):
+            yield Text("string", node.lineno, "".join(map(_text_of, node.values)))
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in parts:
+            yield Text("string", node.lineno, node.value)
         elif isinstance(node, ast.keyword) and node.arg in ("help", "description"):
             words = "".join(
                 part.value
@@ -156,6 +191,30 @@ def python(source: str, *, in_cli: bool) -> Iterator[Text]:
             )
             if words:
                 yield Text("help", node.value.lineno, words)
+
+
+def _text_of(part: ast.expr) -> str:
+    return part.value if isinstance(part, ast.Constant) else "{}"
+
+
+def page(source: str) -> Iterator[Text]:
+    """Yield the texts of a template between its tags."""
+    plain = re.sub(r"\{#.*?#\}|\{%.*?%\}|<(script|style)\b.*?</\1>", _lines_of, source, flags=re.DOTALL)
+    plain = re.sub(r"\{\{.*?\}\}", "{}", plain, flags=re.DOTALL)
+    for match in re.finditer(r"[^<>]+", plain):
+        yield Text("string", plain.count("\n", 0, match.start()) + 1, match[0])
+
+
+def script(source: str) -> Iterator[Text]:
+    """Yield the texts in quotes of a script."""
+    for number, line in enumerate(source.splitlines(), 1):
+        for match in re.finditer(r"\"([^\"]*)\"|'([^']*)'|`([^`]*)`", line):
+            words = match[1] or match[2] or match[3] or ""
+            yield Text("string", number, re.sub(r"\$\{[^}]*\}", "{}", words))
+
+
+def _lines_of(match: re.Match[str]) -> str:
+    return "\n" * match[0].count("\n")
 
 
 if __name__ == "__main__":

@@ -87,7 +87,7 @@ def test_three_runs_against_three_show_nothing(audit):
 def test_notes_say_what_cannot_be_said(audit):
     notes = " ".join(audit_notes(audit))
     assert "4 of 12 values are no k/72" in notes
-    assert "3 runs against 3 give no p below 0.1" in notes
+    assert "3 runs against 3 cannot give a p below 0.1" in notes
     assert "From 5 runs each on" in notes
     assert "no 95 % interval of the median" in notes
 

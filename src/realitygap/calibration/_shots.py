@@ -104,7 +104,7 @@ class Shooter:
         return self.ensemble.summarize(self.shots.play, numbers, key, of, keep=("poses",))
 
     def off(self, values: Mapping[str, Floats], key: int) -> Floats:
-        """Return the observed effects less those of m robots, (m, k, t, 3)."""
+        """Return the observed effects minus the effects of m robots, (m, k, t, 3)."""
         off = np.nan_to_num(self.shots.moved) - self.moved(values, key)
         off[..., 2] = wrapped(off[..., 2])
         off[:, ~self.shots.known] = 0.0

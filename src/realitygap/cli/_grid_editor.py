@@ -1,4 +1,4 @@
-"""Cells picked in a small grid, with keys, in a plain terminal."""
+"""Selection of cells in a small grid, with keys, in a plain terminal."""
 
 from __future__ import annotations
 
@@ -144,6 +144,6 @@ def edit_cells(
 def pick_cells(
     arena: Arena, cells: Sequence[int] = (), *, write: Callable[[str], None] | None = None
 ) -> list[int] | None:
-    """Return cells picked in the terminal; None for later."""
+    """Return cells selected in the terminal; None for later."""
     with single_keys() as keys:
         return edit_cells(arena.grid, arena.start, keys.read, write or draw, cells)

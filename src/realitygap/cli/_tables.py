@@ -35,6 +35,7 @@ def summary_table(summary: pl.DataFrame, title: str) -> Table:
         "median [its interval, at least 95 %] and quartiles; line: cells that the line crosses, "
         "ends: cells in which steps end",
     )
+    table.pad_edge = False  # so that it fits into 80 columns
     table.add_column("condition", overflow="fold")
     table.add_column("runs", justify="right", no_wrap=True)
     table.add_column("line", no_wrap=True)
@@ -114,7 +115,6 @@ def table_of(title: str, caption: str = "") -> Table:
         caption_justify="left",
         title_style="bold",
         box=box.SIMPLE_HEAD,
-        pad_edge=False,
     )
 
 

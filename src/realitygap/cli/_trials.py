@@ -233,7 +233,7 @@ def _read_file(opened: Ledger, path: Path) -> dict[int, list[int]]:
 
 
 def _pick(opened: Ledger, trial: str | None, role: ScoreRole) -> Iterator[dict[int, list[int]]]:
-    """Yield cells picked in the terminal, of one trial or, one after the other, of all that wait."""
+    """Yield cells selected in the terminal, of one trial or of each trial without a score."""
     if not sys.stdin.isatty():
         raise StudyError("There is no terminal in which to pick cells. Give --cells or --file.")
     for number, title, arena, cells in _waiting(opened, trial, role):

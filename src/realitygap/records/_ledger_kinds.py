@@ -170,9 +170,7 @@ def checked_cells(cells: Sequence[int], n_cells: int) -> list[int]:
             f"Cell {outside[0]} is outside the grid: expected numbers from 0 to {n_cells - 1}. Nothing was entered."
         )
     if not unique:
-        raise LedgerError(
-            "No cell was entered: the line crosses at least the cell of the start. Nothing was saved."
-        )
+        raise LedgerError("Mark at least the start cell before saving. Nothing was saved.")
     return unique
 
 

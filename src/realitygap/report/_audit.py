@@ -424,7 +424,7 @@ def audit_notes(audit: Audit) -> list[str]:
     if refused:
         worst = max(refused, key=lambda pair: pair.smallest_p)
         notes.append(
-            f"{worst.n} runs against {worst.n_other} give no p below {worst.smallest_p:.2g}, whatever they are"
+            f"{worst.n} runs against {worst.n_other} cannot give a p below {worst.smallest_p:.2g}"
             + (
                 f", and over {len(audit.pairs)} pairs (Holm) none below "
                 f"{min(1.0, worst.smallest_p * len(audit.pairs)):.2g}"

@@ -152,7 +152,7 @@ class RangeSensor(PointSensor):
     response: Literal["linear", "ir", "table", "pulses", "lorentz"] = Field(
         "linear",
         description="`linear`: 1 - d / reach. `ir`: amplitude * exp(-d / decay). `table`: interpolated from `table`. "
-        "`pulses`: the detected share of `pulses`, the reading of `ir` less those missed with the probability of "
+        "`pulses`: the detected share of `pulses`, the reading of `ir` minus the pulses missed with the probability of "
         "drop_*. `lorentz`: amplitude * (W^2 - P^2) / (d^2 - 2 P d + W^2), with W = half_width and P = "
         "peak, and 0 beyond the reach.",
     )

@@ -579,7 +579,7 @@ class Link:
         ) from fault
 
     def forget(self, request: Request, seconds: float) -> None:
-        """Send a command that resets the robot, and send nothing for some seconds.
+        """Send a command that resets the robot, and then wait for some seconds.
 
         Its answers are discarded. Call `greet` next.
 

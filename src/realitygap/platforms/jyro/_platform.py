@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 class JyroPlatform(JyroSettings):
     """The robot as the paper simulated it.
 
-    Box body, a blocked robot freezes, three thin rays, uniform noise. A step lasts 0.1 s; full output
-    moves 0.1 m.
+    Its body is a box, a blocked robot stops dead, and three thin rays have uniform noise. A step lasts 0.1 s; full
+    output moves 0.1 m.
 
     Source: Jyro 0.3.2, checked against its trajectories; Rosenzweig & Remy, sections 2.2 and 2.3. Differs:
     Jyro's rounding to seven decimals is left out, which moves a reading by less than 1e-6 m. Under given

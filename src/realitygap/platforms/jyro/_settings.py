@@ -18,7 +18,7 @@ class JyroSettings(SimulatedPlatform):
 
     name: ClassVar[str] = "jyro"
     summary: ClassVar[str] = (
-        "the paper’s simulation: a box for a body, a blocked robot freezes, uniform noise on its sensors"
+        "the paper’s simulation: a box-shaped body; a blocked robot stops dead; uniform sensor noise"
     )
     default_noise: ClassVar[float] = 0.1
     is_paced: ClassVar[bool] = False

@@ -46,7 +46,7 @@ def release_twins() -> None:
 
 
 def close_twins() -> None:
-    """End the processes of all twins of studies, whatever they are doing."""
+    """End the processes of all twins of studies, also during a trial."""
     with _lock:
         pools = list(_pools.values())
         _last.clear()

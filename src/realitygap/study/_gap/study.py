@@ -305,7 +305,7 @@ def _luck(controllers: Sequence[Controller], task: Task) -> Estimate:
         if each.selected_score is not None and each.fresh_score is not None
     ]
     if not lost:
-        return Estimate.refusal(0, "No controller was selected for its score where it can be tried again.")
+        return Estimate.refusal(0, "Not measured: pass champions with --controllers STUDY.")
     return mean_interval(lost, range_of_differences(task.score_range))
 
 
@@ -318,7 +318,7 @@ def _reevolved(
     target: Target,
     task: Task,
 ) -> Estimate:
-    """Return the quality on the target of what was evolved there, less that in simulation of what was evolved in it."""
+    """Return the quality of the target's own champions on it minus the quality of simulated champions in simulation."""
     if not reevolved:
         return Estimate.refusal(0, "Nothing was evolved on the target (--reevolved).")
     champions = [(k, each) for k, each in enumerate(controllers) if each.kind == "champion"]

@@ -110,7 +110,7 @@ class _Known:
         return self._interpolated(visits, self.disparities)
 
     def difference(self, visits: Values) -> Values:
-        """Return the predicted score on the target less that in simulation, (n,)."""
+        """Return the predicted score on the target minus the score in simulation, (n,)."""
         return self._interpolated(visits, self.differences)
 
     def _interpolated(self, visits: Values, values: Sequence[float]) -> Values:

@@ -133,7 +133,7 @@ def coverage(study: ResultsFolder) -> str:
                 f"{each.a12.value:.2f} ({_span(each.a12, '.2f')})",
                 f"{each.p_holm:.2g}" if each.p_holm >= 1e-4 else "< 0.0001",
                 "" if each.detectable is None else f"{each.detectable:.3f}",
-                each.difference_verdict.partition(";")[0],
+                each.difference_verdict.partition(":")[0],
                 "" if each.is_shown else each.equivalence,
             ]
         rows.append([*row, *[""] * (9 - len(row))])
@@ -141,7 +141,7 @@ def coverage(study: ResultsFolder) -> str:
         "Condition",
         "n",
         "median",
-        "mean less paper’s",
+        "mean − paper’s mean",
         "A12",
         "p (Holm)",
         "detectable",
@@ -179,8 +179,8 @@ def behaviors(study: ResultsFolder) -> str:
                 f"{variety[name].mean():.3f} ({_span(bca_mean(variety[name]), '.3f')})",
             ]
         )
-    head = ["Condition", "cells of a trial", "less paper’s", "mean column", "less paper’s", "mean row"]
-    return _csv([*head, "less paper’s", "novelty with cells", "variety"], rows)
+    head = ["Condition", "cells of a trial", "− paper’s", "mean column", "− paper’s", "mean row"]
+    return _csv([*head, "− paper’s", "novelty with cells", "variety"], rows)
 
 
 def _per_run(study: ResultsFolder, condition: str) -> pl.DataFrame:

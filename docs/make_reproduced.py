@@ -3,9 +3,9 @@
     uv run python docs/make_reproduced.py
 
 Carries out `realitygap run paper` and `realitygap run examples/constant-input.toml` in a temporary folder and writes
-docs/data/reproduced/*.csv and docs/images/reproduced/*.svg: those tables and figures of the paper's report that the
-page shows, where each value that the paper prints lies among our runs, and what the constant input does. The last also
-with more runs, and with the NEAT settings of an old neat-python.
+docs/data/reproduced/*.csv and docs/images/reproduced/*.svg: tables and figures of the paper's report, figures of single
+runs, the place of each value that the paper prints among our runs, the mistakes in these values, and the effect of the
+constant input. The last also with more runs, and with the NEAT settings of an old neat-python.
 """
 
 from __future__ import annotations
@@ -19,10 +19,11 @@ from pathlib import Path
 
 import numpy as np
 import polars as pl
+from paper_audit import audit_paper, spread_of_three
 from written import write_files
 
 from realitygap import ResultsFolder, run_study, write_report
-from realitygap.report import compare_conditions
+from realitygap.report import compare_conditions, draw_individuals, draw_paths, save_drawing
 from realitygap.report._comparisons import MARGIN, is_within, paired_values
 from realitygap.report._tally import Tally, read_tally
 from realitygap.stats import Estimate, bca_interval, difference_of_means, holm
@@ -40,17 +41,16 @@ WANTED_TABLES = (
     "table-spread",
     "table-variety",
     "table-chance",
-    "table-audit",
     "structures",
 )
 WANTED_FIGURES = {
     "figure-4": "figure-coverage",
     "figure-5": "figure-individuals-coverage",
-    "figure-6a": "figure-paths-0",
-    "figure-8": "figure-individuals-novelty",
     "figure-7": "figure-networks",
 }
 """Names of the page's figures, which are the paper's numbers, and those of the report's files."""
+RUNS = {"figure-6a": (draw_paths, "coverage-10"), "figure-8": (draw_individuals, "novelty-50")}
+"""Figures of single runs, each with its condition."""
 
 CELLS = 72
 NEAT_SETS = ("rosenzweig-remy", "rosenzweig-remy-neat-python")
@@ -67,15 +67,18 @@ def make(folder: Path) -> tuple[dict[str, str], dict[str, str]]:
     """The tables and figures of the page, by file name; everything is written below `folder`."""
     result = run_study("paper", folder / "paper")
     write_report(result.folder, figures=folder / "figures")
+    for number, (draw, condition) in RUNS.items():
+        save_drawing(draw(result.folder, condition), folder / "figures" / f"{number}.svg")
     inputs = run_study(INPUTS_STUDY, folder / "inputs")
     tables = {
         f"{name}.csv": (folder / "figures" / f"{name}.csv").read_text("utf-8") for name in WANTED_TABLES
     }
     tables |= {"published.csv": published(result.folder), "constant-input.csv": comparisons(inputs.folder)}
     tables["neat-sets.csv"] = neat_sets({name: _with_settings(name, folder) for name in NEAT_SETS})
+    tables |= {"table-audit.csv": audit(), "robot-spread.csv": robot_spread(result.folder)}
     figures = {
         f"{number}.svg": (folder / "figures" / f"{name}.svg").read_text("utf-8")
-        for number, name in WANTED_FIGURES.items()
+        for number, name in (WANTED_FIGURES | {name: name for name in RUNS}).items()
     }
     return tables, figures
 
@@ -106,6 +109,22 @@ def published(folder: ResultsFolder) -> str:
     )
 
 
+def audit() -> str:
+    """The inconsistencies of the numbers that the paper prints."""
+    rows = [[each.section, each.printed, each.found, each.bearing] for each in audit_paper()]
+    return _csv(["Section", "Printed", "Computed", "Consequence"], rows)
+
+
+def robot_spread(folder: ResultsFolder) -> str:
+    """How often three of our runs spread as far as the robot's three, by chance."""
+    head = [
+        "Condition",
+        "three runs spread as far as the robot's",
+        "of two threes, one spreads 3.5 times as far",
+    ]
+    return _csv(head, map(list, spread_of_three(read_tally(folder))))
+
+
 def comparisons(folder: ResultsFolder) -> str:
     """Differences between conditions in selection or input alone, corrected over all comparisons of the study."""
     rows = [
@@ -116,7 +135,7 @@ def comparisons(folder: ResultsFolder) -> str:
             _signed(each.size),
             _span(each.difference),
             f"{each.p_holm:.2g}" if each.p_holm >= 1e-4 else "< 0.0001",
-            each.difference_verdict,
+            each.difference_verdict.partition(":")[0],
             "" if each.is_shown else each.equivalence,
         ]
         for each in compare_conditions(folder)
@@ -143,7 +162,7 @@ def _with_settings(name: str, folder: Path) -> Tally:
 
 
 def neat_sets(tallies: dict[str, Tally]) -> str:
-    """Novelty less coverage by NEAT settings, inputs and noise; p corrected over all rows."""
+    """Difference of novelty and coverage by NEAT settings, inputs, and noise; p corrected over all rows."""
     rows, chances = [], []
     for settings, tally in tallies.items():
         for inputs, (novelty, coverage) in INPUTS.items():
@@ -162,7 +181,7 @@ def neat_sets(tallies: dict[str, Tally]) -> str:
         "constant input",
         "noise",
         "n",
-        "novelty less coverage",
+        "novelty − coverage",
         "95 % interval",
         "p (Holm)",
     ]

@@ -39,7 +39,7 @@ def test_numbers_have_their_interval_if_there_is_one():
     estimate = Estimate(-0.1, -0.2, 0.05, 20)
     assert wording.with_interval(estimate) == "−0.100 [−0.200, 0.050]"
     assert wording.with_interval(estimate, signs=True) == "−0.100 [−0.200, +0.050]"
-    assert wording.span(estimate, signs=True) == "−0.200 to +0.050"
+    assert wording.bracketed(estimate, signs=True) == "[−0.200, +0.050]"
     few = mean_interval([0.25, 0.75])
     assert (wording.with_interval(few), wording.span(few)) == ("0.500", "–")
     assert (few.needed, few.ends) == (5, None)

@@ -126,14 +126,6 @@ def signed(value: float, digits: int = 3) -> str:
     return text.replace("−", "±").replace("+", "±") if float(f"{value:.{digits}f}") == 0 else text
 
 
-def span(estimate: Estimate, digits: int = 3, *, signs: bool = False) -> str:
-    """Return the interval in words; a dash without one."""
-    if estimate.ends is None:
-        return "–"
-    low, high = (signed(end, digits) if signs else f"{end:.{digits}f}" for end in estimate.ends)
-    return f"{low} to {high}" if signs else f"{low}–{high}"
-
-
 def with_interval(estimate: Estimate, *, signs: bool = False) -> str:
     """Return a number with its interval in brackets, if it has one; a dash without a number."""
     if estimate.value is None:
@@ -149,13 +141,12 @@ def between(estimate: Estimate, digits: int = 3, missing: str = "–") -> str:
     return missing if estimate.ends is None else " to ".join(f"{end:.{digits}f}" for end in estimate.ends)
 
 
-def bracketed(estimate: Estimate, digits: int = 3, missing: str = "") -> str:
+def bracketed(estimate: Estimate, digits: int = 3, missing: str = "", *, signs: bool = False) -> str:
     """Return the ends of an interval in brackets, such as `[0.100, 0.200]`; another text without one."""
-    return (
-        missing
-        if estimate.ends is None
-        else "[" + ", ".join(f"{end:.{digits}f}" for end in estimate.ends).replace("-", "−") + "]"
-    )
+    if estimate.ends is None:
+        return missing
+    ends = (signed(end, digits) if signs else f"{end:.{digits}f}" for end in estimate.ends)
+    return f"[{', '.join(ends)}]"
 
 
 def within(ends: Ends | None, digits: int = 3) -> str:
@@ -263,7 +254,7 @@ def higher_than_others(leader: str, n_lower: int, n: int, nearest: str, differen
 def higher_searches(one: str, other: str, n_above: int, n_below: int, n: int) -> str:
     """Return at how many of n noise levels one kind of search is above another, without a period."""
     if not n_above and not n_below:
-        return f"{one} and {other} are not shown to differ"
+        return f"no difference between {one} and {other} is supported"
     levels = at_levels(n_above or n_below, n)
     if n_above and n_below:
         return f"{one} covers more than {other}{levels} and less at {n_below}"
@@ -324,38 +315,29 @@ def higher_verdict(one: str, other: str, difference: float) -> str:
     return f"{higher} above {lower}"
 
 
-def apart_clause(one: str, other: str, difference: float) -> str:
-    """Return by how much one is above or below another, of a difference that is shown."""
-    return f"{one} {'above' if difference > 0 else 'below'} {other} by {abs(difference):.3f}"
-
-
-def undecided_clause(can_claim: bool, is_equivalent: bool, margin: float) -> str:
-    """Return why a difference is not claimed, and whether equivalence is."""
-    if not can_claim:
-        return "too few runs for a claim"
-    if is_equivalent:
-        return f"not shown to differ, and equivalent within ±{margin:g}"
-    return f"not shown to differ, nor to be equivalent within ±{margin:g}"
-
-
-def not_shown_verdict(detectable: float | None = None, needed: int | None = None, most: int = 100_000) -> str:
+def inconclusive_verdict(
+    n: int | None = None, detectable: float | None = None, needed: int | None = None, most: int = 100_000
+) -> str:
     """Return that a difference is not shown, with what n can detect.
 
     Args:
+        n: Number of runs.
         detectable: Smallest difference that n runs detect in 80 of 100 studies; None if it is unknown.
         needed: Number of runs that detect the observed difference as often; None if there are too many to compute.
         most: Largest number that is named.
     """
     if detectable is None:
-        return "not shown"
-    runs = f"{needed:,}" if needed is not None and needed <= most else f"over {most:,}"
-    return f"not shown; n finds {detectable:.3f} in 80 %, this difference takes {runs} runs"
+        return "inconclusive"
+    runs = f"about {needed:,}" if needed is not None and needed <= most else f"over {most:,}"
+    return (
+        f"inconclusive: {n} runs detect {detectable:.3f} with 80 % power; this difference would need {runs}"
+    )
 
 
 def equivalence_verdict(is_equivalent: bool, margin: float, difference: Estimate) -> str:
     """Return whether two conditions are shown to be equivalent, with the interval of their difference."""
     shown = "equivalent" if is_equivalent else "not shown equivalent"
-    return f"{shown} within ±{margin:g} (90 %: {span(difference, signs=True)})"
+    return f"{shown} within ±{margin:g} (90 % interval {bracketed(difference, signs=True)})"
 
 
 RANKS_ALIKE = 0.8

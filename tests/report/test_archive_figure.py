@@ -9,11 +9,11 @@ from realitygap.report import NARROW, draw_archive
 
 def test_it_shows_whose_behaviors_the_archive_of_the_typical_run_holds(tiny_study):
     drawn = draw_archive(tiny_study)
-    assert "condition novelty, run" in drawn.caption
+    assert "end of novelty, run" in drawn.caption
     assert "8 behaviors" in drawn.caption  # the archive's size
     assert "SIM, n = 1 run" in drawn.caption
-    assert "n = 7 runs, no interval" in drawn.caption
-    assert "visit the cells recorded" in drawn.caption
+    assert "n = 7 runs" in drawn.caption
+    assert "Recomputed from the records" in drawn.caption
     assert drawn.svg.count("<svg") == 1
     assert "mean novelty [cells]" in drawn.svg
     assert drawn.in_width(NARROW).svg != drawn.svg

@@ -115,7 +115,9 @@ def test_a_difference_that_is_not_shown_states_the_detectable_one(out):
     (found,) = compare_conditions(folder)
     assert not found.is_shown
     assert found.can_claim
-    assert found.verdict.startswith(f"not shown; n finds {found.detectable:.3f} in 80 %")
+    assert found.verdict.startswith(
+        f"inconclusive: {found.n} runs detect {found.detectable:.3f} with 80 % power"
+    )
 
 
 def _pair_with_differences(out, differences):
@@ -136,14 +138,14 @@ def test_small_difference_is_equivalent_if_its_interval_lies_within_the_margin(o
     ends = found.equivalence_interval.low, found.equivalence_interval.high
     assert ends == pytest.approx((-reach, reach), rel=1e-3)  # on the scale of differences from -1 to 1
     assert found.is_equivalent
-    assert found.verdict.endswith("equivalent within ±0.02 (90 %: −0.005 to +0.005)")
+    assert found.verdict.endswith("equivalent within ±0.02 (90 % interval [−0.005, +0.005])")
 
 
 def test_difference_that_is_not_shown_is_not_called_equivalent_if_its_interval_is_wide(out):
     found = _pair_with_differences(out, np.array([20, -20, 15, -15, 2] * 4))
     assert not found.is_shown
     assert found.is_equivalent is False
-    assert "; not shown equivalent within ±0.02 (90 %: " in found.verdict
+    assert "; not shown equivalent within ±0.02 (90 % interval " in found.verdict
 
 
 def test_few_runs_give_no_verdict_on_equivalence(out):

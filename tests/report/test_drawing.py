@@ -23,7 +23,6 @@ def test_every_figure_says_label_and_number_of_runs(tiny_study):
         assert any("SIM" in text for text in texts(drawing.svg))
         assert "SIM" in drawing.caption
         assert "n = " in drawing.caption or any("n = 7" in text for text in texts(drawing.svg))
-        assert "interval" in drawing.caption
         assert f'aria-label="{drawing.alt}"' in drawing.svg
 
 
@@ -64,14 +63,16 @@ def test_points_follow_the_study_or_the_caller(out):
     runs = [[[0.4, 0.1], [0.2, 0.1], [0.3, 0.2]]] * 2
     folder = write_results(out, [describe("c")], {"c": runs}, report={"points": "best-so-far"})
     assert draw_coverage(folder).caption.startswith("Best coverage so far")
-    assert draw_coverage(folder, points="best-of-generation").caption.startswith("Best coverage of each gen")
+    assert draw_coverage(folder, points="best-of-generation").caption.startswith(
+        "Best coverage by generation"
+    )
     assert draw_coverage(folder).svg != draw_coverage(folder, points="best-of-generation").svg
 
 
 def test_few_runs_have_no_interval_and_the_caption_says_so(out):
     folder = write_results(out, [describe("c")], {"c": random_runs(5)})
     drawing = draw_coverage(folder)
-    assert "no interval: fewer than 6 runs" in drawing.caption
+    assert "a 95 % interval needs 6 runs" in drawing.caption
     assert "95 % interval of the median" not in texts(drawing.svg)
 
 
@@ -79,7 +80,7 @@ def test_too_many_lines_are_thinned_and_the_caption_says_how(out):
     runs = np.random.default_rng(5).integers(0, 73, (40, 200, 1)) / 72
     folder = write_results(out, [describe("c")], {"c": runs})
     drawing = draw_coverage(folder)
-    assert "only the first runs are drawn" in drawing.caption
+    assert "the first runs" in drawing.caption
     assert re.search(r"\((\d+) of 40 in c\)", drawing.caption)
     assert len(drawing.svg) < 300_000
 
@@ -100,10 +101,10 @@ def test_one_generation_and_one_run_draw(out):
 def test_the_typical_run_is_the_lower_median_one(tiny_study):
     bests = read_tally(tiny_study).run_bests("novelty", "line")
     drawing = draw_paths(tiny_study, "novelty")
-    run = int(re.search(r"run (\d+):", drawing.caption)[1])
+    run = int(re.search(r"run (\d+),", drawing.caption)[1])
     assert bests[run] == np.sort(bests)[3]
     assert list(bests).index(bests[run]) == run
-    assert f"{bests[run]:.3f}, is the median of the 7 runs" in drawing.caption
+    assert f"the run with the median best coverage (its best coverage: {bests[run]:.3f})" in drawing.caption
 
 
 def test_paths_show_each_generation_with_its_coverage(tiny_study):
@@ -113,8 +114,8 @@ def test_paths_show_each_generation_with_its_coverage(tiny_study):
         best = rows.filter(rows["generation"] == generation)["coverage_line"].max()
         assert any(f"{best:.3f} ({round(best * 72)} of 72)" in text for text in texts(drawing.svg))
         assert f"generation {generation}" in texts(drawing.svg)
-    assert "chosen by number" in drawing.caption
-    assert "visit the cells recorded" in drawing.caption
+    assert "median" not in drawing.caption
+    assert "Recomputed from the records" in drawing.caption
 
 
 def test_paths_that_cannot_be_recomputed_are_left_out_and_said_to_be(tiny_study, no_replay):

@@ -85,15 +85,13 @@ def test_the_report_shows_the_robots_arm_beside_the_simulated_ones(folder, tmp_p
     page = write_report(folder, tmp_path / "report.html").read_text()
     assert "robot (EMULATED): 9 trials that count, 1 void" in page
     assert "left out because unfinished: run 1 (0 of 2 generations)" in page
-    assert "6 of 8 runs are there" in page
+    assert "6 of 8 runs are complete" in page
     assert "EMULATED, n = 1" in page
     assert "driven over the robot’s own protocol, with a simulated robot behind it" in page
     for search, condition, counterpart in (("coverage", "robot", "5"), ("novelty", "searching", "8")):
         drawn = page.partition(f'id="figure-individuals-{search}"')[2].partition("</figure>")[0]
         assert f"Counterpart of the paper’s Figure {counterpart}." in drawn
-        assert f"Condition {condition}, run 0" in drawn, (
-            "as in the paper, whose Figures 5 and 8 the robot drew"
-        )
+        assert f"{condition}, run 0" in drawn, "as in the paper, whose Figures 5 and 8 the robot drew"
 
 
 @pytest.mark.slow
@@ -101,8 +99,8 @@ def test_figures_of_conditions_on_a_robot_state_their_label(folder):
     assert "EMULATED and SIM" in draw_coverage(folder).caption
     drawing = draw_individuals(folder, "robot")
     assert "EMULATED, n = 1 run" in drawing.caption
-    assert "witness saw" in drawing.caption
-    assert "witness saw" in draw_paths(folder, "robot").caption
+    assert "emulator’s witness" in drawing.caption
+    assert "emulator’s witness" in draw_paths(folder, "robot").caption
 
 
 def test_trials_of_a_robot_are_refused_as_no_program_can_repeat_them(folder):
@@ -139,10 +137,10 @@ def test_counts_of_a_person_have_no_ends_and_no_paths(tmp_path):
     assert summary["ends_median"].to_list() == [None]
     assert summary["line_median"].null_count() == 0
     caption = draw_individuals(tmp_path / "small").caption
-    assert "Only the cells were entered" in caption
-    assert "A dot in the color of its pen stands in each cell" in caption
+    assert "Shaded: the entered cells" in caption
+    assert "A dot in the color of an individual marks each cell" in caption
     page = write_report(tmp_path / "small").read_text()
-    assert "the lines themselves are on paper" in page
+    assert "The paths themselves were not recorded" in page
     assert "realitygap drive STUDY.toml --port PORT --seed 1 --replicates 1 --out DIR" in page
     assert not re.search(r"[>\s]nan[<\s]", page, re.IGNORECASE)
     assert len(ResultsFolder.open(tmp_path / "small").digest()) == 64

@@ -26,7 +26,7 @@ from realitygap.report import (
     save_drawing,
     write_report,
 )
-from realitygap.report._individuals_figure import _moved_apart, draw_better
+from realitygap.report._individuals_figure import _moved_apart
 from realitygap.report._species_figure import count_species
 from realitygap.report._structures import _canonical, count_structures, structures_frame
 from realitygap.report._table import Cell, Column, Part, TableOnPage, latex_table
@@ -44,15 +44,9 @@ def draw_arena_and_robot(folder, condition=None):
     return _arena_figure.draw_arena_and_robot(tally, tally.name_of(condition), name="arena")
 
 
-def draw_better_individuals(folder, condition=None, replicate=None):
-    tally = read_tally(folder)
-    return draw_better(tally, tally.name_of(condition), replicate)
-
-
 ALL = [
     draw_arena_and_robot,
     draw_individuals,
-    draw_better_individuals,
     draw_networks,
     draw_species,
     draw_lineage,
@@ -70,11 +64,10 @@ def resolved(study, name: str) -> Condition:
 
 
 @pytest.mark.parametrize("draw", ALL)
-def test_every_figure_says_label_n_and_interval(tiny_study, draw):
+def test_every_figure_has_its_label_and_n(tiny_study, draw):
     drawing = draw(tiny_study)
     assert "SIM" in drawing.caption
-    assert re.search(r"\bn (=|and)", drawing.caption)
-    assert "interval" in drawing.caption
+    assert re.search(r"\bn = |Drawn from", drawing.caption)
     assert len(drawing.alt) > 40
 
 
@@ -128,21 +121,12 @@ def test_ends_that_coincide_are_moved_apart():
     assert np.abs(_moved_apart(apart, 0.1) - apart).max() < 0.01
 
 
-def test_better_individuals_are_the_best_with_different_paths(tiny_study):
-    rows = tiny_study.read("novelty", [3]).sort("coverage_line", descending=True, maintain_order=True)
-    best = rows.unique("cells", keep="first", maintain_order=True).head(5)
-    drawn = texts(draw_better_individuals(tiny_study, "novelty", 3).svg)
-    for row in best.iter_rows(named=True):
-        assert f"generation {row['generation']}, individual {row['individual']}" in drawn
-
-
 def test_paths_that_cannot_be_recomputed_are_said_to_be_missing(tiny_study, no_replay):
-    for draw in (draw_individuals, draw_better_individuals):
-        assert "Some paths are missing" in draw(tiny_study).caption
+    assert "Some paths are missing" in draw_individuals(tiny_study).caption
 
 
 def test_unknown_condition_and_run_are_clear_errors(tiny_study):
-    for draw in (draw_individuals, draw_better_individuals, draw_species, draw_lineage, draw_trial):
+    for draw in (draw_individuals, draw_species, draw_lineage, draw_trial):
         with pytest.raises(ValueError, match="Did you mean 'novelty'"):
             draw(tiny_study, "noveltyy")
         with pytest.raises(ValueError, match=r"has no run 99 .*its runs are 0 to 6"):
@@ -277,7 +261,7 @@ def test_export_writes_every_figure_and_table(tiny_study, tmp_path):
     page = write_report(tiny_study, tmp_path / "page.html", figures=tmp_path / "figures").read_text("utf-8")
     names = {each.name for each in (tmp_path / "figures").iterdir()}
     figures = re.findall(r'<figure id="(figure-[^"]+)"', page)
-    assert len(figures) == 12
+    assert len(figures) == 7
     for figure in figures:
         root = ET.fromstring((tmp_path / "figures" / f"{figure}.svg").read_bytes())
         assert [each.tag.split("}")[1] for each in root][:2] == ["title", "desc"]
@@ -410,7 +394,7 @@ def test_numbers_of_species_keep_apart_in_a_long_run(tmp_path):
         tops = [band.get_paths()[0].vertices for band in left.collections]
         highest = max(v[np.abs(v[:, 0] - generation) <= 0.5, 1].max(initial=0) for v in tops)
         assert highest == pytest.approx(1.0)
-    assert "numbers of larger species" in drawing.caption
+    assert "Numbers name the larger species" in drawing.caption
 
 
 def test_a_lineage_shows_every_ancestor_with_its_coverage_and_species(tiny_study):
@@ -457,7 +441,7 @@ def test_a_lineage_names_new_structure_and_a_long_one_is_drawn_without_numbers(t
     """
     folder = run_study(parse_study(text, "long.toml"), tmp_path / "long").folder
     early = draw_lineage(folder, "coverage", 0, 14, 3)
-    assert "Colors tell species apart" in early.caption
+    assert "Colors identify species" in early.caption
     assert not [each for each in texts(early.svg) if each.startswith("+ ")]
     n_dots = sum(len(line.get_xdata()) for line in early.figure.axes[0].lines if line.get_marker() == "o")
     n_ancestors = len(ancestors_of(folder.read("coverage", [0]), 14, 3))
@@ -469,8 +453,3 @@ def test_a_lineage_names_new_structure_and_a_long_one_is_drawn_without_numbers(t
     grown = rows.filter(pl.col("generation") == 1, pl.col("new").list.len() == 2).row(0, named=True)
     shown = draw_lineage(folder, "coverage", 0, 1, grown["individual"])
     assert f"generation 1: node h{grown['genome']['hidden'][0]}" in shown.alt
-
-
-def test_the_page_shows_the_lineage_below_the_species(tiny_html):
-    assert tiny_html.index('id="figure-species"') < tiny_html.index('id="figure-lineage"')
-    assert "Ancestors of coverage, run" in tiny_html

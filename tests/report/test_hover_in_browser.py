@@ -83,27 +83,44 @@ def test_arrow_keys_step_through_all_marks_and_are_read_aloud(show, tiny_study):
     assert page.locator(".tip").count() == 0
 
 
-def test_a_click_on_a_run_that_the_page_plays_opens_its_replay(show):  # noqa: F811
-    page = show(reduced_motion="reduce")
-    run = page.evaluate(
-        "() => document.querySelector('#replay-condition').options[1].textContent.match(/run (\\d+)/)[1]"
-    )
-    x, y = page.evaluate(WHERE, ["figure-bests", True, "novelty", run])
-    page.mouse.move(x, y)
-    if "(click to replay)" not in page.locator(".tip").text_content():
-        page.locator("#figure-bests .wide").focus()  # it is under the mark of the median
+@pytest.mark.parametrize("size", [DESKTOP, PHONE])
+def test_a_click_on_a_run_replays_its_best_trial_in_view(show, runs, tiny_study, size):  # noqa: F811
+    touch = size == PHONE
+    page = show(size=size, reduced_motion="reduce", has_touch=touch)
+    median = runs.filter(pl.col("condition") == "novelty")["line"].median()
+    for run, value in runs.filter(pl.col("condition") == "novelty").select("replicate", "line").iter_rows():
+        if value == median:  # a dot under the mark of the median is reached by the keyboard
+            continue
+        x, y = page.evaluate(WHERE, ["figure-bests", not touch, "novelty", str(run)])
+        for _ in range(2):
+            page.touchscreen.tap(x, y) if touch else (page.mouse.move(x, y), page.mouse.click(x, y))
+        trial = page.locator("#replay-rows .trial", has_text=f"novelty/{run}/")
+        trial.wait_for()
+        rows = tiny_study.read("novelty", [run])
+        best = rows.row(int(rows["coverage_line"].arg_max()), named=True)
+        assert trial.text_content() == f"novelty/{run}/{best['generation']}/{best['individual']}"
+        box = page.locator("#replay-arena").bounding_box()
+        assert box["y"] >= 0
+        assert box["y"] + box["height"] <= size[1]
         page.mouse.move(1, 1)
-        for _ in range(3):
-            page.keyboard.press("ArrowDown")
-        while "(click to replay)" not in page.locator(".tip").text_content():
-            before = page.locator(".tip").text_content()
-            page.keyboard.press("ArrowRight")
-            assert page.locator(".tip").text_content() != before
+
+
+def test_enter_on_a_run_in_focus_replays_it_and_again(show):  # noqa: F811
+    page = show(reduced_motion="no-preference")
+    page.locator("#figure-bests .wide").focus()
+    page.keyboard.press("ArrowRight")
+    page.keyboard.press("ArrowDown")
+    for _ in range(3):
+        page.keyboard.press("ArrowRight")
+    text = page.locator("#figure-bests .tip").text_content()
+    run = re.match(r"coverage, run (\d+): .* \(click to replay\)", text)[1]
+    for _ in range(2):
         page.keyboard.press("Enter")
-    else:
-        page.mouse.click(x, y)
-    page.wait_for_function("() => location.hash.startsWith('#replay=novelty/')")
-    assert page.locator("#replay-rows .trial").text_content().startswith(f"novelty/{run}/")
+        page.wait_for_function("() => document.querySelectorAll('#replay-rows tr').length == 1")
+        assert page.locator("#replay-rows .trial").text_content().startswith(f"coverage/{run}/")
+        page.wait_for_function("() => document.querySelector('#replay-play').textContent.trim() == 'Pause'")
+        page.locator("#replay-across").evaluate("button => button.click()")
+        assert page.locator("#replay-rows tr").count() == 4
 
 
 def test_wide_tables_scroll_on_a_phone_and_say_so(show):  # noqa: F811
@@ -121,14 +138,14 @@ def test_print_has_the_first_screen_on_one_page_and_the_last_frame(show):  # noq
     page = show(color_scheme="dark", size=(720, 1000))
     page.emulate_media(media="print")
     page.wait_for_function("() => document.querySelector('#replay-scrub').value == '30'")
-    assert page.locator("#lead-clock").text_content().endswith("step 30 of 30")
     # A4 within its margins, 178 x 261 mm at 96 dots per inch
     page.set_viewport_size({"width": 672, "height": 986})
-    figure = page.locator("#figure-bests").bounding_box()
-    assert figure["y"] + figure["height"] <= 986
-    assert not page.locator("#lead-play").is_visible()
+    for name in ("#figure-bests", "#replay-arena"):
+        box = page.locator(name).bounding_box()
+        assert box["y"] + box["height"] <= 986
+    assert not page.locator("#replay-play").is_visible()
     page.emulate_media(media="screen")
-    page.wait_for_function("() => document.querySelector('#replay-scrub').value == '0'")
+    page.wait_for_function("() => document.querySelector('#replay-scrub').value != '30'")
 
 
 EVERY = """(narrow) => {

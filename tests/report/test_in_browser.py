@@ -18,7 +18,7 @@ from axe_playwright_python.sync_playwright import Axe
 from realitygap.report import _replay, write_report
 from realitygap.report._tally import read_tally, settings_of
 from realitygap.runs import Condition, replay
-from realitygap.study import parse_study, run_study
+from realitygap.study import load_study, parse_study, run_study
 from realitygap.trials import Trajectory
 from tests.browsers import LOCAL
 
@@ -111,7 +111,7 @@ def check_numbers(shown: list[float | str], trajectory: Trajectory, step: int) -
 
 @pytest.mark.slow
 def test_replay_waits_at_step_0_and_plays_once_when_in_view(show):
-    page = show()
+    page = show(size=PHONE)
     assert page.locator("#replay-scrub").evaluate("scrub => scrub.value") == "0"
     assert page.locator("#replay-figure .rg-robot").count() == 1
     page.wait_for_timeout(300)
@@ -128,55 +128,74 @@ def test_replay_waits_at_step_0_and_plays_once_when_in_view(show):
 
 
 @pytest.mark.slow
-def test_first_screen_has_findings_a_moving_path_and_a_figure(show):
+def test_first_screen_has_findings_a_figure_and_a_moving_path(show):
     page = show(size=(1440, 900))
     boxes = [
         page.locator(name).bounding_box()
-        for name in (".findings", "#lead-stage svg", "#figure-bests .wide svg", "#figure-bests figcaption")
+        for name in (".findings", "#figure-bests .wide svg", "#figure-bests figcaption", "#replay-arena")
     ]
     assert all(box["y"] >= 0 and box["y"] + box["height"] <= 900 for box in boxes)
-    page.wait_for_function("() => /step [1-9]/.test(document.querySelector('#lead-clock').textContent)")
-    moving = page.locator("#lead-stage .rg-robot")
-    page.locator("#lead-play").click()
+    assert boxes[1]["x"] + boxes[1]["width"] <= boxes[3]["x"], "side by side"
+    page.wait_for_function("() => document.querySelector('#replay-scrub').value > 1")
+    moving = page.locator("#replay-figure .rg-robot")
+    page.locator("#replay-play").click()
     paused = moving.get_attribute("transform")
     page.wait_for_timeout(300)
     assert moving.get_attribute("transform") == paused
-    page.locator("#lead-play").click()
-    page.wait_for_function(
-        "paused => document.querySelector('#lead-stage .rg-robot').getAttribute('transform') != paused",
-        arg=paused,
-    )
-    page.locator("#lead-open").click()
-    page.wait_for_function(
-        "() => document.querySelector('#replay-stage').getBoundingClientRect().top < innerHeight"
-    )
-    assert step_of(page) < 10  # it plays from step 0 on
 
 
 @pytest.mark.slow
 def test_first_screen_is_still_with_reduced_motion(show):
     page = show(size=(1440, 900), reduced_motion="reduce")
-    assert page.locator("#lead-clock").text_content().endswith("step 30 of 30")
-    before = page.locator("#lead-stage .rg-robot").get_attribute("transform")
-    page.wait_for_timeout(300)
-    assert page.locator("#lead-stage .rg-robot").get_attribute("transform") == before
-    page.locator("#replay-stage").scroll_into_view_if_needed()
     page.wait_for_timeout(300)
     assert step_of(page) == 0
+    assert page.locator("#replay-play").text_content().strip() == "Play"
 
 
 @pytest.mark.slow
-def test_conclusions_are_in_view_on_a_phone(show):
+def test_conclusions_and_differences_are_in_view_on_a_phone(show):
     page = show(size=PHONE)
-    cells = page.locator(".cards td.prose")
-    rights = cells.evaluate_all("cells => cells.map(cell => cell.getBoundingClientRect().right)")
-    assert rights
-    assert max(rights) <= 390
-    number = page.locator(".cards td[data-label]").first
-    assert not number.is_visible()
-    page.locator(".cards summary").first.click()
-    assert number.is_visible()
-    assert number.bounding_box()["x"] + number.bounding_box()["width"] <= 390
+    rows = page.locator("table.comparisons tr:has(td)").evaluate_all(
+        "rows => rows.filter(row => row.checkVisibility()).map("
+        "row => [row.children[2].getBoundingClientRect().right, row.offsetHeight])"
+    )
+    assert rows
+    assert max(right for right, _ in rows) <= PHONE[0]
+    assert max(height for _, height in rows) < 60, "rows and no cards"
+
+
+@pytest.mark.slow
+def test_navigation_marks_the_section_in_view(show):
+    page = show(size=(1400, 900), reduced_motion="reduce")
+    marked = page.locator(".contents a[aria-current]")
+    assert marked.text_content() == "Findings and replay"
+    for link in page.locator(".contents a").all():
+        page.evaluate("anchor => document.querySelector(anchor).scrollIntoView()", link.get_attribute("href"))
+        page.wait_for_function("() => document.querySelectorAll('.contents a[aria-current]').length == 1")
+    assert marked.text_content() == "Data"
+
+
+PAPER_HEIGHTS = {(1400, 900): 8_500, PHONE: 12_000}
+"""Largest height of the report of the paper's study by size of the window [px]."""
+
+
+@pytest.mark.slow
+def test_report_of_the_paper_is_short(visitors, tmp_path):
+    folder = run_study(load_study("paper", replicates=100), tmp_path / "paper").folder
+    file = write_report(folder, tmp_path / "page.html")
+    for size, most in PAPER_HEIGHTS.items():
+        page = visitors.open_page(size, LOCAL, PATIENCE_MS, reduced_motion="reduce")
+        page.goto(file.as_uri())
+        assert page.evaluate("document.documentElement.scrollHeight") <= most
+        assert page.evaluate("document.documentElement.scrollWidth") <= size[0]
+        used = page.locator("main section > *").evaluate_all(
+            "all => Math.max(...all.map(it => it.getBoundingClientRect().right))"
+        )
+        assert used >= 0.97 * size[0] - 32, "the page uses its width"
+        if size != PHONE:
+            pages = re.findall(rb"/Type\s*/Page\b", page.pdf(format="A4"))
+            assert 1 < len(pages) <= 8
+    visitors.leave("file://")
 
 
 @pytest.mark.slow
@@ -568,14 +587,13 @@ def test_touch_plays(show):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("used", "seen"), [("#replay-first", "#replay"), ("#lead-play", "#lead")])
-def test_a_replay_in_use_does_not_start_by_itself(show, used, seen):
+def test_a_replay_in_use_does_not_start_by_itself(show):
     page = show(size=(PHONE[0], 80))
-    page.locator(used).dispatch_event("pointerdown")
+    page.locator("#replay-first").dispatch_event("pointerdown")
     page.set_viewport_size({"width": DESKTOP[0], "height": DESKTOP[1]})
-    page.locator(f"{seen}-stage").scroll_into_view_if_needed()
+    page.locator("#replay-stage").scroll_into_view_if_needed()
     page.wait_for_timeout(300)
-    assert page.locator(f"{seen}-play").text_content().strip() == "Play"
+    assert page.locator("#replay-play").text_content().strip() == "Play"
 
 
 @pytest.mark.slow
@@ -618,7 +636,8 @@ def test_reduced_motion_goes_from_step_to_step(show, trials):
 def test_the_page_without_a_script_says_so(show):
     page = show(java_script_enabled=False)
     assert page.get_by_text("needs JavaScript, which does not run here").is_visible()
-    assert not page.locator("#replay-figure").is_visible()
+    assert page.locator("#replay-without .rg-trail").is_visible()
+    assert not page.locator("#replay-stage").is_visible()
 
 
 @pytest.mark.slow

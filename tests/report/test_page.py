@@ -93,7 +93,7 @@ def test_page_can_be_heard(tiny_page):
         for tag, attributes in page.tags
         if tag == "svg" and "aria-hidden" not in attributes and "replay" not in attributes.get("id", "")
     ]
-    assert len(pictures) == 25, "12 figures, each wide and narrow, and the path of the first screen"
+    assert len(pictures) == 15, "7 figures, each wide and narrow, and a path for readers without a script"
     assert all(each["role"] == "img" and len(each["aria-label"]) > 40 for each in pictures)
     headings = [tag for tag, _ in page.tags if re.fullmatch(r"h\d", tag)]
     assert headings[0] == "h1"
@@ -105,22 +105,22 @@ def test_page_can_be_heard(tiny_page):
 
 def test_figures_and_tables_are_numbered_in_the_order_of_the_page(tiny_page):
     html, _ = tiny_page
-    for word, count in (("Figure", 12), ("Table", 8)):
+    for word, count in (("Figure", 7), ("Table", 8)):
         numbers = re.findall(rf"<b>{word} (\d+)\.</b>", html)
         assert list(map(int, numbers)) == list(range(1, count + 1))
     figures = re.findall(r"<figure id=.*?</figure>", html, re.S)
     counterparts = [re.findall(r"paper’s Figure (\d)", figure) for figure in figures]
-    assert [each for found in counterparts for each in found] == list("45668972")
+    assert [each for found in counterparts for each in found] == list("4572")
 
 
 def test_navigation_lists_the_sections_in_the_order_of_the_page(tiny_page):
     html, _ = tiny_page
     headings = re.findall(r'<h2 id="([^"]+)">([^<]+)</h2>', html)
-    assert headings[0] == ("findings", "Findings")
+    assert headings[0] == ("findings", "Findings and replay")
     navigations = re.findall(r'<nav aria-label="Contents">(.*?)</nav>', html, re.S)
     assert len(navigations) == 2, "beside the text, and folded on a phone"
     for navigation in navigations:
-        assert re.findall(r'<a href="#([^"]+)">([^<]+)</a>', navigation) == headings[1:]
+        assert re.findall(r'<a href="#([^"]+)">([^<]+)</a>', navigation) == headings
 
 
 def test_findings_lead_to_the_tables_that_they_name(tiny_page):
@@ -137,8 +137,8 @@ def test_page_says_what_was_run(tiny_page, tiny_study):
     _, page = tiny_page
     assert tiny_study.digest() in page.words
     assert "A tiny study" in page.words
-    assert "28 (7 replicates of each condition planned)" in page.words
-    assert f"{28 * 24} networks tried once each" in page.words
+    assert "28 (7 planned for each condition)" in page.words
+    assert f"{28 * 24}, one for each network" in page.words
     assert f"{28 * 24 * 30:,}" in page.words
     assert "realitygap run STUDY.toml --seed 1 --replicates 7 --out DIR" in page.words
     assert "no robot was driven" in page.words
@@ -156,8 +156,8 @@ def test_numbers_are_those_of_the_summary(tiny_page, tiny_study):
         expected = [row["condition"], row["label"], str(row["n"])]
         for which in ("line", "ends"):
             expected.append(f"{row[f'{which}_median']:.3f}")
-            expected.append(f"{row[f'{which}_low']:.3f}–{row[f'{which}_high']:.3f}")
-            expected.append(f"{row[f'{which}_q25']:.3f}–{row[f'{which}_q75']:.3f}")
+            expected.append(f"[{row[f'{which}_low']:.3f}, {row[f'{which}_high']:.3f}]")
+            expected.append(f"[{row[f'{which}_q25']:.3f}, {row[f'{which}_q75']:.3f}]")
         expected += [f"{value:.3f}" for value in row["published"] or []] or ["–"] * 3
         assert cells == expected
 
@@ -165,7 +165,7 @@ def test_numbers_are_those_of_the_summary(tiny_page, tiny_study):
 def test_interval_is_described_as_it_is(tiny_page):
     _, page = tiny_page
     assert (
-        "With n = 7 it runs from the 1st to the 7th of the ordered values and covers the median with 98.4 %"
+        "With n = 7, it extends from the 1st to the 7th of the ordered values and covers the median with 98.4 %"
         in (page.words)
     )
 
@@ -215,9 +215,7 @@ def test_incomplete_study_says_what_is_missing(out, no_replay):
     folder = write_results(out, conditions, {"c": random_runs(3)}, replicates=10)
     _, page = report(folder)
     assert "The study is incomplete" in page.words
-    assert (
-        "3 of 20 runs are there. c lacks 7 (replicates 3 to 9); d lacks 10 (replicates 0 to 9)." in page.words
-    )
+    assert "3 of 20 runs are complete. c lacks 7 (runs 3 to 9); d lacks 10 (runs 0 to 9)." in page.words
     assert "no runs yet" in page.words
 
 
@@ -244,7 +242,7 @@ def test_the_smallest_studies_have_a_page(out, no_replay, n, generations):
     folder = write_results(out, [describe("only")], {"only": random_runs(n, generations)})
     html, page = report(folder)
     assert f"With n = {n} there is no interval" in page.words
-    assert 'id="figure-paths-0"' in html
+    assert 'id="figure-individuals-coverage"' in html
     assert "Choices" not in page.words
 
 

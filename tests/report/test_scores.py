@@ -92,7 +92,7 @@ def test_first_screen_plays_the_best_trial_by_the_task(folder):
     replay = _replay.content(tally, "wall")
     run = next(each for each in replay.runs if each.name == "wall")
     best = tally.rows_of("wall", run.replicate)["task_fitness"].max()
-    assert replay.lead.caption.endswith(f"score of wall {best:#.4g}.")
+    assert replay.still.caption.endswith(f"score of wall {best:#.4g}.")
 
 
 def test_a_study_of_coverage_has_no_figure_of_scores(tiny_study):

@@ -17,7 +17,7 @@ from realitygap.report import (
     draw_species,
 )
 from realitygap.report.charts.house import WIDE, house_style
-from realitygap.report.charts.lines import head, line_key, spread, write
+from realitygap.report.charts.lines import head, line_key, write
 from realitygap.report.charts.rows import stacked
 from realitygap.report.charts.sheet import Sheet, grid
 
@@ -124,8 +124,3 @@ def test_near_values_are_stacked_within_their_row():
     assert abs(offsets).max() <= 0.5
     assert offsets[0] == 0.0
     assert offsets[9] == 0.0
-
-
-def test_labels_are_moved_apart_in_their_order():
-    places = spread([0.5, 0.5, 0.0], 0.1)
-    assert places == [0.5, 0.6, 0.0]

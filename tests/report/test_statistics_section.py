@@ -10,7 +10,6 @@ from realitygap.report import (
 )
 from realitygap.report._champions import retry_champions
 from realitygap.report._comparisons import compare_champions
-from realitygap.report._paper_audit import paper_audit_content
 from realitygap.report._statistics_section import statistics_content
 from realitygap.report._tally import read_tally
 from realitygap.study import load_study, run_study
@@ -40,10 +39,10 @@ def words(paper):
 
 
 def test_three_runs_are_refused_and_what_would_do_is_named(words):
-    assert "0 of 18 comparisons show a difference; 18 have too few runs to show any" in words
-    assert "no claim possible: with n = 3 corrected p cannot be below 1; 10 runs at least" in words
+    assert "0 of 18 comparisons support a difference; 18 have too few runs for that" in words
+    assert words.count("too few runs") >= 18
+    assert "first higher" not in words
     assert "The smallest p that 3 pairs can give is 0.250" in words
-    assert "above coverage-10" not in words
 
 
 def test_every_table_says_sim_and_n(words, paper):
@@ -53,30 +52,23 @@ def test_every_table_says_sim_and_n(words, paper):
     content = content_of(paper)
     assert [table.name for table in content.answers] == [
         "plateaus",
+        "chance",
         "champions",
         "spread",
         "variety",
-        "chance",
     ]
     for table in content.answers:
         assert [row[1] for row in table.rows] == ["3"] * 9, table.name
 
 
-def test_audit_is_for_the_papers_study_alone(words, tiny_study, tiny_html, paper):
-    assert "What does not add up in the paper" in words
-    assert "the first spreads 3.5 times as much" in words
-    assert paper_audit_content(read_tally(tiny_study)) is None
-    assert "The paper’s numbers" not in Page(tiny_html).words
-
-
 def test_chance_and_the_fourth_input_are_told(words):
-    assert "“50 % noise is best” comes out of three runs a level" in words
+    assert "With three runs per level, 50 % noise is the best in" in words
     assert "With novelty, networks have a fourth, constant input" in words
     assert "33 % each" in words
 
 
 def test_plateaus_are_defined(words):
-    assert "does not rise in its last 2 of 5 generations" in words
+    assert "does not rise in the last 2 of 5 generations" in words
     assert "in 60 % of runs" in words
 
 
@@ -90,30 +82,10 @@ def test_intervals_come_with_enough_runs(out):
     table = content.comparisons.table
     assert "BCa" in table.caption
     row = dict(zip(table.heads, table.rows[0], strict=True))
-    assert " to " in row["difference: interval"]
-    assert "–" in row["A12: interval"]
+    assert row["difference: interval"].startswith("[")
+    assert row["A12: interval"].startswith("[")
     assert "*" not in row["A12: interval"]
     assert content.champions.problem == "its rows were not drawn with the key of its settings"
-
-
-@pytest.mark.parametrize(
-    ("cells", "verdict"),
-    [
-        ([1, -1, 2, -2, 0] * 4, "not shown to differ, and equivalent within ±0.02."),
-        ([20, -20, 15, -15, 2] * 4, "not shown to differ, nor to be equivalent within ±0.02."),
-    ],
-)
-def test_selection_sentence_gives_equivalence_beside_a_difference_that_is_not_shown(out, cells, verdict):
-    conditions = [
-        describe(name, settings=settings(selection=name, noise=0.1) | {"pair": True, "seed": 1})
-        for name in ("coverage", "novelty")
-    ]
-    runs = {
-        "coverage": [[[30 / 72, 0.0]] * 2 for _ in cells],
-        "novelty": [[[(30 + difference) / 72, 0.0]] * 2 for difference in cells],
-    }
-    (sentence,) = content_of(write_results(out, conditions, runs)).deception.sentences
-    assert sentence.endswith(verdict)
 
 
 def test_studies_of_every_shape_have_the_section(out):

@@ -34,7 +34,6 @@ from realitygap.report._lineage_figure import draw_lineage
 from realitygap.report._motion import Each, choose_moving, watch, write_movie
 from realitygap.report._networks_figure import draw_networks
 from realitygap.report._page import write_report
-from realitygap.report._paper_audit import audit_paper
 from realitygap.report._path_figure import draw_paths
 from realitygap.report._questions import measure_variety
 from realitygap.report._sensor_figure import save_sensor_figure
@@ -59,7 +58,6 @@ __all__ = [
     "Tally",
     "audit_distance",
     "audit_notes",
-    "audit_paper",
     "audit_results",
     "best_trials",
     "check_ending",

@@ -51,11 +51,10 @@ def draw_archive(folder: Results, condition: str | None = None, replicate: int |
     unit = DISTANCES[run.condition.novelty.distance].unit
     drawn = f", of which {len(paths)} are drawn" if len(paths) < len(different) else ""
     caption = (
-        f"Left (on a phone, above), condition {run.name}, run {run.replicate}: what the archive holds at its end, "
-        f"{len(members)} behaviors, {len(different)} of them different{drawn}, from generations {min(entered)} to "
-        f"{max(entered)}; a cell is the darker, the more of them visit it. {run.label}, n = 1 run. "
-        f"{origin} Right (below), the mean novelty of the individuals of each "
-        f"generation, over all runs that measure it alike. n = {counted(_n_runs(tally, novelty), 'run')}, no interval."
+        f"Left (on a phone, above): archive at the end of {run.name}, run {run.replicate}: {len(members)} behaviors, "
+        f"{len(different)} of them different{drawn}, from generations {min(entered)} to {max(entered)}. "
+        f"Darker cells are visited by more of them. {run.label}, n = 1 run. {origin} Right (below): mean novelty by "
+        f"generation, over all runs that measure it in the same way. n = {counted(_n_runs(tally, novelty), 'run')}."
     )
     alt = (
         f"The archive of run {run.replicate} of {run.name} holds {len(members)} behaviors, of generations "

@@ -45,13 +45,12 @@ def draw_arena_and_robot(tally: Tally, condition: str, *, name: str) -> Drawing:
 def _caption(tally: Tally, condition: Condition, described: DescribedCondition) -> str:
     start = condition.arena.pose()
     same = len({str(settings_of(each).get("arena")) for each in tally.conditions}) == 1
-    whose = "All conditions have this arena." if same else f"Shown is condition {condition.name}."
+    whose = "" if same else f" of {condition.name}"
     platform = condition.on
     simulated = "" if condition.is_physical else " as simulated"
     return (
-        f"The arena, with its reachable cells outlined, and the robot{simulated}, both to scale. Trials begin at "
-        f"({start.x:.4f}, {start.y:.4f}) m with the robot facing as the arrow does; the gray outline is what can "
-        f"collide, the dashed lines are how far its {len(platform.sensors.mounts)} sensors see. {whose} The outline is "
-        f"{platform.outline_words}. "
-        f"{label_of(described)}: a drawing of the settings; n and interval do not apply."
+        f"Arena{whose} with its reachable cells outlined, and robot{simulated}, to scale. Trials start at "
+        f"({start.x:.4f}, {start.y:.4f}) m, facing along the arrow. Gray: the outline that collides, "
+        f"{platform.outline_words}. Dashed: range of the {len(platform.sensors.mounts)} sensors. "
+        f"{label_of(described)}. Drawn from the study’s settings."
     )

@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from realitygap._limits import MOST_TABLE_BYTES, read_file
-from realitygap._wording import few_runs_verdict, higher_verdict, not_shown_verdict
+from realitygap._wording import few_runs_verdict, higher_verdict, inconclusive_verdict
 from realitygap.errors import TableError, whole_number
 from realitygap.report._comparisons import difference_and_share
 from realitygap.stats import (
@@ -145,7 +145,7 @@ class AuditedPair:
             return f"{few_runs_verdict(self.runs_for_a_claim)} each at least"
         if self.p_holm < ALPHA:
             return higher_verdict(self.one, self.other, self.difference.value or 0.0)
-        return not_shown_verdict()
+        return inconclusive_verdict()
 
 
 @dataclass(frozen=True)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from urllib.parse import quote
 
 import numpy as np
 import numpy.typing as npt
@@ -40,12 +41,12 @@ class _Row:
     published: tuple[float, ...]
 
 
-def draw_bests(folder: Results, *, links: Mapping[tuple[str, int], str] | None = None) -> Drawing:
+def draw_bests(folder: Results, *, replayed: Mapping[str, Collection[int]] | None = None) -> Drawing:
     """The best coverage of each run by condition, with medians and intervals.
 
     Args:
         folder: The results of a study, or the path to them.
-        links: Target of a click on a run, by condition and replicate.
+        replayed: Runs that the page can play, by condition: a click on one of them plays its best trial.
 
     Raises:
         RecordError: There is no such folder, a file in it is damaged, or it holds no trials yet.
@@ -63,7 +64,7 @@ def draw_bests(folder: Results, *, links: Mapping[tuple[str, int], str] | None =
         "bests",
         _caption(tally, rows),
         alt,
-        marks=(Panel("bests", tuple(_series(rows, positions, links or {})), (3, 2)),),
+        marks=(Panel("bests", tuple(_series(rows, positions, replayed or {})), (3, 2)),),
         width=HALF,
     )
 
@@ -92,7 +93,7 @@ def _top(rows: Sequence[_Row]) -> float:
 def _series(
     rows: Sequence[_Row],
     positions: Sequence[npt.NDArray[np.float64]],
-    links: Mapping[tuple[str, int], str],
+    replayed: Mapping[str, Collection[int]],
 ) -> list[Series]:
     series = []
     for index, (row, offsets) in enumerate(zip(rows, positions, strict=True)):
@@ -101,17 +102,16 @@ def _series(
         text = f"{{name}}: median {{x}}{within(row.interval)}, n = {len(row.values):,}, {row.label}"
         series.append(Series(text, np.array([[row.median, float(index)]]), row.name))
         runs = row.replicates[: row.n_drawn]
-        linked = next((k for k, run in enumerate(runs) if (row.name, run) in links), 0)
-        points = np.column_stack([row.values[: row.n_drawn], index + offsets])
-        link = links.get((row.name, runs[linked]), "")
+        known = replayed.get(row.name, ())
+        n_linked = next((k for k, run in enumerate(runs) if run not in known), len(runs))
         series.append(
             Series(
                 "{name}, run {label}: best coverage {x}",
-                points,
+                np.column_stack([row.values[: row.n_drawn], index + offsets]),
                 row.name,
                 tuple(map(str, runs)),
-                link,
-                linked,
+                f"#replay={quote(row.name, safe='')}/" if n_linked else "",
+                n_linked,
             )
         )
     return series
@@ -160,12 +160,12 @@ def _caption(tally: Tally, rows: Sequence[_Row]) -> str:
     labels = " and ".join(sorted({row.label for row in rows}))
     counts = sorted({len(row.values) for row in rows if len(row.values)})
     parts = [
-        f"Best coverage of each run by condition, counted {tally.counted}. {labels}, "
+        f"Best coverage of each run by condition (cells {tally.counted}). {labels}, "
         f"n = {count_range(counts)} runs per condition."
     ]
     if any(row.n_drawn < len(row.values) for row in rows):
         most = max(row.n_drawn for row in rows)
-        parts.append(f"Dots: the first {most:,} runs of a condition; medians and intervals are of all runs.")
+        parts.append(f"Dots show the first {most:,} runs of a condition; medians and intervals use all runs.")
     if counts[-1] < MEDIAN_SMALLEST_N:
         parts.append(f"Fewer than {MEDIAN_SMALLEST_N} runs give no interval of 95 %.")
     return " ".join(parts)

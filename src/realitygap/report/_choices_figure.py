@@ -338,17 +338,14 @@ def _caption(tally: Tally, groups: list[list[Choice]]) -> str:
     labels = " and ".join(sorted({choice.label for choice in choices}))
     counts = sorted({choice.n for choice in choices})
     parts = [
-        "Each row changes one choice and leaves all others as in the baseline. Dot: the median over runs of "
-        f"the best coverage of a run, counted {tally.counted}. {labels}, "
-        f"n = {counted_range(counts, 'run')} for each condition.",
-        "Bar: its exact 95 % interval from order statistics. Band: the baseline’s. "
+        f"Median best coverage of a run by choice (cells {tally.counted}).",
+        "Each row changes one choice of the baseline.",
+        "Bar: exact 95 % interval. Band: the baseline’s."
         if min(counts) >= MEDIAN_SMALLEST_N
-        else f"No interval below {MEDIAN_SMALLEST_N} runs. ",
-        "Right: the change of the median. Rows are sorted by it.",
+        else f"Intervals need {MEDIAN_SMALLEST_N} runs.",
+        "Right: change of the median, by which rows are sorted.",
     ]
     if any(choice.other_median is not None for choice in choices):
         parts.append("Square: the same runs with cells counted as the changed selection counts them.")
-    parts.append(
-        "Intervals of single medians, not tests of differences; with many rows some differ by chance."
-    )
-    return " ".join(part.strip() for part in parts)
+    parts.append(f"{labels}, n = {counted_range(counts, 'run')} per condition.")
+    return " ".join(parts)

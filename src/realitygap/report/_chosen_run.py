@@ -13,7 +13,7 @@ import polars as pl
 
 from realitygap.errors import RealityGapError
 from realitygap.report._driven import driven_paths
-from realitygap.report._tally import DescribedCondition, Results, Tally, label_of, read_tally
+from realitygap.report._tally import DescribedCondition, Results, Tally, label_of, read_tally, task_of
 from realitygap.report.charts.arena import Track
 from realitygap.runs import Condition, replay
 from realitygap.world import Arena
@@ -51,7 +51,7 @@ class ChosenRun:
         tally: Tally of its study.
         name: Name of the condition.
         replicate: Number of the run.
-        is_typical: True if nobody chose the run, so that it is the typical one.
+        is_typical: True if the run was not chosen by number, so that it is the typical one.
     """
 
     tally: Tally
@@ -120,15 +120,23 @@ class ChosenRun:
         coverage = row[self.tally.coverage_column]
         return TracedPath(row["generation"], row["individual"], coverage, tuple(row["cells"]), tracks)
 
+    @property
+    def which(self) -> str:
+        """The reason for this run, as the end of a clause; empty if it was chosen by number."""
+        if not self.is_typical or len(self.tally.replicates(self.name)) == 1:
+            return ""
+        worth = "coverage" if task_of(self.described) == "coverage" else "score"
+        return f", the run with the median best {worth}"
+
     def _origin(self, paths: Sequence[TracedPath], problem: str) -> str:
         if self.condition.is_physical:
             if all(path.tracks for path in paths):
-                return "The paths are what the emulator’s witness saw; where the robot was blocked is not marked."
-            return "Only the cells were entered, which are shaded; the lines themselves are on paper."
+                return "Paths as recorded by the emulator’s witness, without marks for blocked steps."
+            return "Shaded: the entered cells. The paths themselves were not recorded."
         if problem:
             return f"Some paths are missing: the trials could not be recomputed. {problem}"
         several = " Each color is a robot." if any(len(path.tracks) > 1 for path in paths) else ""
-        return f"The paths were recomputed from the records and visit the cells recorded.{several}"
+        return f"Recomputed from the records.{several}"
 
 
 def choose_run(folder: Results, condition: str | None = None, replicate: int | None = None) -> ChosenRun:

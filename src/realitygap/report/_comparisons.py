@@ -13,13 +13,13 @@ import numpy.typing as npt
 import polars as pl
 
 from realitygap._wording import (
+    bracketed,
     equivalence_verdict,
     few_runs_verdict,
     higher_verdict,
-    not_shown_verdict,
+    inconclusive_verdict,
     p_in_words,
     signed,
-    span,
 )
 from realitygap.report._champions import FRESH_TRIALS, Champions
 from realitygap.report._table import Cell, Column, Part, Row, TableOnPage
@@ -159,7 +159,17 @@ class Comparison:
             return f"{few_runs_verdict(self.runs_for_a_claim, detail)} at least"
         if self.is_shown:
             return higher_verdict(self.one, self.other, self.size)
-        return not_shown_verdict(self.detectable, self.runs_for_difference)
+        n = min(self.n, self.n_other)
+        return inconclusive_verdict(n, self.detectable, self.runs_for_difference)
+
+    @property
+    def conclusion(self) -> str:
+        """The conclusion in two words, for a table that has the numbers."""
+        if not self.can_claim:
+            return "too few runs"
+        if self.is_shown:
+            return "first higher" if self.size > 0 else "first lower"
+        return "equivalent" if self.is_equivalent else "inconclusive"
 
 
 def is_within(difference: Estimate) -> bool | None:
@@ -436,7 +446,7 @@ def difference_and_share(
 
 
 def comparisons_frame(comparisons: Sequence[Comparison]) -> pl.DataFrame:
-    """Return one row per comparison: its numbers, the bounds of its intervals, and the conclusion."""
+    """Return one row per comparison: its numbers, the bounds of its intervals, its conclusion, and its verdict."""
     rows = []
     for each in comparisons:
         row: dict[str, Any] = {}
@@ -448,7 +458,7 @@ def comparisons_frame(comparisons: Sequence[Comparison]) -> pl.DataFrame:
                 row |= {f"{name}_interval_low": value.low, f"{name}_interval_high": value.high}
             else:
                 row[field.name] = value
-        rows.append(row | {"conclusion": each.verdict})
+        rows.append(row | {"conclusion": each.conclusion, "verdict": each.verdict})
     return pl.DataFrame(rows, infer_schema_length=None)
 
 
@@ -499,29 +509,30 @@ def comparisons_content(
         return None
     labels = ", ".join(dict.fromkeys(each.label for each in comparisons))
     columns = (
-        Column("First less second"),
-        Column(verdict, kind="text prose ", head_kind="text"),
-        Column("n"),
+        Column("First − second"),
+        Column(verdict, kind="text", head_kind="text"),
         Column("difference", kind="median"),
         Column("interval"),
+        Column("p (Holm)"),
+        Column("p"),
         Column("A12"),
         Column("interval"),
-        Column("p"),
-        Column("p (Holm)"),
+        Column("n"),
+        Column("detectable"),
+        Column("n needed"),
     )
     table = TableOnPage(
         name,
-        f"{caption} ({labels}; n is the number of runs of each). The difference is the mean of the first condition "
-        "minus that of the second. A12 is the probability that a run of the first is above a run of the second. "
-        f"Intervals: {INTERVAL_NAME}.",
+        f"{caption} ({labels}; n runs of each). A12: probability that a run of the first condition is above one of the "
+        f"second. Detectable: difference that n runs detect with 80 % power; n needed: runs that detect the observed "
+        f"difference as often. Intervals: {INTERVAL_NAME}.",
         columns,
         tuple(
             Part(rows, title)
             for reason, title in _REASONS.items()
             if (rows := [_row(each) for each in comparisons if each.reason == reason])
         ),
-        kind="numbers statistics cards",
-        is_cards=True,
+        kind="numbers statistics comparisons",
     )
     return ComparisonsOnPage(
         table,
@@ -535,16 +546,19 @@ def comparisons_content(
 
 def _row(comparison: Comparison) -> Row:
     n, m = comparison.n, comparison.n_other
+    detectable, needed = comparison.detectable, comparison.runs_for_difference
     return (
-        f"{comparison.one} less {comparison.other}",
-        Cell(comparison.verdict, "text prose strong" if comparison.is_shown else None),
-        f"{n:,}" if n == m else f"{n:,}; {m:,}",
+        f"{comparison.one} − {comparison.other}",
+        Cell(comparison.conclusion, "text strong" if comparison.is_shown else None),
         signed(comparison.size),
-        span(comparison.difference, signs=True),
-        f"{comparison.a12.value:.2f}",
-        span(comparison.a12, digits=2) + (" *" if comparison.a12.method == "Newcombe" else ""),
-        p_in_words(comparison.p),
+        bracketed(comparison.difference, missing="–", signs=True),
         p_in_words(comparison.p_holm),
+        p_in_words(comparison.p),
+        f"{comparison.a12.value:.2f}",
+        bracketed(comparison.a12, 2, "–") + (" *" if comparison.a12.method == "Newcombe" else ""),
+        f"{n:,}" if n == m else f"{n:,}; {m:,}",
+        "–" if detectable is None else f"{detectable:.3f}",
+        "–" if comparison.is_shown or needed is None else f"{needed:,}",
     )
 
 
@@ -570,18 +584,15 @@ def _notes(comparisons: Sequence[Comparison]) -> list[str]:
         runs = f"{n:,} pairs" if paired else f"{n:,} runs against {m:,}"
         notes.append(
             f"The smallest p that {runs} can give is {p_in_words(floor)}, and corrected for {len(comparisons)} "
-            f"comparisons {p_in_words(min(1.0, floor * len(comparisons)))}: whatever comes out, it is no "
-            f"evidence at the level of {ALPHA}."
+            f"comparisons {p_in_words(min(1.0, floor * len(comparisons)))}, so no difference can be supported at the "
+            f"level of {ALPHA}."
         )
     if any(each.difference.ends is None for each in comparisons):
-        notes.append(
-            f"A dash: no interval. Below n = {BCA_SMALLEST_N} resamples of so few runs vary too little, and "
-            "where all resamples are alike there is nothing to go by."
-        )
+        notes.append(f"A dash: no interval, because n is below {BCA_SMALLEST_N} or all resamples are alike.")
     if any(each.can_claim and not each.is_shown and each.equivalence for each in comparisons):
         notes.append(
             f"Equivalent: the 90 % interval of the difference by t lies within ±{MARGIN:g}. This is two one-sided "
-            "tests at 5 %, not corrected. A difference that is not shown does not prove equivalence."
+            "tests at 5 %, not corrected."
         )
     if any(each.a12.method == "Newcombe" for each in comparisons):
         notes.append("Marked *: Newcombe’s interval, which needs no resampling.")

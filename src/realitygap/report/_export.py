@@ -74,7 +74,8 @@ def export_page(folder: Path, tally: Tally, content: Mapping[str, Any]) -> Expor
         notes.append(f"{name}.svg, {name}.pdf\n    {figure.title}. {figure.caption}")
     tables = []
     for table in content["tables"].values():
-        name, rows = table.file, [table.heads, *table.texts]
+        name = table.file
+        rows = [[head.replace("−", "-") for head in table.heads], *table.texts]
         caption = f"{table.title}. {table.caption}" if table.number else table.caption
         write_whole(folder / f"{name}.csv", _csv(rows), within=folder)
         tables.append(f"{name}.csv")

@@ -319,7 +319,7 @@ def _of_noise(study: _Study) -> Finding | None:
     directions = {each.size > 0 for each in shown}
     raises = directions.pop() if len(directions) == 1 else None
     claim = effect_of_noise(span, score, searches, raises, is_shown=bool(shown))
-    evidence = f"{quoted.one} less {quoted.other}: {_difference([quoted])}."
+    evidence = f"{quoted.one} − {quoted.other}: {_difference([quoted])}."
     if not study.basis.is_fresh:
         return study.find(claim, evidence)
     recorded = comparison_of(study.recorded, quoted.one, quoted.other)

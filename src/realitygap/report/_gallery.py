@@ -1,4 +1,4 @@
-"""The figures that show a study rather than measure it: arena, individuals, networks, species, a lineage."""
+"""The figures that show a study rather than measure it: arena, individuals, networks, species."""
 
 from __future__ import annotations
 
@@ -9,13 +9,12 @@ from realitygap._version import __version__
 from realitygap.errors import RecordVersionError
 from realitygap.report import _networks_figure
 from realitygap.report._arena_figure import draw_arena_and_robot
-from realitygap.report._individuals_figure import draw_better, draw_individuals
-from realitygap.report._lineage_figure import draw_lineage
+from realitygap.report._individuals_figure import draw_individuals
 from realitygap.report._placed import FigureOnPage
 from realitygap.report._species_figure import count_species, draw_species
 from realitygap.report._structures import Structures
 from realitygap.report._table import Cell, Column, Part, Row, TableOnPage
-from realitygap.report._tally import Tally, settings_of
+from realitygap.report._tally import Tally
 from realitygap.report.charts.house import Drawing
 
 
@@ -47,36 +46,23 @@ def content(tally: Tally) -> dict[str, Any]:
         "structures": _structures_table(structures, tally),
         "structure_groups": structures,
     }
-    objective, novelty = _first(tally, "coverage"), _first(tally, "novelty", noise=0.5)
+    # the replay shows paths, except those that a robot drove
     found["individuals"] = [
-        draw(what, condition, figure, counterpart)
-        for what, condition, figure, counterpart in (
-            ("individuals-coverage", _first(tally, "coverage", driven=True), draw_individuals, "Figure 5"),
-            (
-                "individuals-novelty",
-                _first(tally, "novelty", noise=0.5, driven=True),
-                draw_individuals,
-                "Figure 8",
-            ),
-            ("better", novelty, draw_better, "Figure 9"),
-        )
-        if condition is not None
-    ]
+        draw(f"individuals-{search}", driven[0], draw_individuals, counterpart)
+        for search, counterpart in (("coverage", "Figure 5"), ("novelty", "Figure 8"))
+        if (driven := [each["name"] for each in tally.selecting_by(search) if each["name"] in tally.driven])
+    ] or [draw("individuals-coverage", _first(tally), draw_individuals, "Figure 5")]
     species = count_species(tally)
-    condition = objective or str(tally.runs["condition"][0])
-    drawing = draw_species(tally, condition, species=species, name="figure-species")
+    drawing = draw_species(tally, _first(tally), species=species, name="figure-species")
     found["species"] = FigureOnPage("figure-species", drawing)
     found["species_counts"] = species
-    found["lineage"] = draw("lineage", condition, draw_lineage)
     return found
 
 
-def _first(tally: Tally, selection: str, *, noise: float | None = None, driven: bool = False) -> str | None:
-    """The first condition with runs and this selection; rather one that a robot drove (or not), and with this noise."""
-    candidates = tally.selecting_by(selection)
-    candidates = [each for each in candidates if (each["name"] in tally.driven) == driven] or candidates
-    wanted = [each for each in candidates if settings_of(each).get("noise") == noise]
-    return str((wanted or candidates)[0]["name"]) if candidates else None
+def _first(tally: Tally) -> str:
+    """The first condition with runs, if possible one that selects by coverage and that no robot drove."""
+    candidates = tally.selecting_by("coverage") or tally.with_runs
+    return str(([each for each in candidates if each["name"] not in tally.driven] or candidates)[0]["name"])
 
 
 def _structures_table(structures: Sequence[Structures], tally: Tally) -> TableOnPage:

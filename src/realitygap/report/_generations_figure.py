@@ -180,9 +180,8 @@ def _draw_score(
     score, least, greatest = of
     axis = _score_axis(score, panels, least, greatest)
     caption = (
-        f"Best {score} of each generation, by generation (from 0). {' and '.join(labels)}. {_say_runs(panels)} Blue: "
-        f"the median over the runs{_say_interval(panels)}. Gray column, “run”: the best of whole runs, with its "
-        "median, interval and quartiles."
+        f"Best {score} by generation. {_say_runs(panels)} Blue: median{_say_interval(panels)}. Gray column: best of "
+        f"whole runs, with median, interval, and quartiles. {' and '.join(labels)}, n in each panel."
     )
     alt = (
         f"Best {score} by generation in {len(panels)} panels, one per condition: a line for each run, the median with "
@@ -273,9 +272,7 @@ def _series(panel: RunsPanel, n_runs: int, decimals: int) -> tuple[Series, ...]:
 
 def _draw_panels(panels: list[RunsPanel], width: float, axis: Axis) -> Sheet:
     """Return a figure of this width [in] with a panel for each condition, and a legend."""
-    n_columns = (
-        min(len(panels), 1 if width < IS_WIDE else 3) if len(panels) <= 9 else 2 if width < IS_WIDE else 4
-    )
+    n_columns = min(len(panels), 2 if width < IS_WIDE else 3 if len(panels) <= 9 else 4)
     sheet, places = grid(
         width, len(panels), n_columns, min(1.75, max(1.15, 0.55 * width / n_columns - 0.3)), gap=0.2
     )
@@ -417,17 +414,16 @@ def _draw_best_of_runs(axes: Axes, bests: npt.NDArray[np.float64], x: float) -> 
 
 
 def _caption(tally: Tally, panels: list[RunsPanel], points: Points) -> str:
-    each = "Best coverage of each generation" if points == "best-of-generation" else "Best coverage so far"
+    each = "Best coverage" if points == "best-of-generation" else "Best coverage so far"
     parts = [
-        f"{each}, counted {tally.counted}, by generation (from 0). {' and '.join(tally.labels)}.",
+        f"{each} by generation (cells {tally.counted}).",
         _say_runs(panels),
-        f"Blue: the median over the runs{_say_interval(panels)}.",
-        "Gray column, “run”: the best of whole runs, with its median, interval and quartiles"
-        + (", beside the values that the paper prints." if any(panel.published for panel in panels) else "."),
+        f"Blue: median{_say_interval(panels)}. Gray column: best of whole runs, with median, interval, and quartiles.",
+        f"{' and '.join(tally.labels)}, n in each panel.",
     ]
     cells = {settings_of(condition).get("task", {}).get("cells") for condition in tally.conditions}
     if len(cells - {None}) > 1:
-        parts.append("All panels count cells in this one way, also where selection counts them in the other.")
+        parts.append("All panels count cells in this way, whichever way selection counts them.")
     return " ".join(parts)
 
 
@@ -436,17 +432,14 @@ def _say_runs(panels: list[RunsPanel]) -> str:
     cut = [panel for panel in panels if panel.n_drawn < len(panel.values)]
     if cut:
         drawn = ", ".join(f"{panel.n_drawn} of {len(panel.values)} in {panel.title}" for panel in cut)
-        return (
-            f"Gray: one line a run; only the first runs are drawn where all would be too many ({drawn}); "
-            "medians and intervals are of all runs."
-        )
-    return "Gray: every run. Lines are more opaque where runs overlap."
+        return f"Gray: the first runs ({drawn}); medians and intervals use all runs."
+    return "Gray: every run. Darker segments are shared by several runs."
 
 
 def _say_interval(panels: list[RunsPanel]) -> str:
     """Return a sentence on the intervals of the medians."""
     counts = [len(panel.values) for panel in panels]
     if max(counts) < MEDIAN_SMALLEST_N:
-        return f" (no interval: fewer than {MEDIAN_SMALLEST_N} runs cannot give one of 95 %)"
-    missing = f", not drawn below {MEDIAN_SMALLEST_N} runs" if min(counts) < MEDIAN_SMALLEST_N else ""
-    return f" with its exact 95 % interval from order statistics{missing}"
+        return f" (a 95 % interval needs {MEDIAN_SMALLEST_N} runs)"
+    missing = f", from {MEDIAN_SMALLEST_N} runs on" if min(counts) < MEDIAN_SMALLEST_N else ""
+    return f" with its exact 95 % interval{missing}"

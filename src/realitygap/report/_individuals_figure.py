@@ -1,4 +1,4 @@
-"""Figures 5 and 8: all individuals of each generation of one run, and Figure 9: the better ones."""
+"""All individuals of each generation of one run, as the paper's Figures 5 and 8."""
 
 from __future__ import annotations
 
@@ -12,8 +12,7 @@ import polars as pl
 
 from realitygap.drawing import PENS, Ink
 from realitygap.report._chosen_run import ChosenRun, TracedPath, choose_run
-from realitygap.report._path_figure import draw_path, path_key
-from realitygap.report._tally import Results, Tally
+from realitygap.report._tally import Results
 from realitygap.report.charts.arena import arena_extent, arena_panels, draw_cells, draw_start
 from realitygap.report.charts.house import Drawing, draw_wide, shorten
 from realitygap.report.charts.lines import (
@@ -40,9 +39,6 @@ _MOST_PANELS = 11
 
 _MOST_PATHS = 16
 """Individuals drawn in a panel at most; more would hide each other."""
-
-_N_BETTER = 5
-"""Individuals in Figure 9."""
 
 
 def draw_individuals(
@@ -81,58 +77,6 @@ def draw_individuals(
         + "."
     )
     return draw_wide(lambda width: _draw_generations(run, panels, width), name, caption, alt)
-
-
-def draw_better(
-    tally: Tally, condition: str, replicate: int | None = None, *, name: str = "better"
-) -> Drawing:
-    """The individuals of highest coverage of one run, as the paper's Figure 9.
-
-    Args:
-        tally: Tally of the study. The trials that are shown are recomputed.
-        condition: Condition to draw.
-        replicate: Run. Default: the typical one, as in `draw_paths`.
-        name: First part of the ids.
-
-    Raises:
-        ValueError: there is no such condition or run.
-        RecordVersionError: its settings are not those of this version.
-    """
-    run = choose_run(tally, condition, replicate)
-    rows, column = run.rows, tally.coverage_column
-    best = (
-        rows.sort(column, descending=True, maintain_order=True)
-        .unique("cells", keep="first", maintain_order=True)
-        .head(_N_BETTER)
-    )
-    paths, origin = run.trace(best)
-    caption = (
-        f"Condition {condition}, run {run.replicate}: the {len(paths)} individuals of highest coverage among all "
-        f"{rows.height} of the run, best first, coverage counted {tally.counted}; of those that visit the same "
-        f"cells in the same order only the first is shown. {run.label}, n = 1 run, no interval. "
-        f"{_which(run)} {origin}"
-    )
-    alt = (
-        f"Paths of the {len(paths)} best individuals of run {run.replicate} of {condition}. Coverage: "
-        + ", ".join(
-            f"generation {path.generation} individual {path.individual} {path.coverage:.3f}" for path in paths
-        )
-    )
-
-    def draw(width: float) -> Sheet:
-        sheet, panels, key = arena_panels(width, len(paths), run.arena)
-        for path, axes in zip(paths, panels, strict=True):
-            draw_path(axes, path, run)
-            if sheet.is_wide:
-                title = f"generation {path.generation}, individual {path.individual}"
-                head(axes, title, f"{shorten(run.label, 12)}, coverage {path.coverage:.3f}", below=True)
-            else:
-                title = f"gen {path.generation}, ind {path.individual}"
-                head(axes, title, f"{path.coverage:.3f}", below=True)
-        path_key(key, paths, is_wide=sheet.is_wide)
-        return sheet
-
-    return draw_wide(draw, name, caption, alt + ".")
 
 
 # drawing
@@ -257,7 +201,7 @@ def _individuals_caption(
     run: ChosenRun, panels: list[list[TracedPath]], sizes: tuple[int, int], origin: str
 ) -> str:
     if run.condition.is_physical and not all(path.tracks for panel in panels for path in panel):
-        origin += " A dot in the color of its pen stands in each cell that an individual visits."
+        origin += " A dot in the color of an individual marks each cell that it visits."
     n_generations, population = sizes
     n_drawn = max(len(panel) for panel in panels)
     who = (
@@ -271,16 +215,6 @@ def _individuals_caption(
         else f"{len(panels)} of {n_generations} generations"
     )
     return (
-        f"Condition {run.name}, run {run.replicate}: the paths of {who} of {when}, each with a pen of its own, its "
-        f"number at its end; ends that coincide are fanned out. Coverage is counted {run.tally.counted}. "
-        f"{run.label}, n = 1 run, no interval. {_which(run)} {origin}"
+        f"Paths of {who} of {when}, {run.name}, run {run.replicate}{run.which}. Numbers mark the ends of paths. "
+        f"Coverage counts cells {run.tally.counted}. {run.label}, n = 1 run. {origin}"
     )
-
-
-def _which(run: ChosenRun) -> str:
-    n = len(run.tally.replicates(run.name))
-    if n == 1:
-        return "It is the only run."
-    if not run.is_typical:
-        return "The run was chosen by number."
-    return f"This is the typical run: its best coverage is the median of the {n:,} runs."

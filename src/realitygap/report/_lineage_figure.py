@@ -102,16 +102,16 @@ def draw_lineage(
     counted = ", ".join(f"{n} {word}" for word, n in counts.items() if n) or "none"
     champion = ancestors[-1]
     beside = (
-        "The number in a dot is that of its species; beside it stand coverage and the structure that no parent has"
+        "Each dot has the number of its species, its coverage, and the structure that no parent has"
         if largest(rows, "generation") < _MOST_LABELED
-        else "Colors tell species apart, and repeat when there are more than eight"
+        else "Colors identify species and repeat after eight"
     )
     caption = (
         f"Ancestors of {trial.title} (ringed; itself {_ORIGINS[champion.origin]}): {len(ancestors) - 1} in all, "
         f"{counted}. "
-        "Unbroken lines lead from the first parent, dashed ones from the second, broad ones to a copy. "
+        "Solid lines lead from the first parent, dashed ones from the second, broad ones to a copy. "
         f"{beside}. Below, coverage of the ancestors, and the best of each generation (line). {trial.label}, "
-        "n = 1 run, no interval."
+        "n = 1 run."
     )
     brought = [f"generation {each.generation}: {each.brought}" for each in ancestors if each.brought]
     alt = (

@@ -20,10 +20,7 @@ from realitygap.report.charts.shapes import draw_picture
 from realitygap.report.charts.sheet import IS_WIDE, Sheet, grid
 from realitygap.runs import Condition, genome_of
 
-_MARKS = (
-    "A link is as broad as its weight is large; a positive one is unbroken and ends in an arrow, a negative one is "
-    "dashed and ends in a bar. Dotted and faint: disabled genes. h: hidden node."
-)
+_MARKS = "Width: size of the weight. Solid arrow: positive; dashed bar: negative; dotted: disabled. h: hidden node."
 
 _N_COMMON = 3
 """Number of common structures drawn next to the first run's network."""
@@ -76,7 +73,7 @@ def draw_network(condition: Condition, row: Mapping[str, Any], measure: str) -> 
         ValueError: the genome is not one of this version.
     """
     picture = picture_of(condition, row)
-    caption = f"{picture.title}. {_MARKS} {condition.label}, n = 1 network, no interval."
+    caption = f"{picture.title}. {_MARKS} {condition.label}, n = 1 network."
     title = picture.title.removeprefix("Network of ")
     text = f"{condition.label}, coverage {row[measure]:.3f}"
     shown = [(title, text, picture)]
@@ -138,11 +135,10 @@ def _caption(tally: Tally, condition: str, group: Structures) -> str:
     n_runs = sum(len(tally.replicates(name)) for name in group.conditions)
     label = label_of(tally.condition(condition))
     return (
-        f"First, the best individual of the last generation of the first run of condition {condition}, chosen by "
-        "number and not by its look; then the structures that are most common among the "
-        f"{group.n_networks:,} networks of the last generations of all conditions with that selection "
-        f"({group.selection}) and {len(group.inputs)} inputs, each drawn from the "
-        f"individual of highest coverage that has it. {_MARKS} {label}, n = {counted(n_runs, 'run')}, no interval."
+        f"Networks of the last generation: the best one of the first run of {condition}, and the most common "
+        f"structures of the {group.n_networks:,} networks with {len(group.inputs)} inputs and selection by "
+        f"{group.selection}, each from the individual of highest coverage. {_MARKS} {label}, "
+        f"n = {counted(n_runs, 'run')}."
     )
 
 

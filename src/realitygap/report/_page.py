@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import polars as pl
 
 from realitygap._version import __version__
-from realitygap.errors import RealityGapError, RecordError, RecordVersionError
+from realitygap.errors import RealityGapError, RecordError
 from realitygap.platforms import described_platform, is_physical
 from realitygap.records import (
     RecordWarning,
@@ -35,11 +35,8 @@ from realitygap.report._driven import describe_driven
 from realitygap.report._export import export_page
 from realitygap.report._findings import find, leading_conditions
 from realitygap.report._generations_figure import draw_coverage, draw_scores
-from realitygap.report._paper_audit import AuditOnPage, paper_audit_content
 from realitygap.report._parameters import neat_parameters, settings_tables
-from realitygap.report._path_figure import draw_paths
 from realitygap.report._placed import FigureOnPage, hover_content, number_figures
-from realitygap.report._replay import ReplayOnPage
 from realitygap.report._replay import content as replay_content
 from realitygap.report._statistics_section import Statistics, statistics_content
 from realitygap.report._summary import summarize, summarize_tasks
@@ -156,7 +153,7 @@ def _content(tally: Tally) -> dict[str, Any]:
     }
     sections = _sections(content)
     number_figures(figure for _, _, figures in sections for figure in figures)
-    content["sections"] = [(anchor, title) for anchor, title, _ in sections if title]
+    content["sections"] = [(anchor, title) for anchor, title, _ in sections]
     content |= hover_content(content)
     content["tables"] = {table.name: table for table in _tables(content)}
     return content
@@ -171,15 +168,18 @@ def _statistics(
 
 
 def _sections(content: Mapping[str, Any]) -> list[tuple[str, str, list[FigureOnPage | str | None]]]:
-    """Anchor, title, and figures of each section in the order of the page; the first screen has no title."""
+    """Anchor, title, and figures of each section in the order of the page."""
     gallery = content["gallery"]
     sections = [
-        ("findings", "", [content["bests"]]),
+        ("findings", "Findings and replay", [content["bests"]]),
         ("results", "Results", [content["coverage"], *content["scores"]]),
         ("comparisons", "Comparisons", [content["choices"]]),
-        ("paths", "Paths and replay", content["paths"]),
-        ("networks", "Networks and species", [gallery[each] for each in ("networks", "species", "lineage")]),
-        ("questions", "The paper’s questions and numbers", []),
+        (
+            "networks",
+            "Paths, networks, and species",
+            [*gallery["individuals"], gallery["networks"], gallery["species"]],
+        ),
+        ("questions", "The paper’s questions", []),
         ("methods", "Methods and settings", [gallery["arena"]]),
         ("again", "Reproduce and cite", []),
         ("data", "Data", []),
@@ -191,14 +191,12 @@ def _sections(content: Mapping[str, Any]) -> list[tuple[str, str, list[FigureOnP
 def _tables(content: Mapping[str, Any]) -> list[TableOnPage]:
     """Return the tables in the order of the page, with their numbers."""
     statistics: Statistics = content["statistics"]
-    audit: AuditOnPage | None = content["audit"]
     tables = [
         content["results"],
         content["task_scores"],
         *statistics.compared,
         content["gallery"]["structures"],
         *statistics.answers,
-        None if audit is None else audit.table,
         content["parameters"],
     ]
     tables += [*content["settings"], _columns_table()]
@@ -233,10 +231,7 @@ def _results_table(summary: pl.DataFrame) -> TableOnPage:
         published = [*(row["published"] or []), *[None] * n_published][:n_published]
         cells += [Cell(_share(value), kind="none" if value is None else None) for value in published]
         rows.append(cells)
-    caption = (
-        "The greatest coverage achieved in each run: the visited share of the reachable cells, best of all individuals "
-        "of a run."
-    )
+    caption = "Best coverage of a run by condition: the visited share of the reachable cells, best of all individuals."
     more = " Counterpart of the paper’s Table 2." if n_published else ""
     return TableOnPage("results", caption + more, tuple(columns), (Part(rows),), kind="numbers")
 
@@ -263,7 +258,7 @@ def _scores_table(tasks: pl.DataFrame) -> TableOnPage | None:
         for row in tasks.iter_rows(named=True)
     ]
     caption = (
-        "The best score of each run by its task. First and last: the median of the best in the first and in the last "
+        "Best score of a run by condition. First and last: the median of the best in the first and in the last "
         "generation."
     )
     return TableOnPage("scores", caption, columns, (Part(rows),), kind="numbers tasks")
@@ -272,7 +267,6 @@ def _scores_table(tasks: pl.DataFrame) -> TableOnPage | None:
 def _words_and_figures(tally: Tally) -> dict[str, Any]:
     summary, tasks = summarize(tally), summarize_tasks(tally.folder)
     description = tally.description
-    gallery = _gallery.content(tally)
     replay = replay_content(tally, leading_conditions(tally)[0])
     return {
         "counts": _counts(tally),
@@ -288,19 +282,17 @@ def _words_and_figures(tally: Tally) -> dict[str, Any]:
         "settings": settings_tables(tally.conditions),
         "results": _results_table(summary),
         "measure": tally.measure,
-        "audit": paper_audit_content(tally),
         "note": description.get("note") or "",
         "published_sources": _published_sources(tally),
         "interval_notes": _interval_notes(summary),
         "confidence": _CONFIDENCE,
-        "bests": FigureOnPage("figure-bests", draw_bests(tally, links=_links(replay))),
+        "bests": FigureOnPage("figure-bests", draw_bests(tally, replayed=replay.replayed)),
         "coverage": FigureOnPage("figure-coverage", draw_coverage(tally), "Figure 4"),
         "tasks": tasks.to_dicts(),
         "task_scores": _scores_table(tasks),
         "scores": _score_figures(tally),
-        "paths": [*gallery["individuals"][:1], *_path_figures(tally), *gallery["individuals"][1:]],
         "choices": _choices_figure(tally),
-        "gallery": gallery,
+        "gallery": _gallery.content(tally),
         "replay": replay,
         "command": _command(tally),
         "has_novelty": any(selection_of(each) == "novelty" for each in tally.conditions),
@@ -311,39 +303,11 @@ def _words_and_figures(tally: Tally) -> dict[str, Any]:
 # figures
 
 
-def _links(replay: ReplayOnPage) -> dict[tuple[str, int], str]:
-    """Address of the best trial in the replay of each run that the page plays, by condition and replicate."""
-    return {(run.name, run.replicate): run.link for run in replay.runs if run.link}
-
-
 def _score_figures(tally: Tally) -> list[FigureOnPage]:
     """A figure for each score of another task than coverage."""
     return [
         FigureOnPage(f"figure-scores-{k}", drawing) for k, drawing in enumerate(draw_scores(tally.folder))
     ]
-
-
-def _path_figures(tally: Tally) -> list[FigureOnPage | str]:
-    """A figure for a condition that selects by coverage and one by novelty, or why there is none."""
-    found: list[FigureOnPage | str] = []
-    for condition in _conditions_with_paths(tally):
-        anchor = f"figure-paths-{len(found)}"
-        try:
-            drawn = draw_paths(tally, condition, name=anchor)
-        except RecordVersionError:
-            found.append(
-                f"The figure of the paths of {condition} is missing: this realitygap ({__version__}) cannot read its "
-                "settings, so it cannot recompute its paths. Use the version that ran the study."
-            )
-        else:
-            found.append(FigureOnPage(anchor, drawn, "Figure 6"))
-    return found
-
-
-def _conditions_with_paths(tally: Tally) -> list[str]:
-    by_selection = (tally.selecting_by(selection) for selection in ("coverage", "novelty"))
-    first = [conditions[0] for conditions in by_selection if conditions] or tally.with_runs[:1]
-    return [condition["name"] for condition in first]
 
 
 def _choices_figure(tally: Tally) -> FigureOnPage | None:
@@ -380,8 +344,8 @@ def _banners(tally: Tally) -> list[tuple[str, str]]:
         banners.append(
             (
                 "The study is incomplete",
-                f"{expected - n_missing:,} of {expected:,} runs are there. {'; '.join(listed)}. "
-                "The same command goes on with what is missing.",
+                f"{expected - n_missing:,} of {expected:,} runs are complete. {'; '.join(listed)}. "
+                "Run the same command again to complete the study.",
             )
         )
     return banners
@@ -399,7 +363,7 @@ def _missing_runs(tally: Tally) -> list[tuple[str, int, str]]:
         gaps = _gaps([int(run) for run in tally.replicates(condition["name"])], _expected_replicates(tally))
         if gaps:
             shown = [str(first) if first == last else f"{first} to {last}" for first, last in gaps]
-            where = "replicates " + ", ".join(shown[:4]) + (", …" if len(shown) > 4 else "")
+            where = "runs " + ", ".join(shown[:4]) + (", …" if len(shown) > 4 else "")
             missing.append((condition["name"], sum(last - first + 1 for first, last in gaps), where))
     return missing
 
@@ -424,9 +388,9 @@ def _facts(tally: Tally) -> list[tuple[str, str]]:
         ("Conditions", _count(len(tally.conditions))),
         (
             "Runs",
-            f"{_count(n_runs)} ({_count(_expected_replicates(tally))} replicates of each condition planned)",
+            f"{_count(n_runs)} ({_count(_expected_replicates(tally))} planned for each condition)",
         ),
-        ("Trials", f"{_count(n_trials)} networks tried once each"),
+        ("Trials", f"{_count(n_trials)}, one for each network"),
     ]
     if n_steps is not None:
         facts.append(("Robot-steps", _count(n_steps)))
@@ -439,7 +403,7 @@ def _facts(tally: Tally) -> list[tuple[str, str]]:
     facts += [(f"Assumed of {names}", text) for names, text in sim_assumptions(tally.conditions)]
     numbers = {
         "True": "; all conditions draw the same random numbers",
-        "False": "; conditions draw apart",
+        "False": "; each condition draws its own random numbers",
     }.get(str(description.get("pair")), "")
     facts.append(("Seed", f"{description.get('seed', '–')}{numbers}"))
     return facts
@@ -481,7 +445,7 @@ def _interval_notes(summary: pl.DataFrame) -> list[str]:
             )
         else:
             notes.append(
-                f"With n = {n:,} it runs from the {_ordinal(ranks.lower)} to the {_ordinal(ranks.upper)} of "
+                f"With n = {n:,}, it extends from the {_ordinal(ranks.lower)} to the {_ordinal(ranks.upper)} of "
                 f"the ordered values and covers the median with {100 * ranks.coverage:.1f} %."
             )
     return notes
@@ -530,7 +494,7 @@ def _share(value: float | None) -> str:
 
 
 def _range(low: float | None, high: float | None) -> Cell:
-    return Cell("–", element="none") if low is None else Cell(f"{_share(low)}–{_share(high)}")
+    return Cell("–", element="none") if low is None else Cell(f"[{_share(low)}, {_share(high)}]")
 
 
 def _count(value: int) -> str:

@@ -95,25 +95,14 @@ def path_key(axes: Axes, paths: Sequence[TracedPath], *, is_wide: bool) -> None:
 
 
 def _caption(run: ChosenRun, paths: list[TracedPath], origin: str) -> str:
-    tally, name = run.tally, run.name
-    bests = tally.run_scores(name)
     is_coverage = task_of(run.described) == "coverage"
+    best = run.tally.run_scores(run.name)[list(run.tally.replicates(run.name)).index(run.replicate)]
+    n_generations = run.tally.generation_bests(run.name, run.tally.measure).shape[1]
+    when = (
+        "each generation" if len(paths) == n_generations else f"{len(paths)} of {n_generations} generations"
+    )
     worth = "coverage" if is_coverage else "score"
-    best = bests[list(tally.replicates(name)).index(run.replicate)]
-    n_generations = tally.generation_bests(name, tally.measure).shape[1]
-    which = (
-        "every generation" if len(paths) == n_generations else f"{len(paths)} of {n_generations} generations"
+    return (
+        f"Path of {'highest' if is_coverage else 'best'} {worth} in {when}, {run.name}, run {run.replicate}{run.which} "
+        f"(its best {worth}: {best:.3f}). Coverage counts cells {run.tally.counted}. {run.label}, n = 1 run. {origin}"
     )
-    why = (
-        f"This is the typical run: its best {worth}, {best:.3f}, is the median of the "
-        f"{len(bests)} runs (the lower middle one, the first of several alike)."
-        if run.is_typical
-        else f"The run was chosen by number; its best {worth} is {best:.3f}."
-    )
-    parts = [
-        f"Condition {name}, run {run.replicate}: the individual of {'highest' if is_coverage else 'best'} {worth} in "
-        f"{which}, coverage counted {tally.counted}. {run.label}, n = 1 run, no interval.",
-        why if len(bests) > 1 else "It is the only run.",
-        origin,
-    ]
-    return " ".join(parts)

@@ -55,7 +55,7 @@ class FigureOnPage:
 
 def hover_content(content: Mapping[str, Any]) -> dict[str, Any]:
     """Return what a page needs to show the values of its figures: `marks`, `hover`, and `hover_hash`."""
-    script = packed(template_text("hover.js")) + template_text("tables.js")
+    script = packed(template_text("hover.js")) + template_text("page.js")
     marks = {each.anchor: each.marks for each in figures_in(content) if each.marks}
     return {"marks": as_json(marks), "hover": Markup(script), "hover_hash": hash_of(script)}
 

@@ -1,4 +1,4 @@
-"""The replay: trials of the typical run of each condition, recomputed and packed for the page's script.
+"""The replay: trials of a typical run and the best one of each run, recomputed and packed for the page's script.
 
 Every number is rounded to a whole multiple of its unit in `UNITS`, so that what the page shows is within half a
 unit of what was computed. A trial is one run of bytes: columns of differences from one step to the next, each
@@ -12,7 +12,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
 from typing import Any
-from urllib.parse import quote
 
 import numpy as np
 import numpy.typing as npt
@@ -34,8 +33,9 @@ UNITS = {"length": 1e-4, "angle": 1e-3, "output": 1e-3}
 N_PENS = 4
 """Trials shown at once: of more, bodies and rays cover one another."""
 
-MOST_STEPS = 105_000
-"""Steps embedded in a page, of all trials together: some 18 bytes each."""
+MOST_STEPS = 115_000
+"""Steps embedded in a page, of all trials together: some 18 bytes each. The best trial of each run of the paper's study
+fits."""
 
 
 @dataclass(frozen=True)
@@ -46,8 +46,7 @@ class _Run:
         data: Data for the script; None if no trial could be embedded.
         n_embedded, n_trials: Number of embedded trials and of all trials of the run.
         note: Note on what is missing and why; empty if nothing is.
-        best: Index of the best embedded trial by the task, the first of several alike.
-        link: Address of that trial at the first step; empty if no trial could be embedded.
+        replayed: Runs of the condition whose best trial is embedded.
     """
 
     name: str
@@ -56,16 +55,15 @@ class _Run:
     n_embedded: int
     n_trials: int
     note: str
-    best: int = 0
-    link: str = ""
+    replayed: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
-class Lead:
-    """The trial that the first screen plays.
+class Still:
+    """A trial for readers without a script.
 
     Attributes:
-        picture: Drawing of its whole path as one `svg` element, for readers without a script.
+        picture: Drawing of its whole path as one `svg` element.
         caption: Caption.
     """
 
@@ -82,20 +80,22 @@ class ReplayOnPage:
         script: Script of the player.
         script_hash: Hash of the script, as the page's policy names it.
         data: Trials, for the script.
-        lead: Trial of the first screen; None without one.
+        still: Trial that the replay starts with; None without one.
         runs: The typical run of each condition.
         notes: Sentences on trials that are missing.
         labels: Labels of the runs.
+        has_all_runs: True if the best trial of each run can be played.
     """
 
     css: Markup
     script: Markup
     script_hash: str
     data: Markup
-    lead: Lead | None
+    still: Still | None
     runs: list[_Run]
     notes: list[str]
     labels: list[str]
+    has_all_runs: bool
 
     @property
     def embedded(self) -> list[_Run]:
@@ -103,14 +103,9 @@ class ReplayOnPage:
         return [run for run in self.runs if run.data is not None]
 
     @property
-    def n_trials(self) -> int:
-        """Number of trials that can be played."""
-        return sum(run.n_embedded for run in self.runs)
-
-    @property
-    def is_same_number(self) -> bool:
-        """True if all runs with trials have the same number of them."""
-        return len({run.n_embedded for run in self.embedded}) == 1
+    def replayed(self) -> dict[str, tuple[int, ...]]:
+        """The runs whose best trial can be played, by condition."""
+        return {run.name: run.replayed for run in self.runs}
 
 
 def content(tally: Tally, lead: str) -> ReplayOnPage:
@@ -118,15 +113,15 @@ def content(tally: Tally, lead: str) -> ReplayOnPage:
 
     Args:
         tally: The study.
-        lead: Name of the condition whose best embedded trial the first screen plays. If it has none, the first
-            condition that has some takes its place.
+        lead: Name of the condition with whose best trial the replay starts. If it has none, the first condition that
+            has some takes its place.
     """
     candidates = tally.with_runs
     room = MOST_STEPS // max(len(candidates), 1)
     runs = [_pack_run(tally, condition, room) for condition in candidates]
     with_trials = [run for run in runs if run.data is not None]
     packed = [run.data for run in with_trials]
-    first = _lead_of(tally, with_trials, lead) if packed else None
+    first = next((k for k, run in enumerate(with_trials) if run.name == lead), 0)
     player = resources.files("realitygap.playback")
     module = player.joinpath("player.js").read_text("utf-8").replace("export default { render };", "")
     # no module: those run last, after the script that looks for tables wider than the page
@@ -140,14 +135,15 @@ def content(tally: Tally, lead: str) -> ReplayOnPage:
                 "units": UNITS,
                 "pens": [pack_pen(pen) for pen in range(N_PENS)],
                 "measure": tally.measure,
-                "lead": first[:2] if first else [],
+                "lead": first,
                 "conditions": packed,
             }
         ),
-        lead=first[2] if first else None,
+        still=_still(tally, with_trials[first]) if packed else None,
         runs=runs,
         notes=_notes(runs),
         labels=sorted({label_of(condition) for condition in candidates}),
+        has_all_runs=all(len(run.replayed) == len(tally.replicates(run.name)) for run in runs),
     )
 
 
@@ -157,27 +153,25 @@ def _notes(runs: Sequence[_Run]) -> list[str]:
     return [f"{', '.join(run.name for run in runs if run.note == note)}: {note}" for note in notes]
 
 
-# the first screen
+# without a script
 
 
-def _lead_of(tally: Tally, runs: Sequence[_Run], lead: str) -> tuple[int, int, Lead]:
-    """Index of the condition, index of its best trial, the first of several alike, and what is shown of it."""
-    index = next((k for k, each in enumerate(runs) if each.name == lead), 0)
-    name, run = runs[index].name, runs[index].replicate
-    best = runs[index].best
-    generation, individual = (runs[index].data or {})["trials"][best][:2]
-    row = tally.rows_of(name, run).row(
+def _still(tally: Tally, run: _Run) -> Still:
+    """The best trial of a run."""
+    data = run.data or {}
+    generation, individual = data["trials"][data["best"]][:2]
+    row = tally.rows_of(run.name, run.replicate).row(
         by_predicate=(pl.col("generation") == generation) & (pl.col("individual") == individual), named=True
     )
-    condition = tally.resolved(name)
-    label, task = label_of(tally.condition(name)), task_of(tally.condition(name))
-    value = float(row[tally.score_column(name)])
+    condition = tally.resolved(run.name)
+    label, task = label_of(tally.condition(run.name)), task_of(tally.condition(run.name))
+    value = float(row[tally.score_column(run.name)])
     worth = f"coverage {value:.3f}" if task == "coverage" else f"score of {task} {score_text(value)}"
     caption = (
-        f"{label}. Best path of the typical run of {name} (run {run}): generation {generation}, individual "
-        f"{individual}, {worth}."
+        f"{label}. Best path of {run.name}, run {run.replicate}: generation {generation}, individual {individual}, "
+        f"{worth}."
     )
-    return index, best, Lead(_picture(condition, replay(condition, row), caption), caption)
+    return Still(_picture(condition, replay(condition, row), caption), caption)
 
 
 def _picture(condition: Condition, trajectory: Trajectory, text: str) -> Markup:
@@ -212,10 +206,11 @@ def _pack_run(tally: Tally, described: DescribedCondition, room: int) -> _Run:
         if condition.is_physical:
             note = "its trials were driven by a robot, and cannot be computed again to be played."
             return _Run(name, replicate, None, 0, rows.height, note)
-        chosen = _choose(
-            rows, room // (condition.on.steps + 1) // condition.arena.robots, tally.score_column(name)
-        )
+        n_fitting = room // (condition.on.steps + 1) // condition.arena.robots
+        chosen = _choose(rows, n_fitting, tally.score_column(name))
         trials = [_pack_row(condition, row) for row in chosen.iter_rows(named=True)]
+        bests = _bests(tally, name, replicate, n_fitting - len(trials))
+        others = [[int(row["replicate"]), *_pack_row(condition, row)] for row in bests.iter_rows(named=True)]
     except (RealityGapError, ValueError):
         note = (
             "its trials cannot be recomputed by this version of realitygap; use the one that ran the study."
@@ -236,11 +231,22 @@ def _pack_run(tally: Tally, described: DescribedCondition, room: int) -> _Run:
         "label": label_of(described),
         "total": rows.height,
         "trials": trials,
+        "best": chosen[tally.score_column(name)].arg_max() or 0,
+        "bests": others,
     }
-    best = chosen[tally.score_column(name)].arg_max() or 0
-    key = [name, replicate, *trials[best][:2]]
-    link = f"#replay={'/'.join(quote(str(part), safe='') for part in key)}@0"
-    return _Run(name, replicate, data, len(trials), rows.height, note, best, link)
+    replayed = (replicate, *(run for run, *_ in others))
+    return _Run(name, replicate, data, len(trials), rows.height, note, replayed)
+
+
+def _bests(tally: Tally, name: str, typical: int, most: int) -> pl.DataFrame:
+    """Return the best trial of each other run, the first of several alike, of as many runs as fit."""
+    runs = [int(run) for run in tally.replicates(name) if run != typical][: max(0, most)]
+    if not runs:
+        return pl.DataFrame()
+    column = pl.col(tally.score_column(name))
+    rows = tally.folder.read(name, runs)
+    best = rows.filter(column == column.max().over("replicate"))
+    return best.unique("replicate", keep="first", maintain_order=True)
 
 
 def _choose(rows: pl.DataFrame, most: int, column: str) -> pl.DataFrame:

@@ -1,44 +1,26 @@
-"""Species over time: their shares in one run, and how many there are in all runs."""
+"""Species over time: their shares in one run."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 import polars as pl
 
-from realitygap._wording import counted
 from realitygap.drawing import Ink
 from realitygap.report._tally import Results, Tally, label_of, read_tally, selection_of
 from realitygap.report.charts.house import Drawing, draw_wide, shorten
-from realitygap.report.charts.lines import (
-    SPECIES_PENS,
-    Dash,
-    LineStyle,
-    TextStyle,
-    draw_line,
-    generation_axis,
-    head,
-    spread,
-    write,
-)
+from realitygap.report.charts.lines import SPECIES_PENS, generation_axis, head, write
 from realitygap.report.charts.marks import MOST_MARKS, Panel, Series
-from realitygap.report.charts.sheet import IS_WIDE, Sheet
+from realitygap.report.charts.sheet import Sheet
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_HEIGHT = 2.25
-"""Height of a panel [in]."""
-
-_LINES: dict[str, tuple[str, Dash, str]] = {
-    "coverage": (Ink.PEN1, "solid", "o"),
-    "novelty": (Ink.PEN2, (0, (5, 1.5)), "s"),
-    "random": (Ink.RUN, (0, (1.2, 1.4)), "^"),
-}
-"""Color, dashes and mark by selection."""
+_WIDTH, _HEIGHT = 5.2, 2.25
+"""Width of the figure and height of its panel [in]."""
 
 _MOST_BARS = 12
 """Generations up to which each has a bar and each share its species' number."""
@@ -61,8 +43,8 @@ def count_species(tally: Tally) -> pl.DataFrame:
     return pl.concat(parts)
 
 
-def _mean_by_selection(tally: Tally, counts: pl.DataFrame) -> dict[str, npt.NDArray[np.float64]]:
-    """Return the mean number of species in each generation, over all runs with a selection, (g,)."""
+def _mean_by_selection(tally: Tally, counts: pl.DataFrame) -> dict[str, float]:
+    """Return the mean number of species in the last generation, over all runs with a selection."""
     selections = pl.DataFrame(
         {
             "condition": [each["name"] for each in tally.conditions],
@@ -71,14 +53,12 @@ def _mean_by_selection(tally: Tally, counts: pl.DataFrame) -> dict[str, npt.NDAr
     )
     means = (
         counts.join(selections, on="condition")
-        .group_by("selection", "generation")
+        .filter(pl.col("generation") == pl.col("generation").max().over("selection"))
+        .group_by("selection")
         .agg(pl.col("species").mean())
-        .sort("selection", "generation")
+        .sort("selection")
     )
-    return {
-        str(key[0]): frame["species"].to_numpy()
-        for key, frame in means.group_by("selection", maintain_order=True)
-    }
+    return dict(means.iter_rows())
 
 
 def draw_species(
@@ -89,7 +69,7 @@ def draw_species(
     species: pl.DataFrame | None = None,
     name: str = "species",
 ) -> Drawing:
-    """The shares of the species in a run over its generations, and how many species all runs have.
+    """The shares of the species in a run over its generations.
 
     Args:
         folder: Results of a study, or the path to them.
@@ -105,63 +85,42 @@ def draw_species(
     tally = read_tally(folder)
     species = count_species(tally) if species is None else species
     condition = tally.name_of(condition)
-    described = tally.condition(condition)
+    label = label_of(tally.condition(condition))
     of_runs = species.filter(pl.col("condition") == condition)
-    is_chosen = replicate is None
+    which = ""
     if replicate is None:
         most = of_runs.group_by("replicate", maintain_order=True).agg(pl.col("species").sum())
         if most.is_empty():
             raise ValueError(f"Condition {condition!r} has no runs yet.")
         replicate = int(most["replicate"][int(most["species"].arg_max() or 0)])
-    rows = tally.rows_of(condition, replicate, ["generation", "species"])
-    shares = _shares(rows)
-    means = _mean_by_selection(tally, species)
-    n_runs = tally.runs.height
-    why = (
-        "chosen because it has the most species (the first of several alike)"
-        if is_chosen
-        else "chosen by number"
-    )
-    numbered = (
-        "with the species’ numbers"
+        which = ", the run with the most species"
+    shares = _shares(tally.rows_of(condition, replicate, ["generation", "species"]))
+    numbers = (
+        "Numbers name species."
         if len(next(iter(shares.values()))) <= _MOST_BARS
-        else "with the numbers of larger species where there is room; colors repeat when there are more than eight"
+        else "Numbers name the larger species. Colors repeat after eight."
     )
-    labels = ", ".join(tally.labels)
+    means = _mean_by_selection(tally, species)
+    last = ", ".join(f"{each} {values:.2f}" for each, values in means.items())
     caption = (
-        f"Left (on a phone, above), condition {condition}, run {replicate}, {why}: the share of each species in the "
-        f"population of each generation, {numbered}. {label_of(described)}, n = 1 run. Right "
-        f"(below), the mean number of species in each generation, over all runs with a selection. "
-        f"{labels}, n = {counted(n_runs, 'run')}, no interval."
+        f"Share of each species in the population by generation, {condition}, run {replicate}{which}. {numbers} "
+        f"{label}, n = 1 run. Mean number of species in the last generation over all runs, by selection: {last}."
     )
-    alt = (
-        f"Species of run {replicate} of {condition}: {len(shares)} in all. Mean number of species in the last "
-        "generation: " + ", ".join(f"{each} {values[-1]:.2f}" for each, values in means.items()) + "."
-    )
-
-    marks = (
-        Panel("shares", _marks_of_shares(shares), (0, 3)),
-        Panel("means", tuple(_marks_of_means(means)), (0, 2)),
-    )
+    alt = f"Species of run {replicate} of {condition}: {len(shares)} in all. Mean number in all runs: {last}."
 
     def draw(width: float) -> Sheet:
-        if width >= IS_WIDE:
-            sheet = Sheet(width, [["shares", "means"]], [_HEIGHT], widths=[0.55, 0.45], gap=0.4)
-        else:
-            sheet = Sheet(width, [["shares"], ["means"]], [_HEIGHT, _HEIGHT], pad=0.16)
-        for key, axes in sheet.panels.items():
-            axes.set_gid(key)
-        left, right = sheet.panels["shares"], sheet.panels["means"]
-        generation_axis(left, "share of the population")
-        generation_axis(right, "mean number of species")
-        head(left, f"{shorten(condition, 28)}, run {replicate}", f"{label_of(described)}, n = 1")
-        head(right, "all runs", f"{labels}, n = {counted(n_runs, 'run')}")
-        _draw_means(right, means)
+        sheet = Sheet(width, [["shares"]], [_HEIGHT])
+        axes = sheet.panels["shares"]
+        axes.set_gid("shares")
+        generation_axis(axes, "share of the population")
+        head(axes, f"{shorten(condition, 28)}, run {replicate}", f"{label}, n = 1")
         sheet.settle()  # so that the panel has the size in which numbers have room
-        _draw_shares(left, shares)
+        _draw_shares(axes, shares)
         return sheet
 
-    return draw_wide(draw, name, caption, alt, marks=marks)
+    return draw_wide(
+        draw, name, caption, alt, marks=(Panel("shares", _marks_of_shares(shares), (0, 3)),), width=_WIDTH
+    )
 
 
 def _marks_of_shares(shares: Mapping[int, npt.NDArray[np.float64]]) -> tuple[Series, ...]:
@@ -177,12 +136,6 @@ def _marks_of_shares(shares: Mapping[int, npt.NDArray[np.float64]]) -> tuple[Ser
     n_kept = int(np.searchsorted(np.cumsum(sizes), MOST_MARKS, side="right"))
     longest = sorted(range(len(series)), key=lambda k: -len(series[k].points))[: max(1, n_kept)]
     return tuple(series[k] for k in sorted(longest))
-
-
-def _marks_of_means(means: Mapping[str, npt.NDArray[np.float64]]) -> Iterator[Series]:
-    for selection, values in means.items():
-        points = np.column_stack([np.arange(len(values)), values])
-        yield Series("{name}, generation {x}: {y} species on average", points, selection)
 
 
 def _shares(rows: pl.DataFrame) -> dict[int, npt.NDArray[np.float64]]:
@@ -255,22 +208,3 @@ def _numbers_with_room(
 
 def _write_number(axes: Axes, number: int, x: float, y: float) -> None:
     write(axes, str(number), (x, y), (0, 0), 7.5, units=("data", "data"), ha="center", va="center")
-
-
-def _draw_means(axes: Axes, means: Mapping[str, npt.NDArray[np.float64]]) -> None:
-    n = max(len(values) for values in means.values())
-    top = max(1.5, 1.08 * max(float(values.max()) for values in means.values()))
-    axes.set_ylim(0, top)
-    axes.set_xlim(-0.2, max(n - 1, 1))
-    places = spread([float(values[-1]) for values in means.values()], 0.075 * top)
-    for (selection, values), place in zip(means.items(), places, strict=True):
-        color, dashes, mark = _LINES.get(selection, (Ink.PEN3, "solid", "D"))
-        marker = mark if n <= _MOST_BARS else "none"
-        line: LineStyle = {"color": color, "linestyle": dashes, "linewidth": 1.4, "clip_on": False}
-        line |= {"marker": marker, "markersize": 4.0}
-        draw_line(axes, np.arange(len(values)), values, **line)
-        beside: TextStyle = {"va": "center", "color": color}
-        write(
-            axes, shorten(selection, 12), (1.03, place), (0, 0), 8, units=("axes fraction", "data"), **beside
-        )
-    axes.grid(axis="y", color=Ink.RULE, linewidth=0.5)

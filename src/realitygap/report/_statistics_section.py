@@ -3,27 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 import polars as pl
 
-from realitygap._wording import Basis, apart_clause, count_range, fixed, signed, span, undecided_clause
-from realitygap.platforms import is_physical
+from realitygap._wording import bracketed, count_range, fixed, signed
 from realitygap.report._champions import FRESH_TRIALS, MOST_RUNS, Champions
 from realitygap.report._comparisons import (
     INTERVAL_NAME,
-    MARGIN,
     Comparison,
     ComparisonsOnPage,
-    comparison_of,
     comparisons_content,
-    noise_extremes,
     same_but_for,
 )
-from realitygap.report._findings import basis_of
 from realitygap.report._questions import (
     MOST_BEHAVIORS,
     Variety,
@@ -37,8 +32,6 @@ from realitygap.report._table import Column, Part, Row, TableOnPage
 from realitygap.report._tally import DescribedCondition, Tally, label_of, settings_of
 from realitygap.stats import Estimate, bca_interval, bca_mean, difference_of_means
 
-_SELECTIONS = {"coverage": "objective search", "novelty": "novelty search", "random": "unrelated networks"}
-
 
 @dataclass(frozen=True)
 class Deception:
@@ -49,7 +42,6 @@ class Deception:
         k: Generations of a plateau.
         generations: Generations of a run.
         without_learning: Share of runs without learning that end on a plateau; None without such a condition.
-        sentences: Results of the comparisons of selections.
         inputs_differ: True if networks have an additional input with novelty.
     """
 
@@ -57,7 +49,6 @@ class Deception:
     k: int
     generations: int
     without_learning: str | None
-    sentences: list[str]
     inputs_differ: bool
 
 
@@ -67,7 +58,6 @@ class Luck:
 
     Attributes:
         table: Best networks as reported and on fresh noise.
-        sentences: The effect of noise as recorded and on fresh noise.
         problem: Why no network could be tried again; None if one could.
         missing: Conditions whose networks could not be tried again.
         fresh_trials: Number of trials of each network on fresh noise.
@@ -75,7 +65,6 @@ class Luck:
     """
 
     table: TableOnPage
-    sentences: list[str]
     problem: str | None
     missing: list[str]
     fresh_trials: int
@@ -127,10 +116,10 @@ class Statistics:
         """Tables of the paper's questions in the order of the page; None for one that is missing."""
         return [
             None if self.deception is None else self.deception.table,
+            None if self.chance is None else self.chance.table,
             None if self.champions.problem else self.champions.table,
             self.spread,
             self.variety,
-            None if self.chance is None else self.chance.table,
         ]
 
 
@@ -148,7 +137,6 @@ def statistics_content(
         champions: Its best networks on fresh noise, from `retry_champions`.
         fresh: Comparisons of these networks, from `compare_champions`.
     """
-    basis = basis_of(champions)
     with_runs = tally.with_runs
     labels = ", ".join(sorted({label_of(each) for each in with_runs}))
     return Statistics(
@@ -161,8 +149,8 @@ def statistics_content(
         fresh=comparisons_content(
             fresh, "fresh", "Differences between conditions, best networks on fresh noise", "Conclusion"
         ),
-        deception=_deception(tally, fresh if basis.is_fresh else comparisons, with_runs, basis, labels),
-        champions=_champions(tally, comparisons, champions, fresh, with_runs),
+        deception=_deception(tally, with_runs, labels),
+        champions=_champions(tally, champions, with_runs),
         spread=_spread(tally, labels),
         variety=_variety(tally, with_runs, labels),
         chance=_chance(tally, labels),
@@ -177,13 +165,7 @@ def _table(name: str, caption: str, columns: Sequence[Column], rows: Sequence[Ro
 # deceptiveness
 
 
-def _deception(
-    tally: Tally,
-    comparisons: Sequence[Comparison],
-    conditions: Sequence[DescribedCondition],
-    basis: Basis,
-    labels: str,
-) -> Deception | None:
+def _deception(tally: Tally, conditions: Sequence[DescribedCondition], labels: str) -> Deception | None:
     rows: list[Row] = []
     generations = 0
     for condition in conditions:
@@ -198,7 +180,7 @@ def _deception(
                 name,
                 f"{share.n:,}",
                 f"{values.mean():.3f}",
-                span(bca_mean(values)),
+                bracketed(bca_mean(values), missing="–"),
                 _percent(share),
                 _percent_span(share),
             )
@@ -225,7 +207,6 @@ def _deception(
         k=k,
         generations=generations,
         without_learning=f"{100 * (generations - k) / generations:.0f} %" if has_random else None,
-        sentences=[basis.claim(each) for each in _selection_sentences(comparisons, conditions)],
         inputs_differ=_inputs_differ(conditions),
     )
 
@@ -240,43 +221,8 @@ def _inputs_differ(conditions: Sequence[DescribedCondition]) -> bool:
     )
 
 
-def _selection_sentences(
-    comparisons: Sequence[Comparison], conditions: Sequence[DescribedCondition]
-) -> list[str]:
-    """Return the order and the differences, in sentences, of each group of conditions that differ only in selection."""
-    sentences = []
-    for group in same_but_for("selection", conditions):
-        names = {settings_of(each)["selection"]: str(each["name"]) for each in group}
-        parts = []
-        for one, other in (("coverage", "random"), ("novelty", "coverage"), ("novelty", "random")):
-            if one in names and other in names:
-                parts.append(_apart(comparisons, names, one, other))
-        if parts:
-            noise = settings_of(group[0]).get("noise")
-            level = f"{100 * noise:g} % noise" if isinstance(noise, int | float) else "this noise"
-            where = f"on the robot ({label_of(group[0])})" if _is_driven(group[0]) else f"at {level}"
-            sentences.append(f"{where}: {'; '.join(parts)}")
-    return sentences
-
-
-def _is_driven(condition: DescribedCondition) -> bool:
-    return is_physical(settings_of(condition))
-
-
-def _apart(comparisons: Sequence[Comparison], names: Mapping[str, str], one: str, other: str) -> str:
-    words = _SELECTIONS[one], _SELECTIONS[other]
-    comparison = comparison_of(comparisons, names[one], names[other])
-    if comparison is None:
-        return f"{words[0]} and {words[1]} not compared"
-    within = _within(comparison.difference)
-    if comparison.is_shown:
-        return f"{apart_clause(*words, comparison.size)}{within}"
-    why = undecided_clause(comparison.can_claim, bool(comparison.is_equivalent), MARGIN)
-    return f"{words[0]} less {words[1]} {signed(comparison.size)}{within}, {why}"
-
-
 def _within(difference: Estimate, digits: int = 3) -> str:
-    return "" if difference.ends is None else f" ({span(difference, digits, signs=True)})"
+    return "" if difference.ends is None else f" {bracketed(difference, digits, signs=True)}"
 
 
 def _percent(share: Estimate) -> str:
@@ -284,23 +230,16 @@ def _percent(share: Estimate) -> str:
 
 
 def _percent_span(share: Estimate) -> str:
-    return "–" if share.ends is None else f"{100 * share.ends[0]:.0f}–{100 * share.ends[1]:.0f} %"
+    return "–" if share.ends is None else f"[{100 * share.ends[0]:.0f}, {100 * share.ends[1]:.0f}] %"
 
 
 # champions
 
 
-def _champions(
-    tally: Tally,
-    comparisons: Sequence[Comparison],
-    found: Sequence[Champions],
-    fresh: Sequence[Comparison],
-    conditions: Sequence[DescribedCondition],
-) -> Luck:
+def _champions(tally: Tally, found: Sequence[Champions], conditions: Sequence[DescribedCondition]) -> Luck:
     problems = {each.problem for each in found if each.problem}
     return Luck(
-        table=_champions_table(found, fresh, conditions),
-        sentences=_noise_sentences(comparisons, fresh, conditions),
+        table=_champions_table(found, conditions),
         problem=None if any(not each.problem for each in found) else "; ".join(sorted(problems)),
         missing=[each.condition for each in found if each.problem],
         fresh_trials=FRESH_TRIALS,
@@ -308,10 +247,7 @@ def _champions(
     )
 
 
-def _champions_table(
-    found: Sequence[Champions], fresh: Sequence[Comparison], conditions: Sequence[DescribedCondition]
-) -> TableOnPage:
-    references = _references("noise", conditions)
+def _champions_table(found: Sequence[Champions], conditions: Sequence[DescribedCondition]) -> TableOnPage:
     columns = [
         Column("n"),
         Column("reported"),
@@ -321,53 +257,18 @@ def _champions_table(
         Column("interval"),
     ]
     rows: list[Row] = [_champion_row(each) for each in found if not each.problem]
-    if references:
-        columns.append(Column("on fresh noise, less that of its selection’s first noise level"))
-        rows = [
-            (*row, _difference_between(fresh, str(row[0]), references.get(str(row[0]), ""))) for row in rows
-        ]
     labels = ", ".join(sorted({label_of(each) for each in conditions}))
     return _table(
         "champions",
-        f"Best networks as reported and on fresh noise ({labels}; n champions, those of the first {MOST_RUNS} runs at "
-        f"most, {FRESH_TRIALS} fresh trials each). Intervals: {INTERVAL_NAME}, over champions.",
+        f"Coverage of best networks as reported and on fresh noise ({labels}; n runs, up to {MOST_RUNS}; "
+        f"{FRESH_TRIALS} fresh trials each). Intervals: {INTERVAL_NAME}, over runs.",
         columns,
         rows,
     )
 
 
-def _noise_sentences(
-    recorded: Sequence[Comparison],
-    fresh: Sequence[Comparison],
-    conditions: Sequence[DescribedCondition],
-) -> list[str]:
-    """Describe the recorded effect of the highest noise against the lowest, and the effect on fresh noise."""
-    sentences = []
-    for least, most in noise_extremes(conditions):
-        low, high = least["name"], most["name"]
-        changes = [_difference_between(each, high, low) for each in (recorded, fresh)]
-        if "–" not in changes:
-            sentences.append(f"{high} less {low}: {changes[0]} as recorded, {changes[1]} on fresh noise.")
-    return sentences
-
-
-def _difference_between(comparisons: Sequence[Comparison], one: str, other: str) -> str:
-    """Return the difference of two conditions that were compared, with its interval; a dash otherwise."""
-    comparison = comparison_of(comparisons, one, other)
-    return "–" if comparison is None else f"{signed(comparison.size)}{_within(comparison.difference)}"
-
-
 def _trials_a_run(tally: Tally) -> str:
     return count_range(tally.best.group_by("condition", "replicate").agg(pl.col("trials").sum())["trials"])
-
-
-def _references(key: str, conditions: Sequence[DescribedCondition]) -> dict[str, str]:
-    """Return, for each condition, the first one of those that differ only in `key`; the first itself is left out."""
-    return {
-        str(each["name"]): str(group[0]["name"])
-        for group in same_but_for(key, conditions)
-        for each in group[1:]
-    }
 
 
 def _champion_row(champions: Champions) -> tuple[str, ...]:
@@ -377,9 +278,9 @@ def _champion_row(champions: Champions) -> tuple[str, ...]:
         f"{champions.n:,}",
         f"{champions.reported.mean():.3f}",
         f"{champions.expected.mean():.3f}",
-        span(champions.expected_mean),
+        bracketed(champions.expected_mean, missing="–"),
         signed(luck.value or 0.0),
-        span(luck, signs=True),
+        bracketed(luck, missing="–", signs=True),
     )
 
 
@@ -403,9 +304,9 @@ def _spread(tally: Tally, labels: str) -> TableOnPage:
         ratios = (
             each.reference,
             _number(each.ratio.value, 2),
-            span(each.ratio, 2),
+            bracketed(each.ratio, 2, "–"),
             _number(each.robust_ratio.value, 2),
-            span(each.robust_ratio, 2),
+            bracketed(each.robust_ratio, 2, "–"),
         )
         if each.reference == each.condition:
             ratios = ("",) * 5
@@ -432,7 +333,7 @@ def _variety(tally: Tally, conditions: Sequence[DescribedCondition], labels: str
         names = {settings_of(each)["selection"]: str(each["name"]) for each in group}
         if "coverage" in names:
             objective |= {name: names["coverage"] for name in names.values() if name != names["coverage"]}
-    less = [Column("less the objective’s")] if objective else []
+    less = [Column("− objective search")] if objective else []
     columns = [
         Column("n"),
         *(Column("sorted cells [cells]", kind="median"), Column("interval"), *less),
@@ -445,8 +346,9 @@ def _variety(tally: Tally, conditions: Sequence[DescribedCondition], labels: str
     n_behaviors = max(each.n_behaviors for each in measured)
     return _table(
         "variety",
-        f"Variety of behaviors within a run ({labels}; n runs, the first {MOST_RUNS} at most; {n_behaviors} behaviors "
-        f"of each{' at most' if n_behaviors == MOST_BEHAVIORS else ''}). Intervals: {INTERVAL_NAME}, over runs.",
+        f"Variety of behaviors within a run ({labels}; n runs, up to {MOST_RUNS}; "
+        f"{'up to ' if n_behaviors == MOST_BEHAVIORS else ''}{n_behaviors} behaviors of each). Intervals: "
+        f"{INTERVAL_NAME}, over runs.",
         columns,
         rows,
     )
@@ -458,7 +360,7 @@ def _variety_row(variety: Variety, objective: Variety | None) -> tuple[str, ...]
         (1, variety.sorted_cells, None if objective is None else objective.sorted_cells),
         (3, variety.jaccard, None if objective is None else objective.jaccard),
     ):
-        row += [f"{own.mean():.{digits}f}", span(bca_mean(own), digits)]
+        row += [f"{own.mean():.{digits}f}", bracketed(bca_mean(own), digits, "–")]
         row.append("" if other is None else _difference(own, other, digits))
     return tuple(row)
 
@@ -490,9 +392,8 @@ def _chance(tally: Tally, labels: str) -> ChanceOnPage | None:
             )
     table = _table(
         "chance",
-        f"How often a noise level has the highest mean of those with the same selection ({labels}): when runs are "
-        "drawn from the n observed ones, and when all levels have one distribution. Exact for these runs; levels with "
-        "equal means share.",
+        f"How often a noise level has the highest mean of those with the same selection ({labels}), if runs are drawn "
+        "from the n observed ones, and if all levels have one distribution. Ties are shared.",
         (
             Column("n"),
             Column("mean"),
@@ -517,8 +418,8 @@ def _chance_sentence(tally: Tally) -> str | None:
         return None
     (objective, equal), (novelty, _) = by_selection["coverage"], by_selection["novelty"]
     return (
-        f"“50 % noise is best” comes out of three runs a level in {100 * objective:.0f} % of studies of objective "
-        f"search and {100 * novelty:.0f} % of those of novelty search, and in both at once in "
-        f"{100 * objective * novelty:.0f} %. If noise made no difference at all it would be "
-        f"{100 * equal:.0f} % each, and both would agree on some level in {100 * equal:.0f} % of studies."
+        f"With three runs per level, 50 % noise is the best in {100 * objective:.0f} % of studies of objective "
+        f"search, in {100 * novelty:.0f} % of those of novelty search, and in both in "
+        f"{100 * objective * novelty:.0f} %. If noise had no effect, it would be {100 * equal:.0f} % each, and both "
+        f"would agree on some level in {100 * equal:.0f} % of studies."
     )

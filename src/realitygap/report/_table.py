@@ -71,7 +71,6 @@ class TableOnPage:
         columns: Its columns.
         parts: Its rows.
         kind: Classes of the table in a style sheet.
-        is_cards: True to show each row as a card on a narrow screen.
         separates_parts: True if each part is a body of its own.
         number: Number on the page, from 1; 0 for a table without one.
     """
@@ -81,7 +80,6 @@ class TableOnPage:
     columns: tuple[Column, ...]
     parts: tuple[Part, ...]
     kind: str = "numbers statistics"
-    is_cards: bool = False
     separates_parts: bool = False
     number: int = 0
 
@@ -169,7 +167,7 @@ _ESCAPES = {
 }  # fmt: skip
 _SUPERSCRIPTS = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
 _POWER = re.compile("·10([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)")
-_NUMBER = re.compile(r"[<>=]? ?[+-]?[\d.,]+(?:·10[^\d\s]+)?(?: ?%)?(?:[\N{EN DASH}\s].*)?|")
+_NUMBER = re.compile(r"\[[^]]*\].*|[<>=]? ?[+-]?[\d.,]+(?:·10[^\d\s]+)?(?: ?%)?(?:[\N{EN DASH}\s].*)?|")
 
 
 def latex_table(caption: str, label: str, rows: Sequence[Sequence[str]]) -> str:

@@ -39,13 +39,22 @@ def page_environment(**filters: Callable[..., str]) -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters.update(filters, formula=_formula)
+    environment.filters.update(filters, formula=_formula, badge=_badge)
     return environment
 
 
 def _formula(text: str) -> Markup:
     """Return a text of ours with the index of the effect size A12 set low."""
     return escape(text).replace("A12", Markup("A<sub>12</sub>"))
+
+
+_BADGE = re.compile(r"(?<=\. )((SIM|TWIN|EMULATED|REAL)\b[^.]*)\.")
+"""A sentence of a caption that is the label of a figure and its n."""
+
+
+def _badge(text: str) -> Markup:
+    """Return a caption with its label and n as a badge."""
+    return Markup(_BADGE.sub(r'<span class="badge label-\2">\1</span>', str(escape(text))))
 
 
 _UNIT = re.compile(

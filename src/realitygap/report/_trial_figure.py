@@ -170,7 +170,7 @@ def draw_trial(
         f"{trial.title}: {n_steps} steps of {trajectory.step_s:g} s, {n_stalls} of them blocked (×; gray stripes), "
         f"coverage {coverage:.3f} {tally.counted}. Dot: start; circle: end; shaded: cells visited. Readings are "
         "distances without noise; obstacle is what the network saw, 1 being nearest, with noise. "
-        f"{several if trajectory.others else ''}{trial.label}, n = 1 trial, no interval. Recomputed from the records."
+        f"{several if trajectory.others else ''}{trial.label}, n = 1 trial. Recomputed from the records."
     )
     alt = f"Path, readings and commands of one trial. {caption}"
     return draw_wide(lambda width: _draw(trial, trajectory, width), "trial", caption, alt)

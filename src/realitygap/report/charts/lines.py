@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Literal, TypedDict, Unpack
 
@@ -190,12 +189,3 @@ def generation_axis(axes: Axes, unit: str, most: int = 8) -> None:
     axes.xaxis.set_major_locator(MaxNLocator(most, integer=True))
     axes.set_xlabel("generation", labelpad=2)
     axes.set_ylabel(unit)
-
-
-def spread(values: Sequence[float], apart: float) -> list[float]:
-    """The values moved apart to at least a distance, in their order, so that labels at them do not overlap."""
-    places = list(values)
-    order = sorted(range(len(values)), key=lambda k: values[k])
-    for before, after in itertools.pairwise(order):
-        places[after] = max(places[after], places[before] + apart)
-    return places

@@ -26,8 +26,8 @@ class Series:
         points: (m, 2) x and y in the units of the axes.
         name: Name of the series.
         labels: Label of each mark; none if `text` has no {label}.
-        link: Address within the page that a click on one of `linked` marks leads to; empty for none.
-        linked: Index of the mark with the link.
+        link: Address within the page that a click on a mark leads to, without the mark's label; empty for none.
+        n_linked: Number of marks, from the first, that have the link.
     """
 
     text: str
@@ -35,7 +35,7 @@ class Series:
     name: str = ""
     labels: tuple[str, ...] = ()
     link: str = ""
-    linked: int = 0
+    n_linked: int = 0
 
 
 @dataclass(frozen=True)
@@ -123,7 +123,7 @@ def _series_content(series: Series, panel: Panel, texts: Sequence[str]) -> list[
         for values, decimals in zip(series.points.T, panel.decimals, strict=True)
     )
     row = [texts.index(series.text), series.name, ys, 0 if xs == list(range(len(xs))) else xs]
-    more = [list(series.labels) or 0, series.link or 0, series.linked]
+    more = [list(series.labels) or 0, series.link or 0, series.n_linked]
     while more and not more[-1]:
         more.pop()
     return row + more

@@ -7,9 +7,9 @@
   // The marks of a figure in one of its forms; each series is a row.
   const read = ({ frames, panels, narrow }, form, n = 0) => (form && narrow || panels).flatMap(({ decimals: [i, j], texts, series }, k) => {
     const [a, b, c, d, ...box] = frames[form][k];
-    return series.flatMap(([text, name, ys, xs, labels, link, linked = 0], _, __, row = n++) => ys.map((v, place) => {
+    return series.flatMap(([text, name, ys, xs, labels, link, linked], _, __, row = n++) => ys.map((v, place) => {
       const u = xs ? xs[place] : place, words = [name, labels?.[place], (u / 10 ** i).toFixed(i), (v / 10 ** j).toFixed(j)];
-      return { x: a + b * u, y: c + d * v, row, place, box, link: place === linked && link, text: texts[text].replace(/{(.)}/g, (_, k) => words[k]) };
+      return { x: a + b * u, y: c + d * v, row, place, box, link: place < linked && link + words[1], text: texts[text].replace(/{(.)}/g, (_, k) => words[k]) };
     }));
   });
 

@@ -13,17 +13,20 @@ const conditions = data.conditions.map((packed) => {
   if (!scenes.has(key)) scenes.set(key, packed.scene);
   const condition = { ...packed, scene: scenes.get(key), nCells: arena.grid.columns * arena.grid.rows };
   const { outlines, mounts, reach, steps: n } = packed;
-  condition.trials = packed.trials.map(([generation, individual, line, ends, stepS, bytes, ...others]) => {
-    const shared = { condition, generation, individual, line, ends, step_s: stepS, n, outlines, mounts, reach, parts: 1, placed: true };
-    const link = [packed.name, packed.run, generation, individual].map(encodeURIComponent).join("/");
+  const read = (run, [generation, individual, line, ends, stepS, bytes, ...others]) => {
+    const shared = { condition, run, generation, individual, line, ends, step_s: stepS, n, outlines, mounts, reach, parts: 1, placed: true };
+    const link = [packed.name, run, generation, individual].map(encodeURIComponent).join("/");
     return { ...shared, bytes, link, others: others.map((other) => ({ ...shared, bytes: other })) };
-  });
+  };
+  condition.trials = packed.trials.map((trial) => read(packed.run, trial));
+  condition.bests = [condition.trials[packed.best], ...packed.bests.map(([run, ...trial]) => read(run, trial))]; // of each run
   return condition;
 });
 const count = (trial) => (data.measure === "ends" ? trial.ends : trial.line);
 const share = (n, trial) => (n / trial.condition.nCells).toFixed(3);
-const nameOf = ({ condition, generation, individual }) => `${condition.name}, generation ${generation}, individual ${individual}`;
-const pathOf = ({ condition, generation, individual }) => `${condition.name}/${condition.run}/${generation}/${individual}`;
+const nameOf = ({ condition, run, generation, individual }) => `${condition.name}, run ${run}, generation ${generation}, individual ${individual}`;
+const runOf = ({ condition, run }) => `${condition.name}/${run}`;
+const pathOf = (trial) => `${runOf(trial)}/${trial.generation}/${trial.individual}`;
 
 // columns of differences, each a zigzag number of 7 bits a byte
 function unpack(trial) {
@@ -77,7 +80,7 @@ function drawTrials() {
   robots = used.flatMap(({ trial, pen }) => [trial, ...trial.others].map((robot, k) => ({ ...unpack(robot), ...data.pens[pen], isOther: k > 0 })));
   stage.show((only ? only.trial.condition : conditions[shown]).scene, robots);
   const labels = [...new Set(used.map(({ trial }) => trial.condition.label))].map((label) => tag("span", label, { class: "label" }));
-  const title = used.length === 1 ? `${only.trial.condition.name}, run ${only.trial.condition.run}, generation ${only.trial.generation}, individual ${only.trial.individual}` : `${used.length || "No"} trials`;
+  const title = used.length === 1 ? nameOf(only.trial) : `${used.length || "No"} trials`;
   byId("labels").replaceChildren(...labels, ` ${title}`);
 }
 
@@ -232,7 +235,7 @@ function drawMatrix() {
   byId("matrix").replaceChildren(table);
   setFocus(Math.min(focus[0], matrix.length - 1), Math.min(focus[1], individuals.length), hadFocus);
   const which = condition.trials.length === condition.total ? `all ${condition.total}` : `${condition.trials.length} of ${condition.total}`;
-  byId("matrix-text").textContent = `Run ${condition.run}, ${which} trials: cells visited (of ${condition.nCells}) by each individual, left to right. Up to ${pens.length} at once; a generation’s number takes all of it.`;
+  byId("matrix-text").textContent = `Run ${condition.run}, ${which} trials: number of visited cells (of ${condition.nCells}) by generation and individual. Select up to ${pens.length} trials; click a generation number to select its row.`;
 }
 
 function makeChoice(trial, most) {
@@ -341,30 +344,34 @@ chart.addEventListener("pointerdown", (event) => {
 chart.addEventListener("pointermove", drag);
 
 // once in view, and only once; not with reduced motion, and not for a reader who already uses the controls
-function playInView(element, player, mayPlay) {
+function playInView() {
   if (still.matches) return;
   const observer = new IntersectionObserver(([entry]) => {
     if (entry.intersectionRatio < 0.6) return;
     observer.disconnect();
-    if (mayPlay()) player.play();
+    if (clock.at === 0 && !clock.isPlaying && inUse().length) clock.play();
   }, { threshold: [0.6] });
-  observer.observe(element);
-  for (const use of ["pointerdown", "keydown"]) element.parentElement.addEventListener(use, () => observer.disconnect());
+  observer.observe(byId("stage"));
+  for (const use of ["pointerdown", "keydown"]) byId("figure").addEventListener(use, () => observer.disconnect());
 }
 
 // links and start
 
-// #replay=CONDITION/RUN/GENERATION/INDIVIDUAL,...@STEP
+// #replay=CONDITION/RUN/GENERATION/INDIVIDUAL,...@STEP, or CONDITION/RUN for the best trial of a run, which plays
 function follow() {
   if (!location.hash.startsWith("#replay=")) return false;
   const [wanted, step] = location.hash.slice("#replay=".length).split("@");
   const linked = new Set(), missing = [];
+  let isRun = false;
   for (const text of wanted.split(",").filter(Boolean).slice(0, pens.length)) {
     let path = text;
     try {
       path = text.split("/").map(decodeURIComponent).join("/");
     } catch { /* not a link of ours: the message shows it as it is */ }
-    const trial = conditions.flatMap(({ trials }) => trials).find((candidate) => pathOf(candidate) === path);
+    const bests = conditions.flatMap((condition) => condition.bests);
+    const run = bests.find((candidate) => runOf(candidate) === path);
+    const trial = run || [...conditions.flatMap(({ trials }) => trials), ...bests].find((candidate) => pathOf(candidate) === path);
+    isRun ||= Boolean(run);
     if (trial) linked.add(trial);
     else missing.push(path);
   }
@@ -373,61 +380,38 @@ function follow() {
     shown = conditions.indexOf(first.condition);
     byId("condition").value = shown;
     clock.pause();
-    choose([...linked], "As linked");
-    clock.goTo(step === undefined || !Number.isFinite(Number(step)) ? Infinity : Number(step));
+    choose([...linked], isRun ? `Best of run ${first.run} of ${first.condition.name}` : "As linked");
+    clock.goTo(isRun ? 0 : step === undefined || !Number.isFinite(Number(step)) ? Infinity : Number(step));
+    if (isRun) {
+      history.replaceState(null, "", byId("link").getAttribute("href")); // so that the same link works again
+      if (!still.matches) clock.play();
+    }
   }
-  if (missing.length) tell(`Not on this page: ${missing.join(", ")}. Written as condition/run/generation/individual.`);
-  byId("figure").scrollIntoView();
+  if (missing.length) tell(`Not on this page: ${missing.join(", ")}. Expected condition/run/generation/individual.`);
+  byId("main").scrollIntoView({ block: "nearest" });
   return linked.size > 0;
 }
 
-// the first screen: the best path of one condition, which plays in some eight seconds
-function makeLead(element) {
-  const trial = unpack(conditions[data.lead[0]].trials[data.lead[1]]), byLead = (id) => document.getElementById(`lead-${id}`);
-  const leadRobots = [trial, ...trial.others].map((robot) => ({ ...unpack(robot), ...data.pens[0] }));
-  const svg = make("svg", { class: "rg-field", role: "img", "aria-label": element.querySelector("svg").getAttribute("aria-label") });
-  element.replaceChildren(svg);
-  const leadStage = makeStage(svg), duration = trial.n * trial.step_s;
-  const drawLead = () => {
-    leadStage.draw(leadRobots.map((robot) => momentOf(robot, lead.at)));
-    byLead("clock").textContent = `${seconds(lead.step(), trial.step_s)}\u00a0s, step ${lead.step()} of ${trial.n}`;
-  };
-  const lead = makeClock(() => duration, () => trial.step_s, () => Math.max(1, duration / 8), drawLead, () => showPlaying(byLead("play"), lead.isPlaying));
-  leadStage.show(trial.condition.scene, leadRobots);
-  byLead("play").addEventListener("click", lead.toggle);
-  byLead("open").setAttribute("href", `#replay=${trial.link}@0`);
-  byLead("controls").hidden = false;
-  onResize(element, () => {
-    leadStage.measure();
-    drawLead();
-  });
-  lead.goTo(still.matches ? Infinity : 0);
-  playInView(element, lead, () => true);
-  return lead;
+// on paper, the replay is at its last step
+let onScreen = null;
+function setPrinted(isPrinted) {
+  if (isPrinted === (onScreen !== null)) return;
+  const step = isPrinted ? Infinity : onScreen;
+  onScreen = isPrinted ? clock.step() : null;
+  clock.goTo(step);
 }
-
-// on paper, replays are at their last step
-function printLast(clocks) {
-  let before = null;
-  const set = (isPrinted) => {
-    if (isPrinted === Boolean(before)) return;
-    const steps = isPrinted ? clocks.map(() => Infinity) : before;
-    before = isPrinted ? clocks.map((player) => player.step()) : null;
-    clocks.forEach((player, k) => player.goTo(steps[k]));
-  };
-  window.addEventListener("beforeprint", () => set(true));
-  window.addEventListener("afterprint", () => set(false));
-  window.matchMedia("print").addEventListener("change", ({ matches }) => set(matches));
-}
+window.addEventListener("beforeprint", () => setPrinted(true));
+window.addEventListener("afterprint", () => setPrinted(false));
+window.matchMedia("print").addEventListener("change", ({ matches }) => setPrinted(matches));
 
 byId("without").hidden = true;
 byId("figure").hidden = false;
 if (!follow()) {
-  [shown] = data.lead;
-  pens[0] = conditions[shown].trials[data.lead[1]];
+  shown = data.lead;
+  [pens[0]] = conditions[shown].bests;
   byId("condition").value = shown;
   redraw();
-  playInView(byId("stage"), clock, () => clock.at === 0 && !clock.isPlaying && inUse().length > 0);
+  playInView();
 }
 window.addEventListener("hashchange", follow);
 onResize(byId("stage"), () => {
@@ -436,5 +420,3 @@ onResize(byId("stage"), () => {
   draw();
 });
 still.addEventListener("change", draw);
-const first = document.getElementById("lead-stage");
-printLast(first ? [clock, makeLead(first)] : [clock]);

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -10,8 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from realitygap.report._audit import compare_samples, doubt
-from realitygap.report._table import Column, Part, TableOnPage
-from realitygap.report._tally import Tally, label_of, settings_of
+from realitygap.report._tally import Tally, settings_of
 from realitygap.stats import SEED, smallest_p
 
 INCH_M = 0.0254
@@ -228,61 +226,24 @@ def _words() -> list[Inconsistency]:
     ]
 
 
-# on the page
+def spread_of_three(tally: Tally) -> list[tuple[str, str, str]]:
+    """Return how often three runs of a condition spread as far as the robot's, and how often two threes differ as much.
 
+    Args:
+        tally: A study with the conditions of the paper.
 
-@dataclass(frozen=True)
-class AuditOnPage:
-    """The inconsistencies of the paper, and whether its robot is less stable.
-
-    Attributes:
-        table: The findings.
-        spread: Sentences on the spread of the robot's runs; empty without runs to compare.
+    Returns:
+        The name of each condition with novelty search, and both shares of 20,000 draws.
     """
-
-    table: TableOnPage
-    spread: list[str]
-
-
-def paper_audit_content(tally: Tally) -> AuditOnPage | None:
-    """Return the content of the page; None unless the study is the paper's."""
-    if tally.description.get("name") != "paper":
-        return None
-    rows = [(each.section, each.printed, each.found, each.bearing) for each in audit_paper()]
-    columns = tuple(map(Column, ("Section", "Printed", "Found", "Bearing")))
-    table = TableOnPage("audit", "What does not add up in the paper.", columns, (Part(rows),), kind="audit")
-    return AuditOnPage(table, _spread_sentences(tally))
-
-
-def _spread_sentences(tally: Tally) -> list[str]:
-    """Describe how often three of our runs spread as far as the robot's, and how often two threes differ as much."""
-    robot, *simulated = table_2().values()
-    narrowest = min(simulated, key=lambda values: float(values.std()))
-    ratio = float(robot.std(ddof=1) / narrowest.std(ddof=1))
+    robot, *simulated = (float(values.std(ddof=1)) for values in table_2().values())
+    ratio = robot / min(simulated)
     rng = np.random.default_rng(SEED)
-    wide, apart, labels, sizes = [], [], set(), set()
+    rows = []
     for condition in tally.conditions:
         values = tally.run_bests(condition["name"], tally.measure)
         if settings_of(condition).get("selection") != "novelty" or len(values) < 3:
             continue
-        labels.add(label_of(condition))
-        sizes.add(len(values))
         first, second = rng.choice(values, (2, _DRAWS, 3)).std(axis=2, ddof=1)
-        wide.append(float((first >= robot.std(ddof=1) - 1e-9).mean()))
-        apart.append(float((first >= ratio * second - 1e-9).mean()))
-    if not wide:
-        return []
-    n = _range(sizes, "{:,.0f}")
-    return [
-        f"The robot’s three runs of Table 2 have a standard deviation of {robot.std(ddof=1):.3f}, "
-        f"{ratio:.1f} times that of the closest three of the simulation ({narrowest.std(ddof=1):.3f}). Of three "
-        f"runs drawn from one of our conditions with novelty ({', '.join(sorted(labels))}, n = {n} runs), "
-        f"{_range(wide, '{:.0%}')} lie as far apart as the robot’s; and of two threes drawn from one and the same "
-        f"condition, the first spreads {ratio:.1f} times as much as the second in {_range(apart, '{:.0%}')} of "
-        f"{_DRAWS:,} draws. There were three rows to be the closest, so chance had three times to do it."
-    ]
-
-
-def _range(values: Collection[float], form: str) -> str:
-    low, high = (form.format(end).replace("%", " %") for end in (min(values), max(values)))
-    return low if low == high else f"{low} to {high}"
+        shares = ((first >= robot - 1e-9).mean(), (first >= ratio * second - 1e-9).mean())
+        rows.append((condition["name"], *(f"{share:.0%}" for share in shares)))
+    return rows

@@ -355,6 +355,11 @@ def platform_in_words(spec: str, label: str) -> str:
     return {"sim": f"sim with {stem}", "twin": f"the twin {stem}"}.get(name, f"the recorded trials {stem}")
 
 
+def trials_each(trials: tuple[int, int]) -> str:
+    """Return the numbers of trials of each controller on the simulator and on the target."""
+    return f"{' and '.join(str(n) for n in dict.fromkeys(trials))} trials of each on both platforms"
+
+
 def gap_equivalence(equivalence: Estimate) -> str:
     """Return whether the level is shown to be equivalent, with its interval of 90 %; empty if that is not tested."""
     margin, is_equivalent = equivalence.more.get("margin"), equivalence.more.get("equivalent")
@@ -399,6 +404,21 @@ def level_verdict(
         f"Don’t trust {sim} for {of}: it is {size:.3f} [{ends[0]:.3f}, {ends[1]:.3f}] "
         f"{'lower' if lower else 'higher'} on {target}."
     )
+
+
+def change_verdict(change: Estimate, before: Estimate, after: Estimate) -> str:
+    """Return what a calibration did to the RMS gap, as a sentence.
+
+    Args:
+        change: Difference of the RMS gap, after minus before.
+        before, after: The RMS gap.
+    """
+    if change.value is None or change.ends is None or before.value is None or after.value is None:
+        return "Too few controllers or trials to judge the calibration."
+    figures = f"from {before.value:.3f} to {after.value:.3f}, a difference of {with_interval(change)}."
+    if change.ends[0] <= 0 <= change.ends[1]:
+        return f"The calibration is not shown to change the RMS gap: {figures}"
+    return f"The calibration {'lowers' if change.value < 0 else 'raises'} the RMS gap {figures}"
 
 
 def rank_verdict(raw: Estimate, ceiling: Estimate, without: Estimate) -> str:

@@ -49,6 +49,7 @@ COMMANDS = {
     "sensors": "calibrate sensors --robot sim --budget 6 -o sensors.toml --figure sensors.svg",
     "run": "run paper --replicates 6 --out runs",
     "gap": "gap sim jyro --n-controllers 4 --trials 3 --margin 0.05 --report gap.html",
+    "close": "close sim sim --what path --budget 2 --n-controllers 5 --trials 2 -o closed",
     "plan": "plan --effect 0.1",
     "plan of a correlation": "plan --correlation 0.9",
     "try": "try champion.json --on sim --trials 2 --steps 10",

@@ -79,6 +79,7 @@ PRINTED_BY = {
     "study/_calibrate/ordered.py": ("calibrate",),
     "study/_calibrate/whole.py": ("calibrate",),
     "study/_camera.py": ("calibrate", "drive", "gap", "track"),
+    "study/_close.py": ("close",),
     "study/_closing/plan.py": ("closing-the-gap",),
     "study/_cluster.py": ("run",),
     "study/_code.py": ("gap", "plan"),

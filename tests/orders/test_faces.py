@@ -17,6 +17,7 @@ from realitygap.settings import MISSING
 
 FUNCTIONS = {
     "calibrate": "make_calibration",
+    "close": "close_gap",
     "closing-the-gap": "closing_the_gap",
     "gap": "gap_between",
     "plan": "plan_gap",
@@ -25,6 +26,7 @@ FUNCTIONS = {
 }
 SMALLEST = {
     "calibrate": {"what": "path", "robot": "sim", "out": "fit.toml"},
+    "close": {"sim": "sim", "target": "twin:worn.toml"},
     "closing-the-gap": {},
     "gap": {"sim": "sim", "target": "jyro"},
     "plan": {"effect": 0.1},
@@ -41,6 +43,7 @@ WITH = {
         "drop_bad_rows": {"what": "motion"},
         "out": {"out": "there.toml"},
     },
+    "close": {},
     "closing-the-gap": {"budgets": {"budgets": "0,20"}},
     "gap": {},
     "plan": {"margin": {"effect": None}, "correlation": {"effect": None, "correlation": 0.9}},
@@ -51,6 +54,7 @@ WITH = {
 
 ONLY_IN_THE_COMMAND = {
     "calibrate": {"camera", "figure", "allow_code", "as_json"},
+    "close": {"allow_code", "as_json", "open_page"},
     "closing-the-gap": {"as_json", "open_page"},
     "gap": {"camera", "report", "full", "allow_code", "as_json"},
     "plan": {"allow_code", "as_json"},

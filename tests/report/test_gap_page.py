@@ -35,15 +35,16 @@ def test_the_page_has_verdict_measures_figures_and_no_address(gap, tmp_path):
     path = write_gap_report(gap, tmp_path / "gap.html")
     page = path.read_text("utf-8")
     assert gap.study.result.verdict.split(",")[0] in page
-    assert page.count("<figure") == 5
+    assert page.count("<figure") == 7
     assert f"{gap.study.result.rms.value:.3f}" in page
     assert "Change this next: motor" in page
     assert not re.search(r"(?:src|href)=\"(?!#)", page)
-    (script,) = re.findall(r"<script>(.*?)</script>", page, re.S)
-    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
-    assert f"script-src 'sha256-{digest}'" in page
+    scripts = re.findall(r"<script>(.*?)</script>", page, re.S)
+    assert len(scripts) == 2
+    for script in scripts:
+        assert f"'sha256-{base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()}'" in page
     marks = json.loads(re.search(r'id="marks">(.*?)</script>', page, re.S)[1])
-    assert set(marks) == {"pairs", "differences", "maps", "replay", "why"}
+    assert set(marks) == {"distance", "pairs", "differences", "maps", "replay", "why"}
 
 
 def test_ids_are_used_once_so_that_no_figure_shows_parts_of_another(gap, tmp_path):
@@ -60,10 +61,28 @@ def test_figures_say_platforms_trials_and_intervals(gap):
     assert "jyro (SIM)" in draw_gap_why(WHY, gap.study).caption
 
 
+def test_one_controller_moves_on_both_platforms_from_one_start(gap, tmp_path):
+    page = write_gap_report(gap, tmp_path / "gap.html").read_text("utf-8")
+    (data,) = re.findall(r'<script type="application/json">(.*?)</script>', page, re.S)
+    one, other = json.loads(data)["trials"]
+    assert one["poses"][0] == other["poses"][0]
+    assert one["poses"][-1] != other["poses"][-1]
+    shown = gap.study.shown
+    assert gap.study.source.means[shown.controller] == gap.study.source.means.max()
+    assert len(shown.source) == len(shown.target) == 3
+
+
+def test_what_moves_has_the_cells_of_the_measured_trials():
+    study = gap_between("sim", "jyro", n_controllers=5, trials=2, observe="cells").study
+    k = study.shown.controller
+    for moving, record in zip(study.shown.target, study.target_trials[2 * k : 2 * k + 2], strict=True):
+        assert sorted(moving.cells) == list(record.cells)
+
+
 def test_a_gap_without_a_camera_has_no_replay(tmp_path):
     found = gap_between("sim", "jyro", n_controllers=5, trials=2)
     assert draw_gap_replay(found.study) is None
-    assert write_gap_report(found, tmp_path / "gap.html").read_text("utf-8").count("<figure") == 3
+    assert write_gap_report(found, tmp_path / "gap.html").read_text("utf-8").count("<figure") == 5
 
 
 def test_a_page_that_is_none_is_refused_before_any_trial(tmp_path):

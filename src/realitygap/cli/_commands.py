@@ -60,6 +60,7 @@ SECTIONS: dict[str, tuple[Command, ...]] = {
     ),
     "The gap": (
         Command("plan", "Estimate how many controllers and trials you need.", "_gap", "plan"),
+        Command("close", "Measure the gap, calibrate, measure it again.", "_close", "close"),
         Command("transfer", "Compare strategies that transfer controllers.", "_transfer", "transfer"),
         Command("try", "Drive one exported controller on any platform.", "_transfer", "try_genome"),
         Command("again", "Repeat a measurement from its result.", "_order", "again", True),

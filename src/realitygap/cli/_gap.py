@@ -10,7 +10,7 @@ import typer
 
 import realitygap
 from realitygap._terminal import echo
-from realitygap._wording import bracketed, counted, p_equation, reproduces
+from realitygap._wording import bracketed, counted, p_equation, reproduces, trials_each
 from realitygap.orders import GapOrder, PlanOrder
 
 from ._code import AllowPlatforms
@@ -85,12 +85,9 @@ def _print(result: GapResult) -> None:
     echo(result.verdict)
     for title, words in result.main_measures:
         echo(f"  {title:18}{words}")
-    one, other = result.trials
-    trials = f"{one}" if one == other else f"{one} and {other}"
-    echo(
-        f"{' and '.join(dict.fromkeys(result.labels))}, {counted(result.level.n, 'controller')}, {trials} trials of "
-        "each on both platforms, 95 % intervals"
-    )
+    labels = " and ".join(dict.fromkeys(result.labels))
+    n = counted(result.level.n, "controller")
+    echo(f"{labels}, {n}, {trials_each(result.trials)}, 95 % intervals")
     for note in result.notes:
         echo(note)
 
@@ -102,7 +99,7 @@ def _next(order: GapOrder, report: Path | None) -> str:
     if name != "sim" or calibration or order.target.partition(":")[0] in ("jyro", "recorded"):
         return words
     robot = shlex.quote(order.target)
-    return f"{words} Next: realitygap calibrate all --robot {robot} -o fit.toml"
+    return f"{words} Next: realitygap close sim {robot}"
 
 
 def _print_all(result: GapResult, replay: ReplayError | None) -> None:

@@ -5,6 +5,7 @@
 
 from ._behavior import CoverageMaps, coverage_maps
 from ._card import gap_card, pairs_picture
+from ._change import GapChange, measure_change
 from ._level import rms_interval, square_differences
 from ._measure import measure_gap
 from ._ranks import mean_maximum_rank_violation, rank_violation_interval
@@ -21,6 +22,9 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     "GapResult",
     "COVERAGE",
     "SHOWN",
+    # another simulator
+    "measure_change",
+    "GapChange",
     # level
     "square_differences",
     "rms_interval",

@@ -4,6 +4,7 @@ A command, a function, a form of the lab, the message to a worker, and the recor
 """
 
 from ._calibrate import CalibrateOrder
+from ._close import CloseOrder
 from ._field import Limits, OrderField
 from ._function import takes_order, with_fields
 from ._gap import GapOrder
@@ -18,6 +19,7 @@ __all__ = [
     "ORDERS",
     "ORDER_FILE",
     "CalibrateOrder",
+    "CloseOrder",
     "ClosingOrder",
     "GapOrder",
     "Limits",

@@ -12,6 +12,7 @@ from realitygap._limits import MOST_TABLE_BYTES, parse_json, parse_toml, read_fi
 from realitygap.errors import StudyError, did_you_mean
 
 from ._calibrate import CalibrateOrder
+from ._close import CloseOrder
 from ._gap import GapOrder
 from ._order import Order
 from ._plan import PlanOrder
@@ -19,7 +20,7 @@ from ._transfer import ClosingOrder, TransferOrder, TryOrder
 
 ORDERS: dict[str, type[Order]] = {
     model.command: model
-    for model in (CalibrateOrder, ClosingOrder, GapOrder, PlanOrder, TransferOrder, TryOrder)
+    for model in (CalibrateOrder, CloseOrder, ClosingOrder, GapOrder, PlanOrder, TransferOrder, TryOrder)
 }
 """Orders by the name of their command."""
 

@@ -27,7 +27,7 @@ from realitygap.report._divergence_figure import compare_trials, save_divergence
 from realitygap.report._files import export_frame, export_individual
 from realitygap.report._formats import check_ending, save_drawing
 from realitygap.report._gap_figures import draw_gap_pairs
-from realitygap.report._gap_page import refuse_gap_page, write_gap_report
+from realitygap.report._gap_page import refuse_gap_page, write_closed_gap, write_gap_report
 from realitygap.report._generations_figure import draw_best, draw_coverage, draw_scores
 from realitygap.report._individuals_figure import draw_individuals
 from realitygap.report._lineage_figure import draw_lineage
@@ -104,6 +104,7 @@ __all__ = [
     "twin_table",
     "watch",
     "why_table",
+    "write_closed_gap",
     "write_closing_page",
     "write_gap_report",
     "write_movie",

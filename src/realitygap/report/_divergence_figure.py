@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -31,7 +32,8 @@ from realitygap.report._trial_figure import ChosenTrial, choose_trial
 from realitygap.report.charts.arena import draw_arena, draw_cells
 from realitygap.report.charts.house import WIDE, Drawing, draw_wide, shorten
 from realitygap.report.charts.lines import Dash, area_key, draw_band, draw_dots, draw_line, head, line_key
-from realitygap.report.charts.sheet import Sheet
+from realitygap.report.charts.marks import Panel, Series
+from realitygap.report.charts.sheet import Sheet, grid
 from realitygap.runs import Condition, genome_of
 from realitygap.trials import NoiseKey
 
@@ -209,6 +211,51 @@ def draw_divergence(one: Side, *others: Side, of: str = "", width: float = WIDE)
     return draw_wide(
         lambda width: _draw(sides, between, within, width), "divergence", caption, alt, width=width
     )
+
+
+def draw_distance(pairs: Sequence[tuple[str, Side, Side]]) -> Drawing:
+    """Draw how far one network's trials on two platforms are apart after each step.
+
+    Args:
+        pairs: Panels: a title, and the two sides, with equal numbers of repeats.
+    """
+    measured = [_measured(one, other) for _, one, other in pairs]
+    most = max(float(np.percentile(between.distance, 90, axis=0).max()) for between, _ in measured)
+    ends = [f"{between.distance[:, -1].mean():.2f} m" for between, _ in measured]
+    n, last = measured[0][0].n_pairs, measured[0][0].n_steps
+    caption = (
+        f"Distance between the two robots after each step: mean and 10th to 90th percentile of n = {n}. Thin: distance "
+        f"between repeats on one platform, which noise alone causes. After {last} steps: {', then '.join(ends)}."
+    )
+
+    def draw(width: float) -> Sheet:
+        sheet, places = grid(width, len(pairs), len(pairs), 1.05)
+        for k, (axes, (title, *_), (between, within)) in enumerate(zip(places, pairs, measured, strict=True)):
+            axes.set_gid(f"distance-{k}")
+            _draw_curves(axes, (between,), within, "distance")
+            axes.set_ylim(0, 1.08 * max(most, 0.02))
+            axes.set_ylabel("apart [m]", labelpad=3)
+            if title:
+                head(axes, title)
+        return sheet
+
+    marks = tuple(
+        Panel(f"distance-{k}", (_marks_of(between),), (0, 3)) for k, (between, _) in enumerate(measured)
+    )
+    alt = f"Curves of the distance between the two robots, which reaches {' and '.join(ends)}."
+    return draw_wide(draw, "distance", caption, alt, marks=marks)
+
+
+def _measured(one: Side, other: Side) -> tuple[Divergence, tuple[Divergence, ...]]:
+    """Return the divergence between two sides, and that of repeats on each, if there are repeats."""
+    between = measure_divergence(one.trials, other.trials)
+    alone = [side.trials for side in (one, other) if len(side.trials) > 1]
+    return between, tuple(map(own_divergence, alone))
+
+
+def _marks_of(divergence: Divergence) -> Series:
+    means = divergence.distance.mean(axis=0)
+    return Series("step {x}: {y} m apart", np.column_stack([np.arange(len(means)), means]))
 
 
 def _words(

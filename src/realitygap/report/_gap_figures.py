@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import numpy.typing as npt
 
-from realitygap._wording import p_equation
+from realitygap._wording import p_equation, platform_in_words
 from realitygap.drawing import Ink
 from realitygap.gap import GapSide, Why
 from realitygap.report.charts.arena import draw_arena, draw_shares
@@ -32,16 +32,21 @@ _DASHED: Dash = (0, (5, 1.5))
 # quality on both sides
 
 
-def draw_gap_pairs(gap: GapStudy) -> Drawing:
-    """Draw the mean quality of each controller on both sides, with intervals and the line of no gap."""
+def draw_gap_pairs(gap: GapStudy, before: GapStudy | None = None) -> Drawing:
+    """Draw the mean quality of each controller on both sides, with intervals and the line of no gap.
+
+    Args:
+        gap: The gap.
+        before: The gap before a calibration, whose controllers are hollow marks.
+    """
     source, target = gap.source, gap.target
-    order, score = _order_in_words(gap), gap.result.score
+    score, names = gap.result.score, _names(source, target)
+    trials = " and ".join(str(n) for n in dict.fromkeys((source.trials, target.trials)))
     caption = (
-        f"Mean {score} of {source.n} controllers, {source.trials} trials each on {source.name} ({source.label}), "
-        f"across, and {target.trials} on {target.name} ({target.label}), up, with intervals of 95 % of each mean by t. "
-        f"On the line there is no gap. {order}"
-    )
-    alt = f"Scatter of {source.n} controllers: {score} on {source.name} against {score} on {target.name}. {order}"
+        f"Mean {score} on {names[0]} and on {names[1]}: {source.n} controllers, {trials} trials each. Crosses are 95 % "
+        "intervals of each mean. On the line there is no gap."
+    ) + ("" if before is None else " Gray: the same controllers before the calibration.")
+    alt = f"Scatter of {source.n} controllers: {score} on {names[0]} against {score} on {names[1]}."
     rows = {
         kind: np.array([k for k, each in enumerate(gap.controllers) if each.kind == kind], int)
         for kind, *_ in _KINDS
@@ -58,7 +63,10 @@ def draw_gap_pairs(gap: GapStudy) -> Drawing:
         )
         axes = sheet.panels["pairs"]
         axes.set_gid("pairs")
-        draw_equality(axes, *_ends(source, target, *gap.task.score_range))
+        sides = [source, target] if before is None else [source, target, before.source]
+        draw_equality(axes, *_ends(sides, *gap.task.score_range))
+        if before is not None:
+            draw_dots(axes, before.source.means, target.means, 3.4, color=Ink.RUN, alpha=0.6)
         across, up = (np.column_stack(side.intervals()) for side in (source, target))
         handles = []
         for kind, color, marker, name in _KINDS:
@@ -66,14 +74,16 @@ def draw_gap_pairs(gap: GapStudy) -> Drawing:
             if len(k):
                 draw_crosses(axes, source.means[k], target.means[k], (across[k], up[k]), color, marker)
                 handles.append(mark_key(f"{name}, n = {len(k)}", marker, 4.2, color=color))
-        axes.set_xlabel(f"{score} on {shorten(source.name, 24)} ({source.label})", labelpad=3)
-        axes.set_ylabel(f"{score} on {shorten(target.name, 24)} ({target.label})", labelpad=3)
+        if before is not None:
+            handles.append(mark_key("before the calibration", "o", 3.4, color=Ink.RUN))
+        axes.set_xlabel(f"{score} on {shorten(names[0], 34)}", labelpad=3)
+        axes.set_ylabel(f"{score} on {shorten(names[1], 34)}", labelpad=3)
         axes.legend(handles=handles, loc="upper left", frameon=False, fontsize=7.5, handlelength=1.0)
         return sheet
 
     points = np.column_stack([source.means, target.means])
     decimals = decimals_for(points)
-    text = f"{{label}}: {{x}} on {source.name}, {{y}} on {target.name}"
+    text = f"{{label}}: {{x}} on {names[0]}, {{y}} on {names[1]}"
     series = tuple(
         Series(text, points[k], labels=tuple(gap.controllers[row].name for row in k))
         for k in rows.values()
@@ -82,21 +92,15 @@ def draw_gap_pairs(gap: GapStudy) -> Drawing:
     return draw_wide(draw, "gap-pairs", caption, alt, marks=(Panel("pairs", series, (decimals, decimals)),))
 
 
-def _order_in_words(gap: GapStudy) -> str:
-    raw, ceiling, without = gap.result.srcc, gap.result.noise_ceiling, gap.result.srcc_disattenuated
-    if raw.value is None:
-        return raw.refused
-    words = f"Spearman’s correlation {raw}"
-    if ceiling.value is not None:
-        words += f"; noise allows at most {ceiling}"
-    if without.value is not None:
-        words += f"; without noise {without}"
-    return words + "."
+def _names(source: GapSide, target: GapSide) -> tuple[str, str]:
+    """Return both platforms in words, with their labels."""
+    one, other = (f"{platform_in_words(side.name, side.label)} ({side.label})" for side in (source, target))
+    return one, other
 
 
-def _ends(source: GapSide, target: GapSide, low: float, high: float) -> tuple[float, float]:
+def _ends(of: Sequence[GapSide], low: float, high: float) -> tuple[float, float]:
     """The ends of both axes: at tenths of the scale beyond the intervals, and within the score's range."""
-    sides = [side.intervals() for side in (source, target)]
+    sides = [side.intervals() for side in of]
     least, most = min(float(each.min()) for each, _ in sides), max(float(each.max()) for _, each in sides)
     least = min(least, low if math.isfinite(low) else 0.0)
     tenth = 0.1 if high <= 1 else max(most - least, 1e-9) / 10

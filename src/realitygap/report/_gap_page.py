@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from realitygap._version import __version__
-from realitygap._wording import bracketed, p_equation, reproduces
+from realitygap._wording import bracketed, counted, p_equation, platform_in_words, reproduces, trials_each
 from realitygap.errors import RecordError
 from realitygap.gap import SHOWN, GapResult
 from realitygap.records import is_special, refuse_results, write_whole
+from realitygap.report._divergence_figure import Side, draw_distance, draw_divergence
 from realitygap.report._gap_figures import (
     draw_gap_differences,
     draw_gap_maps,
@@ -18,12 +20,14 @@ from realitygap.report._gap_figures import (
     draw_gap_replay,
     draw_gap_why,
 )
+from realitygap.report._motion_on_page import MotionOnPage, motion_content
 from realitygap.report._page import LABELS
 from realitygap.report._placed import FigureOnPage, hover_content, number_figures
 from realitygap.report._table import Cell, Column, Part, Row, TableOnPage
 from realitygap.report._template import render_page
+from realitygap.report.charts.house import Drawing
 from realitygap.stats import Estimate
-from realitygap.study import GapBetween
+from realitygap.study import ClosedGap, GapBetween, GapStudy
 
 _APART = (
     (
@@ -76,14 +80,46 @@ def write_gap_report(gap: GapBetween, path: str | Path) -> Path:
     return Path(path)
 
 
-def _content(gap: GapBetween) -> dict[str, Any]:
+def write_closed_gap(closed: ClosedGap, path: str | Path) -> Path:
+    """Write a gap before and after a calibration as one HTML file that needs no other file and no network.
+
+    Args:
+        closed: Result of `realitygap.study.close_gap`.
+        path: Path that ends in .html. An existing file is replaced.
+
+    Returns:
+        The path.
+
+    Raises:
+        RecordError: The file cannot be written, or would take the place of a file of results.
+    """
+    refuse_gap_page(path)
+    content = _content(closed.after, closed)
+    write_whole(Path(path), render_page("gap.html.jinja", content).encode("utf-8", "replace"))
+    return Path(path)
+
+
+def _content(gap: GapBetween, closed: ClosedGap | None = None) -> dict[str, Any]:
     study, why = gap.study, gap.why
+    before = None if closed is None else closed.before.study
     result = study.result
     labels = list(dict.fromkeys(result.labels))
+    pairs = FigureOnPage("pairs", draw_gap_pairs(study, before))
+    shown = _shown(study)
+    shown_before = None if before is None else _shown(before)
+    moving = [
+        (title, *sides)
+        for title, sides in (
+            ("before the calibration", shown_before),
+            ("" if before is None else "after the calibration", shown),
+        )
+        if sides is not None
+    ]
+    distance = FigureOnPage("distance", draw_distance(moving)) if moving else None
     figures = [
         FigureOnPage(anchor, drawing)
         for anchor, drawing in (
-            ("pairs", draw_gap_pairs(study)),
+            ("paths", _draw_paths(study, *shown) if shown and len(shown[0].trials) > 1 else None),
             ("differences", draw_gap_differences(study)),
             ("maps", draw_gap_maps(study)),
             ("replay", draw_gap_replay(study)),
@@ -91,19 +127,33 @@ def _content(gap: GapBetween) -> dict[str, Any]:
         if drawing is not None
     ]
     figure_of_why = None if why is None else FigureOnPage("why", draw_gap_why(why, study))
-    number_figures([*figures, figure_of_why])
+    number_figures([distance, pairs, *figures, figure_of_why])
     content = {
         "version": __version__,
-        "title": f"The gap from {result.source} to {result.target}",
+        "title": f"The gap: {result.title if closed is None else closed.title}",
         "labels": [(label, LABELS[label]) for label in labels],
-        "verdict": result.verdict,
+        "n": f"{counted(result.level.n, 'controller')}, {trials_each(result.trials)}",
+        "verdict": result.verdict if closed is None else closed.verdict,
+        "main": result.main_measures if closed is None else closed.main_measures,
+        "is_closed": closed is not None,
         "score": result.score,
+        "motions": [_motion(*sides) for sides in moving],
+        "about_motion": _about(study, before),
+        "distance": distance,
+        "pairs": pairs,
         "facts": _facts(gap),
-        "measures": _measures_table(
-            "transfer",
-            "Measures of the transfer gap.",
-            [_row(result, each.name, each.title, each.meaning) for each in SHOWN],
-        ),
+        "measures": [
+            _measures_table(name, caption, [_row(of, each.name, each.title, each.meaning) for each in SHOWN])
+            for name, caption, of in (
+                ("before", "Measures before the calibration.", None if before is None else before.result),
+                (
+                    "transfer",
+                    "Measures of the transfer gap." if before is None else "Measures after it.",
+                    result,
+                ),
+            )
+            if of is not None
+        ],
         "apart": _measures_table(
             "apart", "Re-evolved gap, and luck of selection.", [_row(result, *each) for each in _APART]
         ),
@@ -111,9 +161,58 @@ def _content(gap: GapBetween) -> dict[str, Any]:
         "figures": figures,
         "why": figure_of_why,
         "controllers": _controllers_table(gap),
-        "order": "" if gap.order is None else gap.order.to_toml(),
+        "order": _order(gap, closed),
     }
-    return content | hover_content(content)
+    return content | hover_content(content) | motion_content()
+
+
+def _order(gap: GapBetween, closed: ClosedGap | None) -> str:
+    order = gap.order if closed is None else closed.order
+    return "" if order is None else order.to_toml()
+
+
+def _shown(study: GapStudy) -> tuple[Side, Side] | None:
+    """Return the trials that are shown in motion, by their platform in words."""
+    if study.shown is None:
+        return None
+    sides = ((study.source, study.shown.source), (study.target, study.shown.target))
+    one, other = (Side(platform_in_words(side.name, side.label), trials) for side, trials in sides)
+    return one, other
+
+
+def _motion(title: str, one: Side, other: Side) -> MotionOnPage:
+    return MotionOnPage.of(
+        title, [(f"{side.name} ({side.trials[0].label})", side.trials[0]) for side in (one, other)]
+    )
+
+
+def _about(study: GapStudy, before: GapStudy | None) -> str:
+    """Return which controller moves, or why none does."""
+    if study.shown is None:
+        return (
+            f"The poses of the robot on {study.target.name} are unknown, so no trial can be shown in motion. The "
+            "observation level track records them."
+        )
+    k = study.shown.controller
+    simulated = f"{study.source.means[k]:.3f}"
+    if before is not None:
+        simulated = f"{before.source.means[k]:.3f} before and {simulated} after the calibration"
+    return (
+        f"{study.controllers[k].name}, the best of {len(study.controllers)} controllers in simulation, on both "
+        f"platforms from one start. Mean {study.result.score}: {simulated} in simulation ({study.source.label}), "
+        f"{study.target.means[k]:.3f} on the target ({study.target.label})."
+    )
+
+
+def _draw_paths(study: GapStudy, one: Side, other: Side) -> Drawing:
+    drawing = draw_divergence(one, other)
+    n = len(one.trials)
+    caption = (
+        f"The same controller, n = {n} trials on {one.name} ({one.trials[0].label}) and on {other.name} "
+        f"({other.trials[0].label}). Above: all paths; the first one has its robot and its cells. Below: distance and "
+        "difference in heading after each step, mean and 10th to 90th percentile. Thin: repeats on one platform."
+    )
+    return replace(drawing, caption=caption)
 
 
 def _facts(gap: GapBetween) -> list[tuple[str, str]]:

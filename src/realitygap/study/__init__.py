@@ -10,6 +10,7 @@ from ._calibrate.one import calibrate, save_calibration
 from ._calibrate.ordered import make_calibration
 from ._calibrate.whole import calibrate_all
 from ._camera import CameraObserver, marks_of, read_camera, tag_of
+from ._close import ClosedGap, close_gap
 from ._closing.plan import PLANS, ClosingPlan
 from ._closing.rows import CalibratedRow, ClosingSummary, GoalRow, TwinRow
 from ._closing.study import ClosingProgress, closing_the_gap
@@ -20,7 +21,7 @@ from ._duration import estimate_seconds
 from ._file import DEFAULT_NEAT, SECTIONS, load_study, named_studies, parse_study, platform_sections
 from ._gap.between import GapBetween, gap_between
 from ._gap.plan import GapPlan, plan_gap, recorded_spreads
-from ._gap.study import MOST_CONTROLLERS, GapStudy
+from ._gap.study import MOST_CONTROLLERS, GapStudy, ShownTrials
 from ._kept_target import StoppedByPerson
 from ._mazes import MAZE_SEEDS, measure_maze
 from ._physical import physical_conditions
@@ -55,6 +56,7 @@ __all__ = [
     "AllowCode",
     "CalibratedRow",
     "CameraObserver",
+    "ClosedGap",
     "ClosingPlan",
     "ClosingProgress",
     "ClosingSummary",
@@ -65,6 +67,7 @@ __all__ = [
     "GoalRow",
     "Progress",
     "ReportSection",
+    "ShownTrials",
     "StoppedByPerson",
     "Study",
     "StudyFileError",
@@ -82,6 +85,7 @@ __all__ = [
     "check_files",
     "check_has_robot",
     "choose_condition",
+    "close_gap",
     "closing_the_gap",
     "drive_study",
     "estimate_seconds",

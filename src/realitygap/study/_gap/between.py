@@ -19,6 +19,7 @@ from realitygap.world import Arena, Calibration, load_arena
 
 from .._code import task_named
 from .._controllers import Controller, recorded_controllers, sample_controllers, task_of
+from .shown import with_shown
 from .study import STEPS, GapStudy, Tell, study_gap
 from .why import calibration_of, why_gap
 
@@ -87,6 +88,7 @@ def gap_between(
     allow_code: bool = False,
     tell: Tell | None = None,
     say: Say | None = None,
+    shown: int | None = None,
 ) -> GapBetween:
     """Measure the gap between a simulator and a target, both by name; as `realitygap gap`.
 
@@ -98,6 +100,7 @@ def gap_between(
         allow_code: True to run the Python file of a task that the user has not allowed before.
         tell: Called as trials are done.
         say: Called with what is done otherwise.
+        shown: Index of the controller to show in motion. Default: the one with the highest score in simulation.
 
     Raises:
         StudyError: A platform, study or number that cannot be.
@@ -165,6 +168,7 @@ def gap_between(
             at_its_pace=calibration is None or not calibration.step_s,
             steps=setting.steps,
         )
+        gap = with_shown(gap, source, costly, controller=shown, steps=setting.steps)
     parts = None
     if order.why and calibration is not None:
         tell_of("Switching parts of the model: 64 choices, each with draws from the posterior.")

@@ -20,6 +20,7 @@ from realitygap.gap import (
     replay_error,
 )
 from realitygap.platforms import SimTarget, split_spec
+from realitygap.playback import MovingTrial
 from realitygap.records import OBSERVATIONS, Ledger, Observe, TrialRecord
 from realitygap.stats import Estimate, difference_interval, mean_interval, range_of_differences
 from realitygap.tasks import CoverageTask, Task, score_observed
@@ -55,6 +56,20 @@ MOST_REPLAYED = 60
 
 
 @dataclass(frozen=True)
+class ShownTrials:
+    """Trials of one controller on both platforms, from the same start.
+
+    Attributes:
+        controller: Index of the controller.
+        source, target: Trials in simulation, and on the target.
+    """
+
+    controller: int
+    source: tuple[MovingTrial, ...]
+    target: tuple[MovingTrial, ...]
+
+
+@dataclass(frozen=True)
 class GapStudy:
     """A gap that was measured, and what figures of it are drawn from.
 
@@ -71,6 +86,7 @@ class GapStudy:
         replay: Open-loop replays; None if the target's poses are unknown.
         observe: Observation level of the target.
         step_s: Duration of commands in simulation [s].
+        shown: Trials of one controller to show in motion; None if poses are unknown.
     """
 
     result: GapResult
@@ -85,6 +101,7 @@ class GapStudy:
     replay: ReplayError | None
     observe: Observe
     step_s: float
+    shown: ShownTrials | None = None
 
 
 def study_gap(

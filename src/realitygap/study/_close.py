@@ -1,0 +1,220 @@
+"""A gap, a calibration, and the gap again, over the same controllers and the same trials on the target."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from realitygap._limits import MOST_TABLE_BYTES, parse_toml, read_file
+from realitygap._wording import change_verdict, counted, platform_in_words, with_interval
+from realitygap.errors import StudyError
+from realitygap.gap import GapChange, measure_change
+from realitygap.orders import ORDER_FILE, CalibrateOrder, CloseOrder, GapOrder, takes_order
+from realitygap.platforms import class_of, open_target, platform_of
+from realitygap.records import refuse_links, sees, write_whole
+from realitygap.trials import Pulse
+from realitygap.world import Calibration, load_arena, read_calibration
+
+from ._calibrate.kinds import KINDS
+from ._calibrate.ordered import make_calibration
+from ._gap.between import GapBetween, Say, gap_between
+from ._gap.study import Tell
+from ._targets import refuse_more_than_is_seen
+
+_SHARED = (
+    "target",
+    "controllers",
+    "n_controllers",
+    "trials",
+    "margin",
+    "task",
+    "arena",
+    "processes",
+    "witness",
+    "seed",
+)
+"""Fields that a gap takes from the order."""
+
+
+@dataclass(frozen=True)
+class ClosedGap:
+    """A gap before and after a calibration.
+
+    Attributes:
+        before: Gap with the simulator as it was.
+        after: Gap with the calibrated simulator, to the same trials on the target.
+        change: After minus before.
+        calibration: The calibration.
+        order: The order.
+    """
+
+    before: GapBetween
+    after: GapBetween
+    change: GapChange
+    calibration: Calibration
+    order: CloseOrder
+
+    @property
+    def title(self) -> str:
+        """The platforms and the calibration in words."""
+        return (
+            f"{self.before.study.result.title}, before and after a calibration with "
+            f"{counted(self.calibration.trials, 'trial')}"
+        )
+
+    @property
+    def verdict(self) -> str:
+        """What the calibration changed, and whether the calibrated simulator can be trusted."""
+        before, after = self.before.study.result, self.after.study.result
+        return f"{change_verdict(self.change.rms, before.rms, after.rms)} {after.verdict}"
+
+    @property
+    def main_measures(self) -> list[tuple[str, str]]:
+        """Name and value of each main measure before and after, and the change of the RMS gap, in words."""
+        results = (self.before.study.result, self.after.study.result)
+        before, after = (
+            {
+                "level": with_interval(result.level),
+                "RMS gap": with_interval(result.rms),
+                "rank correlation": with_interval(result.srcc),
+                "noise ceiling": with_interval(result.noise_ceiling),
+            }
+            for result in results
+        )
+        rows = [(name, f"{words} → {after[name]}") for name, words in before.items()]
+        return [*rows, ("change in RMS gap", with_interval(self.change.rms, signs=True))]
+
+
+@takes_order(CloseOrder)
+def close_gap(
+    order: CloseOrder,
+    *,
+    pulse: Pulse | None = None,
+    allow_code: bool = False,
+    tell: Tell | None = None,
+    say: Say | None = None,
+) -> ClosedGap:
+    """Measure a gap, calibrate the simulator, and measure the gap again, as `realitygap close`.
+
+    Args:
+        pulse: Called when a trial on a robot begins or ends, and when the robot has answered in it.
+        allow_code: True to run the Python file of a task that the user has not allowed before.
+        tell: Called as trials are done.
+        say: Called with what is done otherwise.
+
+    Raises:
+        StudyError: The platforms, the part of the robot, and the numbers do not go together, or the folder belongs to
+            another order.
+        RealityGapError: The robot failed, or files cannot be read or written.
+    """
+    order = _with_observe(_checked(order))
+    folder = order.folder
+    _adopt(folder, order)
+    fit, trials = folder / "fit.toml", folder / "fit.trials.sqlite"
+    shared = {name: getattr(order, name) for name in _SHARED}
+    gap = GapOrder(sim=order.sim, observe=order.observe, results=trials, **shared)
+    before = gap_between(gap, pulse=pulse, allow_code=allow_code, tell=tell, say=say)
+    calibration = _calibrated(order, fit, pulse, tell, say)
+    shown = before.study.shown
+    after = gap_between(
+        gap.model_copy(update={"sim": f"sim:{fit}"}),
+        pulse=pulse,
+        allow_code=allow_code,
+        tell=tell,
+        say=say,
+        shown=None if shown is None else shown.controller,
+    )
+    change = measure_change(before.study.source, after.study.source, after.study.target, seed=order.seed)
+    return ClosedGap(before, after, change, calibration, order)
+
+
+def _checked(order: CloseOrder) -> CloseOrder:
+    """Return the order if it can run, before a trial is spent.
+
+    Raises:
+        StudyError: It cannot.
+    """
+    if order.sim.partition(":")[0] != "sim":
+        raise StudyError(f"close calibrates sim, but the simulator is {order.sim}. Name sim or sim:FILE.")
+    if order.target.partition(":")[0] == "recorded" or (
+        order.witness is None and platform_of(order.target).needs_person
+    ):
+        raise StudyError(
+            f"close drives its trials without an operator, but {platform_in_words(order.target, 'REAL')} needs one. "
+            f"Use three commands: realitygap gap sim {order.target} -o gap.sqlite; realitygap calibrate {order.what} "
+            f"--robot {order.target} -o fit.toml; realitygap gap sim:fit.toml {order.target} -o gap.sqlite"
+        )
+    kind = KINDS[order.what]
+    if order.budget < kind.least:
+        raise StudyError(
+            f"--budget is {order.budget}, but a calibration of {order.what} needs at least {kind.least} trials."
+        )
+    return order
+
+
+def _with_observe(order: CloseOrder) -> CloseOrder:
+    """Return the order with its observation level.
+
+    Raises:
+        StudyError: The target or the calibration does not support it.
+    """
+    known = KINDS[order.what].observes
+    with open_target(order.target, load_arena(order.arena), witness=order.witness, processes=1) as target:
+        observe = order.observe or ("track" if sees(target.observes, "track") else "cells")
+        refuse_more_than_is_seen(target, observe)
+    if observe not in known:
+        raise StudyError(
+            f"{observe} alone does not identify {order.what}. Record more (--observe {' or '.join(known)})."
+        )
+    return order.model_copy(update={"observe": observe})
+
+
+def _adopt(folder: Path, order: CloseOrder) -> None:
+    """Make the folder that of the order, or see that it is.
+
+    Raises:
+        StudyError: It belongs to another order.
+        RecordError: It cannot be written.
+    """
+    path = folder / ORDER_FILE
+    refuse_links(folder, path, *(folder / name for name in ("fit.toml", "fit.trials.sqlite", "report.html")))
+    folder.mkdir(parents=True, exist_ok=True)
+    if path.exists():
+        stored = parse_toml(read_file(path, MOST_TABLE_BYTES).decode("utf-8", "replace")).get("order", {})
+        now = order.record()
+        other = sorted(
+            name for name in {*stored, *now} - {"version", "processes"} if stored.get(name) != now.get(name)
+        )
+        if other:
+            raise StudyError(
+                f"{folder} has results of other settings ({', '.join(other)}); nothing was run. Name another folder "
+                "with --out."
+            )
+    write_whole(path, order.to_toml().encode(), within=folder)
+
+
+def _calibrated(
+    order: CloseOrder, fit: Path, pulse: Pulse | None, tell: Tell | None, say: Say | None
+) -> Calibration:
+    """Return the calibration: the one in the file if the same order made it, otherwise a new one."""
+    base = order.sim.partition(":")[2] or class_of(order.target).base_robot
+    wanted = CalibrateOrder(
+        what=order.what,
+        robot=order.target,
+        out=fit,
+        observe=order.observe,
+        budget=order.budget,
+        base=base,
+        seed=order.seed,
+        arena=order.arena,
+        witness=order.witness,
+    )
+    made = read_calibration(fit) if fit.exists() else None
+    if made is not None and made.order == wanted.record():
+        return made
+    if say is not None:
+        say(f"Calibrating with {counted(order.budget, 'trial')}; the fit takes up to a minute.")
+    name = f"calibrating on {order.target}"
+    return make_calibration(
+        wanted, pulse=pulse, tell=None if tell is None else lambda done, n: tell(name, done, n)
+    )

@@ -2,8 +2,9 @@
 
     uv run python docs/make_hero.py [FOLDER]
 
-Runs `realitygap close` on the first twin of the family worn in FOLDER, or resumes it there, and films the first trial of the
-best controller in simulation: before the calibration, and after it. Default: a temporary folder, which takes minutes.
+Runs `realitygap close` on the first twin of the family worn in FOLDER, or resumes it there. Then it films the first
+trial of the best controller in simulation: before the calibration, and after it. Default: a temporary folder, which
+takes minutes.
 """
 
 from __future__ import annotations
@@ -31,7 +32,8 @@ SKIP = 2
 def film(study: GapStudy, title: str, path: Path) -> list[Image.Image]:
     """Frames of the first trial of the shown controller on both platforms."""
     shown = study.shown
-    assert shown is not None
+    if shown is None:
+        raise SystemExit("The poses on the twin are unknown.")
     trials = [
         replace(side[0], title=f"{name} ({side[0].label})")
         for side, name in ((shown.source, "simulation"), (shown.target, "twin"))

@@ -27,7 +27,10 @@ def demo(
         typer.Option(metavar="DIR", help="Folder for the results. [default: a new temporary folder]"),
     ] = None,
     open_page: Annotated[
-        bool, typer.Option("--open", help="When done, show the report of the study in the browser.")
+        bool,
+        typer.Option(
+            "--open", help="When done, show the reports of the study and of the gap in the browser."
+        ),
     ] = False,
 ) -> None:
     """Take a two-minute tour with an emulated robot.
@@ -57,11 +60,12 @@ def demo(
         f"\nThe results of this tour are in {folder}:\n"
         "  paper/report.html   report of the study: figures, tables, and trials to play\n"
         "  champion.gif        film of the controller in simulation\n"
-        "  gap.html            report of the gap\n"
+        "  gap.html            the gap: one controller in motion in both worlds, and all scores\n"
         f"Next, change the paper's study: {launcher()} new-study my-study.toml --from paper"
     )
     if open_page:
         show_page(folder / "paper" / "report.html")
+        show_page(folder / "gap.html")
 
 
 def _made(folder: Path | None) -> Path:
@@ -99,7 +103,7 @@ def _steps(folder: Path) -> list[tuple[str, list[list[str]]]]:
             "Measure the gap between a simulator and the emulated robot.",
             [
                 [
-                    *("gap", "sim", _ROBOT, "--n-controllers", "10", "--trials", "3"),
+                    *("gap", "sim", _ROBOT, "--n-controllers", "10", "--trials", "3", "--observe", "track"),
                     *("--report", str(folder / "gap.html")),
                 ]
             ],

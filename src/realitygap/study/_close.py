@@ -64,7 +64,7 @@ class ClosedGap:
 
     @property
     def verdict(self) -> str:
-        """What the calibration changed, and whether the calibrated simulator can be trusted."""
+        """The effect of the calibration, and whether the calibrated simulator can be trusted."""
         before, after = self.before.study.result, self.after.study.result
         return f"{change_verdict(self.change.rms, before.rms, after.rms)} {after.verdict}"
 
@@ -82,7 +82,7 @@ class ClosedGap:
             for result in results
         )
         rows = [(name, f"{words} → {after[name]}") for name, words in before.items()]
-        return [*rows, ("change in RMS gap", with_interval(self.change.rms, signs=True))]
+        return [*rows, ("change in RMS gap", with_interval(self.change.rms))]
 
 
 @takes_order(CloseOrder)

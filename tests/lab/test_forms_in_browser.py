@@ -69,6 +69,9 @@ def test_all_mistakes_are_shown_at_once_and_each_at_its_field(lab, visit):
             field = page.locator(".lab-field", has=page.get_by_label(label, exact=True)).first
             expect(field.locator(".lab-problem"), f"{path}: {label}").to_contain_text(message)
         expect(page.locator(".lab-summary:visible a"), path).to_have_count(len(fields))
+        focused = page.locator("[aria-invalid=true]:focus")
+        expect(focused, path).to_have_count(1)
+        assert focused.evaluate("it => it === document.querySelector('[aria-invalid=true]')"), path
         page.close()
 
 

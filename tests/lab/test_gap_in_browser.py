@@ -33,7 +33,7 @@ def test_gap_is_measured_with_its_progress_and_mistakes_are_shown_at_their_field
     ):
         measure(page, **fields)
         page.locator(".lab-field .lab-problem", has_text=problem).wait_for()
-        page.wait_for_function("() => document.activeElement.classList.contains('lab-summary')")
+        page.wait_for_function("() => document.activeElement.ariaInvalid === 'true'")
     assert list(lab.root.iterdir()) == []
     page.get_by_label("Controllers", exact=True).fill("10")
     page.get_by_label("Trials per controller").fill("3")

@@ -32,6 +32,8 @@ def job(*, is_over: bool = True, is_failed: bool = False, progress: StudyProgres
 CURVE = {
     "condition": "novelty-10",
     "label": "SIM",
+    "search": "coverage",
+    "noise": 0.1,
     "points": [
         {"n": 8, "median": 0.4, "low": 0.3, "high": 0.5},
         {"n": 8, "median": 0.5, "low": None, "high": None},

@@ -66,9 +66,52 @@ def test_complete_study_never_seems_empty_while_its_figures_are_drawn(lab, visit
     page.goto(lab.address + "study/paper")
     page.locator(".lab-curves polyline").first.wait_for()
     page.locator(".lab-figure img").nth(4).wait_for()
+    check_generations(page)
+    check_touch(page)
     seen = [json.loads(each) for each in json.loads(page.evaluate("sessionStorage.seen"))]
     assert {waiting for _, _, waiting in seen} <= {"", "Drawing figures"}
     assert all(words in ([], ["Complete"]) for words, _, _ in seen), seen
+
+
+def check_generations(page) -> None:
+    """Check that the last generation is shown, and that the slider shows another one."""
+    paths = page.locator(".lab-generations polyline")
+    paths.nth(1).wait_for(state="attached")  # a robot that stands draws nothing
+    assert paths.last.get_attribute("class") == "lab-generations-best"
+    words, slider = (
+        page.locator(".lab-generations .lab-value"),
+        page.get_by_label("Generation", exact=True).first,
+    )
+    expect(words).to_have_text(re.compile(r"generation 4: 0\.\d{3}"))
+    last = paths.last.get_attribute("points")
+    slider.fill("0")
+    expect(words).to_have_text(re.compile(r"generation 0: 0\.\d{3}"))
+    assert paths.last.get_attribute("points") != last
+
+
+def check_touch(page) -> None:
+    """Check that a network without its sensors drives otherwise, and that its unchanged copy drives as recorded."""
+    page.get_by_role("tab", name="Replay").click()
+    tab = page.locator(".lab-replay")
+    tab.locator(".rg-player").first.wait_for()
+    tab.get_by_text("Change the network").click()
+    names = tab.locator(".rg-player").nth(1).locator(".rg-name")
+    expect(names).to_have_count(2)
+    expect(names.nth(1)).to_contain_text("changed")
+    assert tab.locator(".lab-gauges .q-slider").count() > 2
+    trails = tab.locator(".rg-player").nth(1).locator(".rg-trail")
+    end = tab.locator(".rg-player").nth(1).get_by_role("slider", name="Step")
+    end.press("End")
+    same = trails.evaluate_all("all => all.map((it) => it.getAttribute('points'))")
+    assert same[0] == same[1]
+    for sensor in tab.get_by_role("checkbox", name=re.compile("obstacle|time|stall")).all():
+        sensor.click()
+    tab.get_by_role("button", name="Run again").click()
+    expect(trails.nth(1)).not_to_have_attribute("points", same[1])
+    end.press("End")
+    cut = trails.evaluate_all("all => all.map((it) => it.getAttribute('points'))")
+    assert cut[0] == same[0]
+    assert cut[1] != cut[0]
 
 
 RUNNING = """
@@ -140,7 +183,7 @@ def test_mistakes_in_the_form_are_shown_at_their_fields(lab, visit):
     page.get_by_role("button", name="Start study").click()
     summary = page.get_by_role("alert").filter(has_text="You entered 'ui test!'.")
     summary.wait_for()
-    page.wait_for_function("() => document.activeElement.classList.contains('lab-summary')")
+    page.wait_for_function("() => document.activeElement.ariaInvalid === 'true'")
     assert name.get_attribute("aria-invalid") == "true"
     assert page.get_by_label("Runs per condition").get_attribute("aria-invalid") is None
     about = page.locator(f"[id='{name.get_attribute('aria-describedby').split()[-1]}']")

@@ -98,7 +98,7 @@ def filter_by_the_table(page) -> None:
     row.get_by_role("button").click()
     page.get_by_text(f"Showing {name}.").wait_for()
     page.locator(".lab-panel .rg-head", has_text=name).wait_for()
-    expect(page.locator(".lab-curves g.lab-curve-off")).to_have_count(1)
+    expect(page.locator(".lab-curves g.lab-curve-off")).to_have_count(2)  # a line and its label
     page.locator(".lab-curves > svg").focus()
     page.keyboard.press("ArrowRight")
     assert page.locator(".lab-curves-words").inner_text().startswith(f"{name}, generation 0: 0.")

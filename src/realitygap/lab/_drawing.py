@@ -28,6 +28,7 @@ from realitygap.report import (
     Drawing,
     Tally,
     choose_moving,
+    choose_run,
     draw_archive,
     draw_coverage,
     draw_networks,
@@ -36,6 +37,7 @@ from realitygap.report import (
     draw_species,
     read_tally,
     summarize,
+    touch_network,
     write_report,
 )
 from realitygap.stats import median_interval
@@ -45,7 +47,14 @@ from ._channel import Channel
 from ._child import Child
 from ._figure_cache import keep_figures, keep_rows, keep_thumbnail
 
-DrawingWish = messages.FiguresWish | messages.ThumbnailWish | messages.ReplayWish | messages.ReportWish
+DrawingWish = (
+    messages.FiguresWish
+    | messages.ThumbnailWish
+    | messages.ReplayWish
+    | messages.RunWish
+    | messages.TouchWish
+    | messages.ReportWish
+)
 FIGURES: dict[str, Callable[..., Drawing | list[Drawing]]] = {
     "scores": draw_scores,
     "coverage": draw_coverage,
@@ -60,9 +69,11 @@ IDLE_S = 600.0
 """Time without a wish after which the process ends; the next wish starts another [s]."""
 _POLITE = 10
 """Lowers the priority of the process below that of studies."""
-_QUICK = (messages.ReplayWish, messages.ReportWish)
+_QUICK = (messages.ReplayWish, messages.RunWish, messages.TouchWish, messages.ReportWish)
 """Wishes that are granted between two figures, because a visitor waits for them."""
 _DIGITS = 4
+MOST_GENERATIONS, MOST_PATHS, MOST_SLOW = 40, 12, 20
+"""Number of generations whose paths are shown, of paths in each, and of paths of a run whose trials are slow."""
 
 
 class Drawer:
@@ -149,6 +160,8 @@ class _Wishes:
         channel.at_once(messages.FiguresWish, self._queue.put)
         channel.at_once(messages.ThumbnailWish, self._queue.put)
         channel.at_once(messages.ReplayWish, self._queue.put)
+        channel.at_once(messages.RunWish, self._queue.put)
+        channel.at_once(messages.TouchWish, self._queue.put)
         channel.at_once(messages.ReportWish, self._queue.put)
 
     def next(self, timeout: float) -> DrawingWish | None:
@@ -184,6 +197,13 @@ def _grant(channel: Channel, wish: DrawingWish, wishes: _Wishes) -> None:
                 channel.say(messages.ThumbnailDrawn(wish.folder))
             case messages.ReplayWish():
                 channel.say(_replay(folder, wish))
+            case messages.RunWish():
+                channel.say(_paths_of_run(folder, wish))
+            case messages.TouchWish():
+                moving, weights, inputs = touch_network(folder, wish.weights, wish.cut, **wish.choice)
+                scene = pack_scene(moving[0].arena, "As evolved, and changed")
+                trials = pack_trials(moving)
+                channel.say(messages.Replay(wish.folder, wish.key, scene, trials, weights, list(inputs)))
             case messages.ReportWish():
                 write_report(ResultsFolder.open(folder))
                 channel.say(messages.ReportWritten(wish.folder))
@@ -191,7 +211,7 @@ def _grant(channel: Channel, wish: DrawingWish, wishes: _Wishes) -> None:
         match wish:
             case messages.FiguresWish():
                 channel.say(messages.FiguresDrawn(wish.folder, 0.0))
-            case messages.ReplayWish():
+            case messages.ReplayWish() | messages.RunWish() | messages.TouchWish():
                 channel.say(messages.ReplayRefused(wish.folder, wish.key, str(error)))
             case messages.ReportWish():
                 channel.say(messages.ReportWritten(wish.folder, str(error)))
@@ -256,8 +276,16 @@ def curves_of(tally: Tally) -> list[messages.Curve]:
         ]
         points = [_point(values) for values in columns if len(values)]
         if points:
-            label = str(condition.get("label", ""))
-            curves.append({"condition": condition["name"], "label": label, "points": points})
+            settings = condition["settings"]
+            curves.append(
+                {
+                    "condition": condition["name"],
+                    "label": str(condition.get("label", "")),
+                    "search": str(settings.get("selection", "")),
+                    "noise": float(settings.get("noise", 0.0)),
+                    "points": points,
+                }
+            )
     return curves
 
 
@@ -278,6 +306,31 @@ def _thumbnail(folder: Path, rows: list[messages.SummaryRow]) -> str:
     best = max(known, key=lambda condition: known[condition]) if known else None
     trial = choose_moving([folder], condition=best)[1][0]
     return picture_of(trial).to_svg(240.0)
+
+
+def _paths_of_run(folder: Path, wish: messages.RunWish) -> messages.Replay:
+    """Return the paths of the best individuals of each generation of a run."""
+    tally = read_tally(folder)
+    run = choose_run(
+        tally, wish.condition, int(tally.replicates(wish.condition)[-1]) if wish.is_last else None
+    )
+    known = run.rows["generation"].unique().sort().to_numpy()
+    most = MOST_PATHS if run.condition.on.is_simulator else max(MOST_SLOW // len(known), 1)
+    chosen = known[np.unique(np.linspace(0, len(known) - 1, MOST_GENERATIONS).round().astype(int))]
+    rows = run.rows.filter(run.rows["generation"].is_in(chosen.tolist()))
+    rows = rows.sort("generation", tally.score_column(wish.condition))
+    paths, _ = run.trace(rows.group_by("generation", maintain_order=True).tail(most))
+    generations: list[messages.GenerationPaths] = []
+    for path in paths:
+        if not generations or generations[-1]["generation"] != path.generation:
+            generations.append({"generation": path.generation, "coverage": 0.0, "paths": []})
+        last = generations[-1]
+        last["coverage"] = round(path.coverage, _DIGITS)
+        last["paths"] += [
+            (1000 * poses[:, :2]).round().astype(int).ravel().tolist() for poses, _ in path.tracks
+        ]
+    title = f"{wish.condition}, run {run.replicate}"
+    return messages.Replay(wish.folder, wish.key, pack_scene(run.arena, title), [], generations=generations)
 
 
 def _replay(folder: Path, wish: messages.ReplayWish) -> messages.Replay:

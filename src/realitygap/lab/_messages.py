@@ -92,7 +92,17 @@ class Curve(TypedDict):
 
     condition: str
     label: str
+    search: str
+    noise: float
     points: list[CurvePoint]
+
+
+class GenerationPaths(TypedDict):
+    """Paths of a generation: x and y of their points [mm], in turn. That of the best individual is the last one."""
+
+    generation: int
+    coverage: float
+    paths: list[list[int]]
 
 
 class Figure(TypedDict, total=False):
@@ -378,6 +388,25 @@ class ReplayWish(Wish):
     folder: str
     key: str
     choices: list[TrialChoice]
+
+
+class TouchWish(Wish):
+    """Run a trial again with other weights by link, and without some inputs; the answer has the same key."""
+
+    folder: str
+    key: str
+    choice: TrialChoice
+    weights: dict[str, float]
+    cut: list[str]
+
+
+class RunWish(Wish):
+    """Trace the paths of a run: the last one that is published, or the typical one. The answer has the same key."""
+
+    folder: str
+    key: str
+    condition: str
+    is_last: bool
 
 
 class ReportWish(Wish):
@@ -752,11 +781,14 @@ class ThumbnailDrawn(StudyReport):
 
 
 class Replay(StudyReport):
-    """Trials for a player."""
+    """Trials for a player, or the paths of a run by generation; weights by link and inputs of a touched network."""
 
     key: str
     scene: PackedScene
     trials: list[PackedTrial]
+    weights: dict[str, float] = field(default_factory=dict)
+    inputs: list[str] = field(default_factory=list)
+    generations: list[GenerationPaths] = field(default_factory=list)
 
 
 class ReplayRefused(StudyReport):

@@ -109,23 +109,50 @@ class Watcher:
             done: Number of complete runs. Another number asks again.
         """
         key = f"typical {done} {condition}"
+        return self._once(messages.ReplayWish(str(self._folder), key, [{"condition": condition}]))
+
+    def generations(
+        self, condition: str, *, is_last: bool
+    ) -> messages.Replay | messages.ReplayRefused | None:
+        """Return the paths of a run by generation, or why there are none; ask for them and return None before.
+
+        Args:
+            condition: Name of the condition.
+            is_last: Whether it is the last published run, anew with each drawing of figures, or the typical one.
+        """
+        key = f"run {self.n_drawn if is_last else self._stamp} {condition}"
+        return self._once(messages.RunWish(str(self._folder), key, condition, is_last))
+
+    def _once(
+        self, wish: messages.ReplayWish | messages.RunWish
+    ) -> messages.Replay | messages.ReplayRefused | None:
+        """Return the answer to a wish; ask and return None before."""
         with self._lock:
-            found = self.replays.get(key)
-            if found is not None or key in self._typical:
+            found = self.replays.get(wish.key)
+            if found is not None or wish.key in self._typical:
                 return found
-            self._typical.add(key)
-        self.replay(key, [{"condition": condition}])
+            self._typical.add(wish.key)
+        self._play(wish)
         return None
 
     def replay(self, key: str, choices: list[messages.TrialChoice]) -> None:
         """Ask for trials to be played; they come into `replays` under the key."""
+        self._play(messages.ReplayWish(str(self._folder), key, choices))
+
+    def touch(
+        self, key: str, choice: messages.TrialChoice, weights: dict[str, float], cut: list[str]
+    ) -> None:
+        """Ask for a trial with a changed network, as `replay` does."""
+        self._play(messages.TouchWish(str(self._folder), key, choice, weights, cut))
+
+    def _play(self, wish: messages.ReplayWish | messages.RunWish | messages.TouchWish) -> None:
         with self._lock:
-            self.replays.pop(key, None)
+            self.replays.pop(wish.key, None)
             while len(self.replays) >= MOST_REPLAYS:
                 oldest = next(iter(self.replays))
                 del self.replays[oldest]
                 self._typical.discard(oldest)
-        self._want(messages.ReplayWish(str(self._folder), key, choices))
+        self._want(wish)
 
     def write_report(self) -> None:
         """Ask for the report to be written."""

@@ -9,6 +9,7 @@ from realitygap.report._agreement import measure_agreement
 from realitygap.report._archive_figure import draw_archive
 from realitygap.report._audit import Audit, AuditProgress, audit_notes, audit_results
 from realitygap.report._choices_figure import compare_choices, draw_choices
+from realitygap.report._chosen_run import choose_run
 from realitygap.report._closing import (
     SELECTION_NOTE,
     family_table,
@@ -31,7 +32,7 @@ from realitygap.report._gap_page import refuse_gap_page, write_closed_gap, write
 from realitygap.report._generations_figure import draw_best, draw_coverage, draw_scores
 from realitygap.report._individuals_figure import draw_individuals
 from realitygap.report._lineage_figure import draw_lineage
-from realitygap.report._motion import Each, choose_moving, watch, write_movie
+from realitygap.report._motion import Each, choose_moving, touch_network, watch, write_movie
 from realitygap.report._networks_figure import draw_networks
 from realitygap.report._page import write_report
 from realitygap.report._path_figure import draw_paths
@@ -62,6 +63,7 @@ __all__ = [
     "best_trials",
     "check_ending",
     "choose_moving",
+    "choose_run",
     "choose_trial",
     "compare_choices",
     "compare_conditions",
@@ -101,6 +103,7 @@ __all__ = [
     "strategy_table",
     "summarize",
     "summarize_tasks",
+    "touch_network",
     "twin_table",
     "watch",
     "why_table",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal, get_args
 
@@ -25,7 +25,7 @@ from realitygap.report._driven import driven_paths, refuse_replay
 from realitygap.report._tally import Results, Tally, largest, read_tally
 from realitygap.report._trial_figure import ChosenTrial, choose_trial
 from realitygap.robots import Robot
-from realitygap.runs import replay
+from realitygap.runs import genome_of, replay, trace_row
 
 Each = Literal["individual", "generation", "condition"]
 """Selection of several trials: each individual of a generation, or the best of each generation or condition."""
@@ -185,6 +185,48 @@ def _moving(tally: Tally, trial: ChosenTrial, title: str) -> list[MovingTrial]:
         )
         for k, robot in enumerate(trajectory.robots[:_MOST])
     ]
+
+
+def touch_network(
+    folder: Results, weights: Mapping[str, float], cut: Collection[str], **numbers: Any
+) -> tuple[list[MovingTrial], dict[str, float], tuple[str, ...]]:
+    """Run a trial of a study again with a changed network, in its simulator and with the same noise.
+
+    Args:
+        folder: Results of a study, or the path to them.
+        weights: New weights by link, such as obstacle → move.
+        cut: Inputs that the network loses.
+        numbers: Numbers of the trial, as in `choose_trial`.
+
+    Returns:
+        The trial as recorded and the changed one, the recorded weights by link, and the inputs.
+
+    Raises:
+        ValueError: The condition is not on a simulator.
+    """
+    tally = read_tally(folder)
+    trial = choose_trial(tally, **numbers)
+    condition, genes = trial.condition, trial.row["genome"]
+    if not condition.on.is_simulator:
+        raise ValueError("Networks are changed in simulators only. Choose a condition on a simulator.")
+    evolved = genome_of(condition, trial.row).interface
+    names = (*evolved.inputs, *evolved.outputs)
+    ends = [
+        [names[n] if n < len(names) else f"hidden {n}" for n in genes[end]] for end in ("source", "target")
+    ]
+    links = [f"{source} → {target}" for source, target in zip(*ends, strict=True)]
+    changed = {
+        **genes,
+        "weight": [weights.get(link, weight) for link, weight in zip(links, genes["weight"], strict=True)],
+        "enabled": [on and source not in cut for source, on in zip(ends[0], genes["enabled"], strict=True)],
+    }
+    trajectory = trace_row(condition, trial.row, genome_of(condition, {"genome": changed}))
+    arena = condition.arena_of(trajectory)
+    again = in_motion(trajectory, arena, condition.on, title="changed", label=condition.label)
+    known = {
+        link: weight for link, weight, on in zip(links, genes["weight"], genes["enabled"], strict=True) if on
+    }
+    return [*_moving(tally, trial, "as evolved")[:1], again], known, evolved.inputs
 
 
 def _driven(tally: Tally, trial: ChosenTrial, title: str) -> MovingTrial:

@@ -3,7 +3,7 @@
 from ._condition import NAME_PATTERN, Condition
 from ._evolution import Evolution, named, population_of
 from ._published import MAZE_REWARDS, MazeReward, MazeRun, MazeTrials, TaskRun, run_maze, run_task
-from ._replay import genome_of, partners_of, replay
+from ._replay import genome_of, partners_of, replay, trace_row
 from ._runs import prepare_kernels, run_replicates, run_rows
 
 __all__ = [
@@ -25,4 +25,5 @@ __all__ = [
     "run_replicates",
     "run_rows",
     "run_task",
+    "trace_row",
 ]

@@ -77,15 +77,7 @@ def replay(condition: Condition | Mapping[str, Any], row: Mapping[str, Any]) -> 
             f"The network of the row does not fit the settings of the condition. Give those of condition "
             f"{row['condition']!r} of its study; if they are, the row was changed."
         ) from error
-    trajectory = trace_genome(
-        condition.on,
-        condition.arena.arena(),
-        genome,
-        noise=condition.noise,
-        noise_key=NoiseKey(row["key"], row["replicate"], row["generation"], row["individual"]),
-        inputs=condition.network_inputs,
-        partners=partners_of(condition, row),
-    )
+    trajectory = trace_row(condition, row, genome)
     difference = _difference(condition, trajectory, row)
     if difference:
         raise RecordError(
@@ -94,6 +86,19 @@ def replay(condition: Condition | Mapping[str, Any], row: Mapping[str, Any]) -> 
             "computed by this version and not changed?"
         )
     return trajectory
+
+
+def trace_row(condition: Condition, row: Mapping[str, Any], genome: Genome) -> Trajectory:
+    """Compute the trial of a row, with the noise of the row and any genome."""
+    return trace_genome(
+        condition.on,
+        condition.arena.arena(),
+        genome,
+        noise=condition.noise,
+        noise_key=NoiseKey(row["key"], row["replicate"], row["generation"], row["individual"]),
+        inputs=condition.network_inputs,
+        partners=partners_of(condition, row),
+    )
 
 
 def _difference(condition: Condition, trajectory: Trajectory, row: Mapping[str, Any]) -> str:

@@ -16,7 +16,7 @@ from typing_extensions import TypedDict
 
 from realitygap.drawing import hex_of, line_pen, themed_color
 from realitygap.lab._choices import Choices
-from realitygap.lab._messages import Curve, ScorePairs
+from realitygap.lab._messages import Curve, Replay, ScorePairs
 from realitygap.playback import PackedScene, PackedTrial
 from realitygap.world import Arena
 
@@ -235,16 +235,47 @@ class Curves(Element, component="curves.js"):
 
     def put(self, curves: Sequence[Curve]) -> None:
         """Show these curves."""
-        inks = [line_pen(k) for k in range(len(curves))]
         self._props["curves"] = list(curves)
-        self._props["inks"] = [
-            {"color": themed_color(color), "dashes": list(dashes)} for color, dashes in inks
-        ]
+        self._props["inks"], self._props["keys"] = _inks_of(curves)
         self.update()
 
     def choose(self, condition: str) -> None:
         """Show one condition alone; all if it is empty."""
         self._props["chosen"] = condition
+        self.update()
+
+
+def _inks_of(curves: Sequence[Curve]) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
+    """Return the color and dashes of each line, and the key that explains them.
+
+    The color is that of the search, the dashes those of the noise, if these two identify each condition.
+    """
+    searches = list(dict.fromkeys(curve["search"] for curve in curves))
+    noises = sorted({curve["noise"] for curve in curves})
+    colors = [themed_color(line_pen(1 + k)[0]) for k in range(len(searches))]
+    dashes = [list(line_pen(k)[1]) for k in range(len(noises))]
+    pairs = [(searches.index(curve["search"]), noises.index(curve["noise"])) for curve in curves]
+    if len(set(pairs)) < len(curves):
+        pens = [line_pen(k) for k in range(len(curves))]
+        inks = [{"color": themed_color(color), "dashes": list(dash)} for color, dash in pens]
+        return inks, [ink | {"text": curve["condition"]} for ink, curve in zip(inks, curves, strict=True)]
+    of_searches = [
+        {"color": color, "dashes": [], "text": text} for color, text in zip(colors, searches, strict=True)
+    ]
+    of_noises = [
+        {"color": "currentColor", "dashes": dash, "text": f"noise {noise:g}"}
+        for dash, noise in zip(dashes, noises, strict=True)
+    ]
+    return [{"color": colors[k], "dashes": dashes[n]} for k, n in pairs], of_searches + of_noises
+
+
+class Generations(Element, component="generations.js"):
+    """Paths of a run, of the generation that the visitor chooses; the last one as long as the visitor chooses none."""
+
+    def put(self, replay: Replay) -> None:
+        """Show the paths of a run."""
+        # One text, as in `Player`.
+        self._props["shown"] = json.dumps({"scene": replay.scene, "generations": replay.generations})
         self.update()
 
 

@@ -235,6 +235,10 @@ class Form:
         usable = {key: field.check() for key, field in self._fields.items() if key not in problems}
         if find is not None and (found := await run.io_bound(find, usable)) is not None:
             problems |= found.problems
+        return self._in_order(problems)
+
+    def _in_order(self, problems: Mapping[str, str]) -> dict[str, str]:
+        """Return mistakes in the order of the fields, those of no field last."""
         return {key: problems[key] for key in (*self._fields, *problems) if key in problems}
 
     def problems(self) -> dict[str, str]:
@@ -280,11 +284,12 @@ class Form:
             return not problems
 
     def show_problems(self, problems: Mapping[str, str]) -> None:
-        """Show mistakes at their fields and in the summary, and move the focus there.
+        """Show mistakes at their fields and in the summary, and move the focus to the first field with one.
 
         Args:
             problems: Messages by key; a key that is no field's is shown in the summary only.
         """
+        problems = self._in_order(problems)
         self._refused = {
             key: (self._fields[key].input.value, text)
             for key, text in problems.items()
@@ -309,7 +314,8 @@ class Form:
                     target = _control(named.input)
                     link = ui.link(f"{named.label}: {text}", f"#{target}")
                     link.on("click", js_handler=f"(e) => {{ e.preventDefault(); {_focus(target)} }}")
-        ui.run_javascript(f"setTimeout(() => {{ {_focus(self._summary.html_id)} }}, 50)")
+        first = next((_control(self._fields[key].input) for key in problems if key in self._fields), "")
+        ui.run_javascript(f"setTimeout(() => {{ {_focus(first, self._summary.html_id)} }}, 50)")
 
     def _refused_again(self, key: str) -> str:
         """Return the message about a value that was refused and has not changed; empty if there is none."""
@@ -367,8 +373,10 @@ def _control(element: ui.element) -> str:
     return f"f{element.id}"
 
 
-def _focus(target: str) -> str:
+def _focus(target: str, otherwise: str = "") -> str:
+    """Return the script that moves the focus to a control, or to another element if the control is not in sight."""
     return (
-        f"const it = document.getElementById('{target}'); it.focus({{preventScroll: true}}); "
-        "it.scrollIntoView({block: 'center'});"
+        f"const [it, other] = ['{target}', '{otherwise}'].map((id) => document.getElementById(id)); "
+        "const seen = it?.checkVisibility() ? it : other; "
+        "seen.focus({preventScroll: true}); seen.scrollIntoView({block: 'center'});"
     )

@@ -20,6 +20,7 @@ from ._elements import Player
 from ._fields import Form
 from ._frame import hint, section
 from ._part import Part
+from ._touch import Touch
 
 MOST_TRIALS = 4
 """Number of trials that are played together: more robots cover each other."""
@@ -107,6 +108,8 @@ class Replays:
         hint(f"Compare adds the chosen trial to those shown, up to {MOST_TRIALS}.")
         self._stage = ui.refreshable(self._show_stage)
         self._stage()
+        self._touch = Touch(self._watcher, lambda: self._choices[-1] if self._choices else None)
+        self._touch.show()
         section("Drive live")
         with ui.element("div").classes("lab-form"):
             form.text(
@@ -127,6 +130,7 @@ class Replays:
                 self._choices = self._choices[:-1]
             self._stage.refresh()
         self._live.look()
+        self._touch.look()
 
     async def play_first(self) -> None:
         """Play the typical run, unless a trial was played already."""

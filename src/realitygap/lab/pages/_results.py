@@ -10,7 +10,7 @@ from realitygap.lab._standing import Standing
 from realitygap.lab._watcher import PackedFigure, Watcher
 from realitygap.stats import runs_for_a_claim
 
-from ._elements import Curves, Player
+from ._elements import Curves, Generations, Player
 from ._frame import hint, section
 from ._part import Part
 
@@ -52,6 +52,7 @@ class Results:
         self._replicates = standing.state.replicates
         self._chosen = ""
         self._shown_curves: list[Curve] | None = None
+        self._shown_run: Replay | None = None
 
     def show(self) -> None:
         """Show them."""
@@ -62,14 +63,18 @@ class Results:
         self._filtered = Part(lambda: self._chosen, self._show_filter)
         self._filtered.show()
         with ui.element("div").classes("lab-panels-two") as self._panels:
-            with ui.column().classes("lab-panel") as self._curves_box:
-                section("Best coverage by generation")
-                self._curves = Curves([], "Median best coverage by generation, one line per condition")
             with ui.column().classes("lab-panel"):
                 section("Best path")
                 self._path = Part(self._typical, self._show_path)
                 self._path.show()
-        self._table_box = ui.column().classes("lab-cards")
+            with ui.column().classes("lab-panel") as self._curves_box:
+                section("Best coverage by generation")
+                self._curves = Curves([], "Median best coverage by generation, one line per condition")
+            with ui.column().classes("lab-panel") as self._evolution_box:
+                section("Evolution")
+                self._evolution = Generations()
+                self._evolved = hint("")
+            self._table_box = ui.column().classes("lab-panel")
         self._table: ui.table | None = None
         self._gallery = ui.column().classes("lab-cards")
         self._images: dict[str, _Image] = {}
@@ -155,8 +160,21 @@ class Results:
             self._shown_curves = curves
             self._curves.put(curves)
         self._path.look()
+        self._renew_evolution()
         if self._rows():
             self._renew_table()
+
+    def _renew_evolution(self) -> None:
+        """Show the paths of a run by generation: of the last published run while the study runs."""
+        condition, is_known, _ = self._typical()
+        is_last = self._standing.word in GROWING
+        replay = self._watcher.generations(condition, is_last=is_last) if is_known else None
+        if isinstance(replay, Replay) and replay is not self._shown_run:
+            self._shown_run = replay
+            self._evolution.put(replay)
+            which = "the last published run" if is_last else "the typical run"
+            self._evolved.text = f"{replay.scene['title']}, {which}. The thick line is the best path."
+        self._evolution_box.set_visibility(self._shown_run is not None)
 
     def _renew_table(self) -> None:
         rows = [

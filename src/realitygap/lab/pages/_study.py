@@ -169,8 +169,6 @@ class _Page:
         self._report_stamp = self._watcher.report_stamp
 
     def show(self) -> None:
-        if self._standing.state.note:
-            hint(self._standing.state.note)
         self._dialogs = ui.element("div")  # apart from the state, which is drawn again while a dialog is open
         self._state = Part(lambda: self._standing.steady, self._show_state)
         self._state.show()
@@ -201,6 +199,8 @@ class _Page:
         self._drive = Part(self._driven, self._show_driving)
         self._drive.show()
         self._results.show()
+        if self._standing.state.note:
+            hint(self._standing.state.note)
 
     # state
 

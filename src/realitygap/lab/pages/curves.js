@@ -1,8 +1,10 @@
 // Median of each condition by generation: lines, the interval of the chosen one, and values on hover, tap, or arrow keys.
+const LABEL = 15, MOST_LABELS = 16; // height of a label [px], and how many fit
 export default {
   props: {
     curves: Array, // condition, label, points: n, median, low, high
     inks: Array, // of each curve: color, dashes
+    keys: Array, // what colors and dashes mean: color, dashes, text
     chosen: String, // condition that is shown alone; empty for all
     name: String,
   },
@@ -23,6 +25,10 @@ export default {
           <polyline :points="line(k)" fill="none" :stroke="inks[k].color" stroke-width="2" :stroke-dasharray="inks[k].dashes.map((d) => 1.5 * d).join(' ')" />
           <circle v-if="curves[k].points.length === 1" :cx="x(0)" :cy="y(curves[k].points[0].median)" r="3" :fill="inks[k].color" />
         </g>
+        <g v-for="{ k, y, end } in labels" :key="'l' + k" :class="{ 'lab-curve-off': isOff(k) }" aria-hidden="true">
+          <path :d="'M' + (width - right + 2) + ' ' + end + 'L' + (width - right + 12) + ' ' + y" :stroke="inks[k].color" fill="none" />
+          <text :x="width - right + 15" :y="y" dominant-baseline="central" :style="{ fill: inks[k].color }">{{ curves[k].condition }}</text>
+        </g>
         <g v-if="mark">
           <line class="lab-curves-cross" :x1="x(mark.g)" :x2="x(mark.g)" :y1="top" :y2="height - bottom" />
           <line v-if="at.low !== null" :x1="x(mark.g)" :x2="x(mark.g)" :y1="y(at.low)" :y2="y(at.high)" :stroke="inks[mark.k].color" stroke-width="3" />
@@ -31,13 +37,13 @@ export default {
       </svg>
       <div class="lab-curves-words" role="status">{{ words }}</div>
       <ul class="lab-curves-names" aria-hidden="true">
-        <li v-for="k in order.slice().sort((a, b) => a - b)" :key="k" :class="{ 'lab-curve-off': isOff(k) }">
-          <svg viewBox="0 0 30 8" width="30" height="8"><path d="M0 4H30" :stroke="inks[k].color" stroke-width="2.4" :stroke-dasharray="inks[k].dashes.join(' ')" /></svg>
-          {{ curves[k].condition }}
+        <li v-for="key in keys" :key="key.text">
+          <svg viewBox="0 0 30 8" width="30" height="8"><path d="M0 4H30" :stroke="key.color" stroke-width="2.4" :stroke-dasharray="key.dashes.join(' ')" /></svg>
+          {{ key.text }}
         </li>
       </ul>
     </div>`,
-  data() { return { width: 560, mark: null, left: 44, right: 12, top: 10, bottom: 40, height: 300 }; },
+  data() { return { width: 560, mark: null, left: 44, top: 10, bottom: 40, height: 300 }; },
   mounted() {
     this.watcher = new ResizeObserver(([entry]) => { this.width = Math.max(Math.round(entry.contentRect.width), 240); });
     this.watcher.observe(this.$refs.place);
@@ -51,6 +57,16 @@ export default {
     order() { // the chosen one last, above the others
       const all = this.curves.map((_, k) => k);
       return all.sort((a, b) => Number(this.isOff(b)) - Number(this.isOff(a)));
+    },
+    hasLabels() { return this.curves.length > 1 && this.curves.length <= MOST_LABELS; },
+    right() { return this.hasLabels ? 22 + Math.max(...this.curves.map(({ condition }) => 7.8 * Math.min(condition.length, 20))) : 12; },
+    labels() { // at the ends of the lines, moved apart
+      if (!this.hasLabels) return [];
+      const ends = this.curves.map((curve, k) => ({ k, end: this.y(curve.points.at(-1).median) })).sort((a, b) => a.end - b.end);
+      const lowest = this.height - this.bottom, y = ends.map(({ end }) => end);
+      for (let k = 1; k < y.length; k++) y[k] = Math.max(y[k], y[k - 1] + LABEL);
+      for (let k = y.length - 1, limit = lowest; k >= 0; k--, limit = y[k + 1] - LABEL) y[k] = Math.min(y[k], limit);
+      return ends.map((each, k) => ({ ...each, y: y[k] }));
     },
     longest() { return Math.max(1, ...this.curves.map((curve) => curve.points.length)); },
     generations() {

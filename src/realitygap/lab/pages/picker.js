@@ -6,7 +6,7 @@ export default {
   emits: ["update:model-value", "blur"],
   template: `
     <div class="lab-picker">
-      <select :id="isOwn ? null : this.for" v-bind="about" :aria-label="isOwn ? name + ', chosen' : null" :value="isOwn ? ' ' : text"
+      <select :id="isOwn ? null : this.for" v-bind="isOwn ? {} : about" :aria-label="isOwn ? name + ', chosen' : null" :value="isOwn ? ' ' : text"
               @change="choose" @blur="$emit('blur')">
         <optgroup v-for="[title, entries] in groups" :key="title" :label="title">
           <option v-for="[value, words] in entries" :key="value" :value="value">{{ words }}</option>

@@ -145,7 +145,7 @@ def bracketed(estimate: Estimate, digits: int = 3, missing: str = "", *, signs: 
     """Return the ends of an interval in brackets, such as `[0.100, 0.200]`; another text without one."""
     if estimate.ends is None:
         return missing
-    ends = (signed(end, digits) if signs else f"{end:.{digits}f}" for end in estimate.ends)
+    ends = (signed(end, digits) if signs else f"{end:.{digits}f}".replace("-", "−") for end in estimate.ends)
     return f"[{', '.join(ends)}]"
 
 

@@ -16,6 +16,7 @@ from realitygap.report import (
 from realitygap.report._gap_figures import draw_gap_maps, draw_gap_pairs, draw_gap_replay, draw_gap_why
 from realitygap.stats import Estimate
 from realitygap.study import GapBetween, gap_between
+from tests.browsers import open_browser
 
 pytestmark = pytest.mark.slow
 
@@ -70,6 +71,26 @@ def test_one_controller_moves_on_both_platforms_from_one_start(gap, tmp_path):
     shown = gap.study.shown
     assert gap.study.source.means[shown.controller] == gap.study.source.means.max()
     assert len(shown.source) == len(shown.target) == 3
+
+
+def test_controller_moves_until_it_is_paused_and_stands_with_reduced_motion(gap, tmp_path):
+    address = write_gap_report(gap, tmp_path / "gap.html").as_uri()
+    moved = "() => !document.querySelector('.motion .rg-clock').textContent.startsWith('step 0 ')"
+    with open_browser() as browser:
+        for motion in ("no-preference", "reduce"):
+            complaints = []
+            page = browser.new_page(reduced_motion=motion)
+            page.on("console", lambda message, said=complaints: said.append(message.text))
+            page.goto(address)
+            if motion == "reduce":
+                assert page.get_by_role("button", name="Play trials").is_visible()
+                assert page.evaluate(moved) is False
+            else:
+                page.wait_for_function(moved)
+                page.get_by_role("button", name="Pause trials").click()
+            assert not page.get_by_text("need JavaScript").count()
+            assert not page.get_by_text("Measures of the transfer gap.").is_visible()  # folded
+            assert complaints == []
 
 
 def test_what_moves_has_the_cells_of_the_measured_trials():

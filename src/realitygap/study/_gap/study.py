@@ -61,7 +61,8 @@ class ShownTrials:
 
     Attributes:
         controller: Index of the controller.
-        source, target: Trials in simulation, and on the target.
+        source: Trials in simulation.
+        target: Trials on the target.
     """
 
     controller: int

@@ -8,6 +8,8 @@ from __future__ import annotations
 import os
 import signal
 import socket
+import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from multiprocessing.process import BaseProcess
 from pathlib import Path
@@ -204,6 +206,20 @@ def visit(visitors: Visitors, lab: RunningLab) -> Iterator[Callable[..., Any]]:
 
     yield open_page
     visitors.leave(lab.address.rstrip("/"))
+
+
+@pytest.fixture
+def emulated() -> Iterator[tuple[str, str]]:
+    """The port and the witness of an emulated robot in a process of its own.
+
+    Each test has its own: a lab that has just ended may hold its port for a moment longer.
+    """
+    command = ["-m", "realitygap", "emulate", "scribbler", "--tcp", "0", "--witness", "0", "--quiet"]
+    with subprocess.Popen([sys.executable, *command], stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        port, witness = (process.stdout.readline().split()[-1] for _ in range(2))
+        yield port, witness
+        process.terminate()
 
 
 def open_advanced(page, field) -> None:

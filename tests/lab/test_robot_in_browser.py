@@ -142,13 +142,30 @@ def test_a_gamepad_drives_while_the_handle_has_the_focus(visit):
     page.get_by_text("Standing", exact=True).wait_for()
 
 
-def test_a_person_who_watches_can_stop_the_robot_and_cannot_drive_it(visit):
+def test_a_person_who_watches_can_stop_the_robot_and_cannot_drive_it(visit, emulated):
     page = visit("robot")
-    connect(page)
+    page.get_by_text("Another port").click()
+    page.get_by_label("Port", exact=True).fill(emulated[0])
+    page.get_by_role("button", name="Connect", exact=True).click()
+    page.get_by_text(f"Connected to {emulated[0]}").wait_for()
     watcher = visit("robot")
     watcher.locator('.lab-pad[aria-disabled="true"]').wait_for()
     watcher.get_by_role("button", name="Stop robot").click()
     watcher.get_by_role("button", name="Robot stopped").wait_for()
+
+
+def test_each_visitor_drives_an_emulated_robot_of_their_own(visit):
+    first, second = visit("robot"), visit("robot")
+    connect(first)
+    connect(second)
+    hold_key(first)
+    assert second.get_by_text("Standing", exact=True).is_visible()
+    second.get_by_role("button", name="Stop robot").click()
+    assert first.get_by_text("Driving", exact=True).is_visible()
+    first.keyboard.up("ArrowUp")
+    second.get_by_role("button", name="Disconnect").click()
+    second.get_by_role("button", name="Use an emulated robot").wait_for()
+    drive_and_stop(first)
 
 
 def test_its_preflight_and_its_picture_are_shown(visit):

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from typing import Any
@@ -27,15 +25,15 @@ NOTICES = """() => ["negative", "warning", "info"].forEach((type) => Quasar.Noti
   position: "top", timeout: 0 }))"""
 
 
-def test_stop_is_shown_while_a_robot_is_connected_and_nothing_covers_it(visit, tmp_path):
+def test_stop_is_shown_while_a_robot_is_connected_and_nothing_covers_it(visit, emulated, tmp_path):
     """In one lab, with each kind of thing that lies above a page."""
     robot = visit("robot")
     assert not robot.get_by_role("button", name="Stop robot").is_visible()
-    robot.get_by_role("button", name="Use an emulated robot").click()
+    connect(robot, emulated[0])
     robot.locator(".lab-stop").wait_for()
     for view, size in VIEWS.items():
         page = visit("gap", size=size, has_touch=view != "desktop", user_agent=agent(view))
-        page.get_by_text("Emulated robot", exact=False).first.wait_for()
+        page.get_by_text(f"Robot on {emulated[0]}", exact=False).first.wait_for()
         stop = page.get_by_role("button", name="Stop robot")
         stop.wait_for()
         assert stop.bounding_box()["height"] >= 44
@@ -110,20 +108,6 @@ class Motors:
                 time.sleep(0.01)
             end()
         raise AssertionError("the motors do not turn")
-
-
-@pytest.fixture
-def emulated() -> Iterator[tuple[str, str]]:
-    """The port and the witness of an emulated robot in a process of its own.
-
-    Each test has its own: a lab that has just ended may hold its port for a moment longer.
-    """
-    command = ["-m", "realitygap", "emulate", "scribbler", "--tcp", "0", "--witness", "0", "--quiet"]
-    with subprocess.Popen([sys.executable, *command], stdout=subprocess.PIPE, text=True) as process:
-        assert process.stdout is not None
-        port, witness = (process.stdout.readline().split()[-1] for _ in range(2))
-        yield port, witness
-        process.terminate()
 
 
 @pytest.fixture

@@ -11,6 +11,7 @@ from typing import Literal
 
 from realitygap.errors import StudyError
 from realitygap.platforms import names_a_port
+from realitygap.robots import is_in_this_program
 
 from ._files import refuse_port
 from ._hand import Hand, IdentifyJob
@@ -117,9 +118,14 @@ class RobotControl:
         job = self.job
         return "" if job is None else job.robot_action
 
-    def note(self, job: Job) -> None:
-        """Remember what uses the robot, and whether the link to the robot before it is lost."""
-        if job.port:
+    def note(self, job: Job, platform: str = "") -> None:
+        """Remember what uses the robot, and whether the link to the robot before it is lost.
+
+        Args:
+            job: The job.
+            platform: Its platform; one with an emulator in the job's process does not use the lab's robot.
+        """
+        if job.port and not is_in_this_program(platform):
             self._lost_before, self._user = self.lost_port, job
 
     def jobs(self) -> list[Job]:
@@ -145,7 +151,7 @@ class RobotControl:
         Raises:
             StudyError: Something uses the robot.
         """
-        if names_a_port(platform):
+        if names_a_port(platform) and not is_in_this_program(platform):
             self.refuse_second()
             self.operator, self.request = visitor, None
 

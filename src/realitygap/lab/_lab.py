@@ -10,6 +10,7 @@ from typing import Any
 from realitygap.errors import StudyError
 from realitygap.orders import CalibrateOrder, GapOrder
 from realitygap.records import existing_trials, refuse_links
+from realitygap.robots import is_in_this_program
 
 from ._calibration import CalibrationJob, calibration_mistakes
 from ._checks import Checks
@@ -23,6 +24,7 @@ from ._job import Job
 from ._live import LiveJob, live_mistakes
 from ._messages import LiveWork, StudyWork, TrialChoice, VideoWork
 from ._mistakes import Mistakes
+from ._own_robots import OwnRobots
 from ._photos import Photos
 from ._standing import Standing, standing_of
 from ._studies import Studies, used_by
@@ -61,6 +63,7 @@ class Lab:
         self.checks = Checks(root, allow_code=allow_code)
         self._lock = threading.RLock()
         self.robot = RobotControl(root, self._lock, self.changed)
+        self._own_robots = OwnRobots(root, self._lock, self.changed)
         self.jobs: dict[str, StudyJob] = {}
         self.version = 0
         self.gap: GapJob | None = None
@@ -76,6 +79,26 @@ class Lab:
     def changed(self) -> None:
         """Something has changed; may be called from any thread."""
         self.version += 1
+
+    # robots
+
+    def robot_of(self, visitor: Visitor) -> RobotControl:
+        """Return the control of the visitor's emulated robot if there is one, otherwise of the lab's robot."""
+        own = self._own_robots.of(visitor)
+        return self.robot if own is None or (own.job is None and self.robot.job is not None) else own
+
+    def connect(self, port: str, witness: str, visitor: Visitor) -> None:
+        """Connect a robot to be driven by hand: the lab's robot, or an emulated one for this visitor alone.
+
+        Raises:
+            StudyError: No port is named, or a robot is in use.
+        """
+        (self._own_robots if is_in_this_program(port) else self.robot).connect(port, witness, visitor)
+
+    def stop_robots(self, visitor: Visitor) -> bool:
+        """Stop the lab's robot and the visitor's emulated one; return False if there is neither."""
+        stopped = [robot.stop() for robot in {self.robot, self.robot_of(visitor)}]
+        return any(stopped)
 
     # studies
 
@@ -256,7 +279,7 @@ class Lab:
             self.robot.take_for(order.target, visitor)
             page.parent.mkdir(exist_ok=True)
             self.gap = GapJob(order, page, self.root, self.changed)
-            self.robot.note(self.gap)
+            self.robot.note(self.gap, order.target)
         self.changed()
 
     def gap_page(self, name: str) -> Path | None:
@@ -288,7 +311,7 @@ class Lab:
                 raise StudyError("A calibration is running. Wait until it is complete, or stop it.")
             self.robot.take_for(values["robot"], visitor)
             self.calibration = CalibrationJob(CalibrateOrder(**values, out=out), self.root, self.changed)
-            self.robot.note(self.calibration)
+            self.robot.note(self.calibration, values["robot"])
         self.changed()
 
     def close(self) -> None:
@@ -299,6 +322,7 @@ class Lab:
             single: list[Job | None] = [self.gap, self.calibration]
             jobs = [
                 *self.robot.jobs(),
+                *self._own_robots.jobs(),
                 *self.jobs.values(),
                 *self.videos.values(),
                 *self.lives.values(),

@@ -5,8 +5,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from nicegui import app, events, ui
+from starlette.requests import Request
 from starlette.responses import PlainTextResponse, Response
 
+from realitygap.lab._access import VISITOR
 from realitygap.lab._control import HANDOVER_S, RobotRequest, Visitor
 from realitygap.lab._lab import Lab
 
@@ -22,8 +24,9 @@ def add_stop(lab: Lab) -> None:
     """Add the request that stops the robot without a page's websocket; `frame.js` sends it."""
 
     @app.post("/stop")
-    async def stop() -> Response:  # in the event loop: it waits for no thread
-        return PlainTextResponse("stopped" if lab.robot.stop() else "no robot")
+    async def stop(request: Request) -> Response:  # in the event loop: it waits for no thread
+        visitor = Visitor(request.cookies.get(VISITOR, ""))
+        return PlainTextResponse("stopped" if lab.stop_robots(visitor) else "no robot")
 
 
 class _State(NamedTuple):
@@ -66,7 +69,7 @@ class Stop:
         ui.timer(UNTOLD_S, part.look)
 
     def _state(self) -> _State:
-        robot = self._lab.robot
+        robot = self._lab.robot if self._lab.robot.port else self._lab.robot_of(self._visitor)
         if not (port := robot.port):
             lost = robot.lost_port
             text = f"{_name_of(lost)}: link lost. If it moves, switch it off." if lost else ""
@@ -84,12 +87,12 @@ class Stop:
         self._button.text = "Robot stopped" if state.is_stopped else "Stop robot"
 
     def _press(self) -> None:
-        if not self._lab.robot.stop():
+        if not self._lab.stop_robots(self._visitor):
             notify("No robot is connected.")
 
     def _key(self, event: events.KeyEventArguments) -> None:
         if event.action.keydown and event.key.escape:
-            self._lab.robot.stop()
+            self._lab.stop_robots(self._visitor)
 
 
 def _name_of(port: str) -> str:

@@ -8,7 +8,7 @@ from nicegui import run, ui
 from starlette.requests import Request
 
 from realitygap._wording import duration
-from realitygap.lab._control import Visitor
+from realitygap.lab._control import RobotControl, Visitor
 from realitygap.lab._hand import Hand
 from realitygap.lab._lab import Lab
 from realitygap.lab._messages import Activity, Senses
@@ -20,7 +20,7 @@ from realitygap.robot_families import (
     ports_in_words,
     robot_families,
 )
-from realitygap.robots import PortGuess, list_ports, split_port
+from realitygap.robots import PortGuess, is_in_this_program, list_ports, split_port
 
 from ._control import show_holder
 from ._elements import CellGrid, DrivePad, Pull
@@ -75,13 +75,18 @@ class _Page:
         watching(self._lab, self._look)
         ui.timer(LIVE_S, self._live)
 
+    @property
+    def _robot(self) -> RobotControl:
+        """The visitor's emulated robot, or the lab's robot."""
+        return self._lab.robot_of(self._visitor)
+
     def _state(self) -> Any:
-        hand = self._lab.robot.hand
+        hand = self._robot.hand
         shown = None
         if hand is not None:
             facts = (hand.preflight, hand.refusal, hand.doing, hand.picture, hand.battery_v)
             shown = (id(hand), hand.label, hand.outcome, *facts)
-        return shown, self._lab.robot.operator, self._lab.robot.study_job
+        return shown, self._robot.operator, self._robot.study_job
 
     async def _look(self) -> None:
         now = self._state()
@@ -91,9 +96,7 @@ class _Page:
             return
         before, self._seen = self._seen, now
         if self._is_same_robot(before, now):
-            self._doing.text = (
-                _DOING.get(self._lab.robot.hand.doing, "") if self._lab.robot.hand is not None else ""
-            )
+            self._doing.text = _DOING.get(self._robot.hand.doing, "") if self._robot.hand is not None else ""
             for part in (self._facts, self._picture):
                 part.look()
         else:
@@ -107,12 +110,13 @@ class _Page:
 
     def _show(self) -> None:
         self._pad, self._gauges, self._n_shown, self._replies = None, {}, -1, {}
-        hand, job = self._lab.robot.hand, self._lab.robot.study_job
+        hand, job = self._robot.hand, self._robot.study_job
         if job is not None:
             ui.label(f"The study {job.name!r} uses the robot.").props('role="status"')
             ui.button("Open trials", on_click=lambda: ui.navigate.to(f"/study/{job.name}/trials")).props(
                 "outline no-caps"
             )
+            self._show_own()
             return
         if hand is None or hand.is_over:
             self._show_connecting(hand)
@@ -179,6 +183,13 @@ class _Page:
             f"{look} no-caps"
         )
 
+    def _show_own(self) -> None:
+        """Show how to drive an emulated robot while the lab's robot is in use."""
+        with ui.row().classes("lab-row"):
+            for family in self._families:
+                if is_in_this_program(family.emulated):
+                    self._show_emulated(family, is_failed=True)
+
     def _show_port(self, guess: PortGuess) -> None:
         port = guess.port
         with ui.row().classes("lab-row"):
@@ -192,17 +203,18 @@ class _Page:
             self._replies[port] = ui.label(self._lab.robot.reply_on(port)).props('role="status"')
 
     def _connect(self, port: str, witness: str = "") -> None:
-        self._lab.robot.connect(port, witness, self._visitor)
+        self._lab.connect(port, witness, self._visitor)
 
     # a robot that is connected
 
     def _show_robot(self, hand: Hand) -> None:
-        may = self._lab.robot.may_operate(self._visitor)
+        may = self._robot.may_operate(self._visitor)
         with ui.row().classes("lab-row"):
             ui.label(hand.label).classes(f"lab-label-{hand.label.lower()} lab-badge")
             ui.label(f"Connected to {hand.port}").props('role="status"')
         if not may:
             show_holder(self._lab, self._visitor)
+            self._show_own()
         self._show_panels(hand)
         facts = ui.column().classes("lab-cards")
         self._facts = Part(
@@ -252,13 +264,13 @@ class _Page:
         )
         if hand.is_over:
             return
-        ui.button("Stop", on_click=self._lab.robot.stop, color=None).classes("lab-pad-stop").props(
-            "unelevated no-caps"
-        )
+        ui.button("Stop", on_click=lambda: self._lab.stop_robots(self._visitor), color=None).classes(
+            "lab-pad-stop"
+        ).props("unelevated no-caps")
         hint("Hold and pull the pad, or use the arrow keys. The robot stops when you let go.")
 
     def _show_actions(self, hand: Hand) -> None:
-        may = self._lab.robot.may_operate(self._visitor)
+        may = self._robot.may_operate(self._visitor)
         actions: list[tuple[str, Activity]] = [("Run pre-flight", "preflight")]
         if hand.has_camera:
             actions.append(("Take picture", "picture"))
@@ -292,10 +304,10 @@ class _Page:
 
     def _is_off(self, hand: Hand) -> bool:
         """Return True if the pad is off: the robot is lost, does not answer, or is another visitor's."""
-        return hand.is_over or hand.silent_s > 0 or not self._lab.robot.may_operate(self._visitor)
+        return hand.is_over or hand.silent_s > 0 or not self._robot.may_operate(self._visitor)
 
     def _live(self) -> None:
-        hand = self._lab.robot.hand
+        hand = self._robot.hand
         if hand is None or self._pad is None:
             return
         self._pad.know(hand.n_stops, is_off=self._is_off(hand))
@@ -321,13 +333,13 @@ class _Page:
             self._clock.text += f" · {self._grid.follow(senses.pose, hand.line, senses.cells)}"
 
     def _drive(self, pull: Pull) -> None:
-        hand = self._lab.robot.hand
-        if hand is not None and self._lab.robot.may_operate(self._visitor):
+        hand = self._robot.hand
+        if hand is not None and self._robot.may_operate(self._visitor):
             hand.drive(pull["move"], pull["turn"], pull["stops"])
 
     def _release(self) -> None:
-        hand = self._lab.robot.hand
-        if hand is not None and self._lab.robot.may_operate(self._visitor):
+        hand = self._robot.hand
+        if hand is not None and self._robot.may_operate(self._visitor):
             hand.release()
 
 

@@ -14,13 +14,13 @@ from pathlib import Path
 
 DOCS = Path(__file__).parent
 IMAGES = DOCS / "images" / "lab"
-SCENES = "tests/lab/test_screenshots_in_browser.py"
+SCENES = ("tests/lab/test_screenshots_in_browser.py", "tests/lab/test_class_in_browser.py")
 
 
 def main() -> int:
     """Take all pictures."""
     IMAGES.mkdir(parents=True, exist_ok=True)
-    command = [sys.executable, "-m", "pytest", "-q", "-m", "long", SCENES]
+    command = [sys.executable, "-m", "pytest", "-q", "-m", "long", *SCENES]
     environment = os.environ | {"REALITYGAP_SCREENSHOTS": str(IMAGES)}
     return subprocess.run(command, cwd=DOCS.parent, env=environment, check=False).returncode
 

@@ -2,15 +2,24 @@
 
 from __future__ import annotations
 
+import asyncio
+import json
+import math
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 from urllib.error import HTTPError
 from urllib.request import urlopen
 
 import pytest
+from websockets.asyncio.client import connect
+
+from realitygap.lab._access import CLASS_SOCKET, VISITOR
+from realitygap.world import paper_arena
 
 from .conftest import DESKTOP, PATIENCE_MS, RunningLab, expect
+from .test_screenshots_in_browser import FINE, keep
 
 pytestmark = pytest.mark.slow
 PHONE = (390, 800)
@@ -83,3 +92,72 @@ def test_student_reaches_no_other_page(lab, student):
     for path in ("", "class/board", "robot", "new"):
         with pytest.raises(HTTPError, match="403"):
             urlopen(lab.address + path)
+
+
+DRIVERS = {"Ada": 8, "Ben": 4, "Chen": 7, "Dora": 6, "Emil": 3}
+"""Students who drive row by row, and the number of ends of rows that they reach."""
+
+
+async def drive_rows(address: str, name: str, n_goals: int) -> None:
+    """Join, and drive a round row by row."""
+    grid = paper_arena().grid
+    ends = [grid.x + 1.5 * grid.cell, grid.x + (grid.columns - 1.5) * grid.cell]
+    rows = [grid.y + (row + 0.5) * grid.cell for row in (1, 2, 3, 4)]
+    goals = [(x, y) for k, y in enumerate(rows) for x in (ends if k % 2 == 0 else ends[::-1])]
+    async with connect(address, additional_headers={"Cookie": f"{VISITOR}={name}"}) as socket:
+        await socket.send(json.dumps({"kind": "join", "name": name}))
+        goal, phase, n = 0, "", 0
+        async for text in socket:
+            news = json.loads(text)
+            if (phase := news.get("phase", phase)) == "over":
+                break
+            if news["kind"] != "now" or phase != "round":
+                continue
+            x, y, heading = news["pose"]
+            while goal < n_goals and math.dist((x, y), goals[goal]) < 0.05:
+                goal += 1
+            if goal == n_goals:
+                continue
+            off = math.remainder(math.atan2(goals[goal][1] - y, goals[goal][0] - x) - heading, math.tau)
+            n += 1
+            pull = {"move": 1.0 if abs(off) < 0.5 else 0.0, "turn": max(-0.5, min(0.5, off)), "n": n}
+            await socket.send(json.dumps({"kind": "drive", **pull}))
+
+
+@pytest.mark.long
+def test_pictures_of_a_class_and_its_comparison_with_evolution(lab, visit, visitors):
+    """A whole round, until each phone shows its own path next to that of evolution."""
+    allowed = (lab.address, lab.address.replace("http", "ws"), "data:")
+    phone = visitors.open_page(PHONE, allowed, PATIENCE_MS, cookies=[], has_touch=True, **FINE)
+    phone.goto(lab.address + "class")
+    phone.fill("#who", "Fay")
+    phone.get_by_role("button", name="Join").click()
+    board = visit("class/board", size=(1000, 640))
+    address = lab.address.replace("http", "ws").rstrip("/") + CLASS_SOCKET
+
+    async def drive_all() -> None:
+        await asyncio.gather(*(drive_rows(address, *driver) for driver in DRIVERS.items()))
+
+    with ThreadPoolExecutor(1) as pool:
+        driving = pool.submit(asyncio.run, drive_all())
+        board.get_by_text("6 students joined").wait_for()
+        board.get_by_role("button", name="Start round").click()
+        for key, seconds in (
+            ("ArrowUp", 5),
+            ("ArrowLeft", 2.5),
+            ("ArrowUp", 2),
+            ("ArrowLeft", 2.5),
+            ("ArrowUp", 3),
+        ):
+            phone.locator("#pad").press(key, delay=1000 * seconds)
+        phone.locator("#pad").focus()
+        phone.keyboard.down("ArrowUp")
+        keep(phone, "class-phone")
+        phone.keyboard.up("ArrowUp")
+        expect(phone.locator("#words")).to_have_text("Time is up.")
+        board.get_by_role("button", name="Show evolution").click()
+        expect(phone.locator("#words")).to_contain_text("Evolution (SIM)")
+        phone.locator(".rg-sim").wait_for()
+        board.locator(".lab-label-sim").wait_for()
+        keep(board, "class-board")
+        driving.result()

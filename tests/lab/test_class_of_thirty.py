@@ -25,8 +25,8 @@ from realitygap.lab.pages._class import _Class
 
 N = 30
 ROUND_S = 6.0
-MOST_STEPS = 3
-"""The most steps of the class until a page has heard that its robot follows a command."""
+MOST_STEPS = 1
+"""The most steps of the class from the arrival of a command until the page has heard that its robot follows it."""
 
 
 class Phone:
@@ -68,6 +68,25 @@ class Phone:
         await self.say("drive", move=0.0, turn=self.turn, n=self.n_sent)
 
 
+class _Arrivals:
+    """Counts the messages that arrive at a class."""
+
+    def __init__(self, room: Classroom) -> None:
+        self.n = 0
+        self._hear, self._event = room.hear, asyncio.Event()
+        room.hear = self.hear  # type: ignore[method-assign]
+
+    def hear(self, *message: Any) -> bool:
+        self.n += 1
+        self._event.set()
+        return self._hear(*message)
+
+    async def until(self, n: int) -> None:
+        while self.n < n:
+            self._event.clear()
+            await self._event.wait()
+
+
 @contextlib.asynccontextmanager
 async def served(room: Classroom, root: Path) -> AsyncIterator[str]:
     """Serve the websockets of a class; yield their address."""
@@ -88,6 +107,7 @@ async def served(room: Classroom, root: Path) -> AsyncIterator[str]:
 async def drive_a_round(root: Path) -> tuple[Classroom, list[Phone]]:
     now, steps = [0.0], [0]
     room = Classroom(root, clock=lambda: now[0], round_s=ROUND_S)
+    arrived = _Arrivals(room)
     async with served(room, root) as address, contextlib.AsyncExitStack() as open_phones:
         phones = []
         for number in range(N):
@@ -110,12 +130,12 @@ async def drive_a_round(root: Path) -> tuple[Classroom, list[Phone]]:
             await step()
         room.start_round()
         while room.phase == "round":
+            before = arrived.n
             for phone in phones:
                 await phone.drive(steps[0])
-            heard = [phone.hear(lambda it: not it.sent_at or it.state["phase"] == "over") for phone in phones]
-            waiting = asyncio.gather(*heard)
-            while not waiting.done():
-                await step()
+            await arrived.until(before + N)
+            await step()
+            await asyncio.gather(*(phone.hear(lambda it: not it.sent_at) for phone in phones))
         await step()
         await asyncio.gather(*(phone.hear(lambda it: it.state["phase"] == "over") for phone in phones))
         for task in listening:

@@ -27,6 +27,14 @@ def connect(page) -> None:
     page.get_by_text(f"Connected to {PORT}").wait_for()
 
 
+def connect_to(page, port: str) -> None:
+    """Connect the lab's robot, which all visitors see."""
+    page.get_by_text("Another port").click()
+    page.get_by_label("Port", exact=True).fill(port)
+    page.get_by_role("button", name="Connect", exact=True).click()
+    page.get_by_text(f"Connected to {port}").wait_for()
+
+
 def drive_by(page, press: Callable[[], None], let_go: Callable[[], None]) -> None:
     """Press until the robot drives: a page that is drawn at this moment, or a robot that is silent, drops a press."""
     for _ in range(24):
@@ -96,9 +104,9 @@ def test_hand_driving_fits_one_screen_of_a_phone_and_counts_cells(visit):
 
 
 @NEW_PYTHONS
-def test_it_stands_when_the_page_goes_away(visit):
+def test_it_stands_when_the_page_goes_away(visit, emulated):
     page = visit("robot")
-    connect(page)
+    connect_to(page, emulated[0])
     hold(page)
     watcher = visit("robot")
     watcher.get_by_text(re.compile("is operating the robot. You are watching")).wait_for()
@@ -144,10 +152,7 @@ def test_a_gamepad_drives_while_the_handle_has_the_focus(visit):
 
 def test_a_person_who_watches_can_stop_the_robot_and_cannot_drive_it(visit, emulated):
     page = visit("robot")
-    page.get_by_text("Another port").click()
-    page.get_by_label("Port", exact=True).fill(emulated[0])
-    page.get_by_role("button", name="Connect", exact=True).click()
-    page.get_by_text(f"Connected to {emulated[0]}").wait_for()
+    connect_to(page, emulated[0])
     watcher = visit("robot")
     watcher.locator('.lab-pad[aria-disabled="true"]').wait_for()
     watcher.get_by_role("button", name="Stop robot").click()

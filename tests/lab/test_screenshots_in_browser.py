@@ -21,7 +21,12 @@ from .robot_study import await_trial, begin_sitting, make_study, start_trial
 from .sheets import drive_sheet, photo_of
 
 ROOT = Path(__file__).parents[2]
-PAGES = ["docs/how-to/lab.md", "docs/tutorials/lesson.md", "docs/tutorials/robot-lab.md"]
+PAGES = [
+    "docs/how-to/lab.md",
+    "docs/tutorials/double-lesson.md",
+    "docs/tutorials/lesson.md",
+    "docs/tutorials/robot-lab.md",
+]
 MOST_BYTES = 200_000
 WIDE, TALL = (1000, 760), (1000, 1000)
 FINE = {"device_scale_factor": 2}

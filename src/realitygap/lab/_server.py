@@ -165,7 +165,7 @@ def _qr_code(text: str) -> str:
 
 
 def _prepare(
-    root: Path, token: str, port: int, *, is_local: bool, allow_code: bool, students: str
+    root: Path, token: str, port: int, *, is_local: bool, allow_code: bool, students: str = ""
 ) -> tuple[Any, Any]:
     """The lab, and what will serve it."""
     import uvicorn

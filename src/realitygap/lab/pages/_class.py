@@ -115,7 +115,8 @@ class _Class:
                 pass
         telling.cancel()
         self.room.leave(student, news)
-        with contextlib.suppress(RuntimeError):  # the page has left
+        await asyncio.gather(telling, return_exceptions=True)
+        with contextlib.suppress(RuntimeError, WebSocketDisconnect):  # the page has left
             await socket.close(_VIOLATION)
 
     async def _tell(self, socket: WebSocket, student: Student, news: asyncio.Event) -> None:

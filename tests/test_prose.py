@@ -6,6 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from realitygap.gap import SHOWN
+
 PATH = Path(__file__).parent.parent / "tools" / "prose.py"
 
 
@@ -101,6 +103,28 @@ def test_prose_check_finds_riddles_in_every_kind_of_text_and_not_their_better_fo
         for found, better in PAIRS:
             assert findings(prose, tmp_path, name, template.format(found)), (name, found)
             assert not findings(prose, tmp_path, name, template.format(better)), (name, better)
+
+
+def test_prose_check_names_each_measure_as_the_table_of_measures_does(prose, tmp_path):
+    others = {
+        "rank correlation": "The correlation over controllers is high.",
+        "noise ceiling": "That is the ceiling of noise.",
+        "RMS gap": "The RMS difference in coverage is small.",
+        "level": "The mean gap is small.",
+        "run": "The study has more replicates now.",
+        "a number such as 0.306": "The median is .306 here.",
+        "a true minus (−)": "The level is -0.089 here.",
+    }
+    assert others.keys() == prose.OTHER_NAMES.keys()
+    assert {each.title.lower() for each in SHOWN} >= {"rank correlation", "noise ceiling", "rms gap", "level"}
+    for name, text in others.items():
+        found = findings(prose, tmp_path, "page.md", f"# Title\n\n{text}\n")
+        assert len(found) == 1, (text, found)
+        assert f"expected {name}" in found[0]
+        if not name.startswith("a "):
+            assert findings(prose, tmp_path, "message.py", f'say("{text}")\n'), text
+    good = "The level is −0.089, the median 0.306, and the RMS gap 0.145 [0.047, 0.244]; `-0.5` is code."
+    assert not findings(prose, tmp_path, "page.md", f"# Title\n\n{good}\n")
 
 
 def test_prose_check_finds_each_fault_in_a_page(prose, tmp_path):

@@ -41,7 +41,7 @@ def test_numbers_have_their_interval_if_there_is_one():
     assert wording.with_interval(estimate, signs=True) == "−0.100 [−0.200, +0.050]"
     assert wording.bracketed(estimate, signs=True) == "[−0.200, +0.050]"
     few = mean_interval([0.25, 0.75])
-    assert (wording.with_interval(few), wording.span(few)) == ("0.500", "–")
+    assert (wording.with_interval(few), wording.bracketed(few, missing="–")) == ("0.500", "–")
     assert (few.needed, few.ends) == (5, None)
     assert wording.with_interval(Estimate.refusal(0, "no runs")) == "–"
 

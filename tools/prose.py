@@ -54,6 +54,17 @@ RIDDLES = re.compile(
 )
 """What a colleague has to read twice, in any text that a person sees."""
 
+OTHER_NAMES = {
+    "rank correlation": r"correlation over controllers|correlation of (the )?ranks|Spearman['’]s correlation over",
+    "noise ceiling": r"noise allows|ceiling of (the )?noise|ceiling that noise",
+    "RMS gap": r"RMS (difference|error) (of|in|between) (the )?(score|coverage|gap)|gap RMS|root mean square gap",
+    "level": r"mean gap\b|bias of the (simulator|target)",
+    "run": r"\b(more|fewer) replicates\b|\breplications?\b",
+    "a number such as 0.306": r"(?<![\w.)\]/\d-])\.\d{3}\b",
+    "a true minus (−)": r"(?<=\s)-\d+\.\d+\b(?= )",
+}
+"""The name of each measure, the word for an evolution, and the style of numbers, with other forms of each."""
+
 BAD_HELP = re.compile(r"^(Of|By|Where|What|Whether|Who|To|In|For|How|Also|Not|With|At)\b")
 
 
@@ -115,6 +126,11 @@ def findings(path: Path) -> Iterator[tuple[int, str]]:
     for text in texts:
         if match := RIDDLES.search(" ".join(text.words.split())):
             yield text.line, f"'{match[0]}': {text.words[:60]}"
+        shown = text.words if text.kind == "string" else re.sub(r"`[^`]*`", "CODE", text.words)
+        for name, others in OTHER_NAMES.items():
+            is_number = name.startswith("a ")
+            if (match := re.search(others, shown)) and not (is_number and text.kind == "string"):
+                yield text.line, f"'{match[0]}', expected {name}: {text.words[:60]}"
         if text.kind == "string":
             continue
         if text.kind == "summary" and len(text.words) > LONGEST_SUMMARY:

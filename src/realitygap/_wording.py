@@ -136,22 +136,16 @@ def with_interval(estimate: Estimate, *, signs: bool = False) -> str:
     return f"{value} [{ends[0]}, {ends[1]}]" if ends else value
 
 
-def between(estimate: Estimate, digits: int = 3, missing: str = "–") -> str:
-    """Return the ends of an interval, such as `0.100 to 0.200`; another text without one."""
-    return missing if estimate.ends is None else " to ".join(f"{end:.{digits}f}" for end in estimate.ends)
-
-
 def bracketed(estimate: Estimate, digits: int = 3, missing: str = "", *, signs: bool = False) -> str:
     """Return the ends of an interval in brackets, such as `[0.100, 0.200]`; another text without one."""
     if estimate.ends is None:
         return missing
-    ends = (signed(end, digits) if signs else f"{end:.{digits}f}".replace("-", "−") for end in estimate.ends)
-    return f"[{', '.join(ends)}]"
+    return f"[{', '.join(signed(end, digits) if signs else number(end, digits) for end in estimate.ends)}]"
 
 
 def within(ends: Ends | None, digits: int = 3) -> str:
     """Return the ends of an interval in brackets after its number, such as ` [0.100, 0.200]`; empty without one."""
-    return "" if ends is None else f" [{ends[0]:.{digits}f}, {ends[1]:.{digits}f}]"
+    return "" if ends is None else f" [{number(ends[0], digits)}, {number(ends[1], digits)}]"
 
 
 def p_in_words(p: float) -> str:
@@ -431,7 +425,7 @@ def rank_verdict(raw: Estimate, ceiling: Estimate, without: Estimate) -> str:
     """
     if raw.value is None or raw.ends is None:
         return "Too few controllers to judge the ranking."
-    noise = "" if ceiling.value is None else f", and noise allows {ceiling.value:.3f}"
+    noise = "" if ceiling.value is None else f", and the noise ceiling is {number(ceiling.value)}"
     figures = f"the rank correlation is {with_interval(raw)}{noise}."
     low, high = without.ends or raw.ends
     if low >= RANKS_ALIKE:

@@ -74,7 +74,7 @@ def test_a_study_that_runs_and_is_watched_played_and_extended(lab, look):
     page.locator(".lab-figure img").nth(4).wait_for()
     assert faults(page, lab.root) == []
     assert keyboard(page) == []
-    page.get_by_role("button", name="Run more replicates").click()
+    page.get_by_role("button", name="Add runs").click()
     page.get_by_label("Runs per condition").fill("5")
     assert faults(page, lab.root) == []
     page.get_by_role("button", name="Run", exact=True).click()

@@ -70,7 +70,7 @@ def test_a_study_from_a_file_is_carried_out_and_extended_and_survives_the_lab(la
     start(page, TINY)
     page.wait_for_url("**/study/tiny")
     page.locator(".lab-state", has_text="Complete").wait_for(timeout=120_000)
-    page.get_by_role("button", name="Run more replicates").click()
+    page.get_by_role("button", name="Add runs").click()
     page.get_by_label("Runs per condition").fill("4")
     page.get_by_role("button", name="Run", exact=True).click()
     page.locator(".lab-field .lab-problem", has_text="Enter a whole number from 5 to 1000000000.").wait_for()

@@ -97,7 +97,7 @@ def test_a_replicate_does_not_depend_on_the_others(run):
 def test_a_row_of_other_settings_is_noticed():
     condition = Condition(name="a", noise=0.1)
     row = run_replicates(condition, 0, 1).row(30, named=True)
-    with pytest.raises(RecordError, match="replicate 0, generation 3, individual 6"):
+    with pytest.raises(RecordError, match="run 0, generation 3, individual 6"):
         replay(Condition(name="a", jyro={"steps": 20, "turn_per_step": 0.9}), row)
     with pytest.raises(RecordError, match=r"belongs to condition 'a', and the condition is 'b'"):
         replay(Condition(name="b", noise=0.1), row)

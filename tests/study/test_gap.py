@@ -86,7 +86,7 @@ def test_champions_of_results_are_drawn_from_all_runs(tmp_path):
     found = sample_controllers(str(folder), 6, 1)
     assert len({each.name for each in found}) == 6
     assert found == sample_controllers(folder, 6, 1)
-    with pytest.raises(StudyError, match="Run more replicates"):
+    with pytest.raises(StudyError, match="Add runs"):
         sample_controllers(folder, 1_000)
 
 

@@ -78,7 +78,7 @@ def run(
 ) -> None:
     """Run a study, or resume one that was interrupted.
 
-    You can interrupt it at any time. Run the same command again to resume. More replicates or new conditions extend
+    You can interrupt it at any time. Run the same command again to resume. More runs or new conditions extend
     existing results. The results do not depend on threads, clusters, chunks or interruptions.
 
     A study may have tasks in Python files. Before such a file runs for the first time, the command shows it and asks

@@ -9,7 +9,7 @@ import typer
 
 import realitygap
 from realitygap._terminal import echo
-from realitygap._wording import between
+from realitygap._wording import number, with_interval
 from realitygap.orders import ClosingOrder, TransferOrder, TryOrder
 
 from ._code import AllowPlatforms
@@ -19,7 +19,6 @@ from ._order import command_of
 from ._results import show_page
 
 if TYPE_CHECKING:
-    from realitygap.stats import Estimate
     from realitygap.study import ClosingProgress, ClosingSummary, TransferResult
 
 
@@ -70,11 +69,6 @@ def transfer(
     echo(f"Results: {folder}   champions: {folder / 'champions'}")
 
 
-def _with_interval(estimate: Estimate) -> str:
-    ends = "" if estimate.ends is None else f" ({between(estimate)})"
-    return f"{estimate.value:.3f}{ends}"
-
-
 def _print(result: TransferResult) -> None:
     echo(
         f"{result.study}, {result.condition}: from simulation (SIM) to {result.target} ({result.label}), "
@@ -83,9 +77,8 @@ def _print(result: TransferResult) -> None:
     )
     echo(f"{'strategy':16}{'budget':>7}{'on the target':>24}{'regret':>24}{'in simulation':>15}")
     for row in result.strategies:
-        quality, regret = map(_with_interval, (row.quality, row.regret))
-        simulated = "-" if row.simulated is None else f"{row.simulated:.3f}"
-        echo(f"{row.strategy:16}{row.budget:>7}{quality:>24}{regret:>24}{simulated:>15}")
+        quality, regret = map(with_interval, (row.quality, row.regret))
+        echo(f"{row.strategy:16}{row.budget:>7}{quality:>24}{regret:>24}{number(row.simulated):>15}")
     echo(f"Regret is to {result.best_in_words}.")
     if result.replicates == 1:
         echo("Intervals are over the fresh trials of one champion. To compare strategies, add --replicates.")

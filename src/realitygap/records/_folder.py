@@ -170,7 +170,7 @@ class ResultsFolder(PublishedResults):
         return folder
 
     def update_description(self, description: Mapping[str, Any]) -> None:
-        """Replace the description, when a study gets more replicates or conditions.
+        """Replace the description, when a study gets more runs or conditions.
 
         Raises:
             RecordError: a condition with published chunks would be missing from it, or the file cannot be

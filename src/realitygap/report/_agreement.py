@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy
 
-from realitygap._wording import between, counted
+from realitygap._wording import bracketed, counted
 from realitygap.errors import LedgerError
 from realitygap.records import Ledger, open_ledger
 from realitygap.stats import BCA_SMALLEST_N, CONFIDENCE, RESAMPLES, SEED, Estimate
@@ -48,7 +48,7 @@ class Agreement:
         interval = (
             f"no interval below {BCA_SMALLEST_N} trials"
             if self.kappa.ends is None
-            else f"95 % interval {between(self.kappa)}, trials resampled whole"
+            else f"95 % interval {bracketed(self.kappa)}, trials resampled whole"
         )
         return f"{judged}: {100 * self.same:.1f} % judged alike. Cohen's kappa {self.kappa.value:.3f} ({interval})."
 

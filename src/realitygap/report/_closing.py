@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 
 from realitygap._version import __version__
-from realitygap._wording import GOAL_VERDICTS, fixed
+from realitygap._wording import GOAL_VERDICTS, number
 from realitygap.records import write_whole
 from realitygap.report._closing_figures import draw_closing, words_of
 from realitygap.report._placed import FigureOnPage, hover_content, number_figures
@@ -117,8 +117,8 @@ def family_table(summary: ClosingSummary) -> TableOnPage:
             "–" if row["observe"] == "none" else row["observe"],
             str(row["budget"]),
             str(row["n"]),
-            _number(row["rms"]["estimate"]),
-            _span(row["rms"]["low"], row["rms"]["high"], _number),
+            number(row["rms"]["estimate"]),
+            _span(row["rms"]["low"], row["rms"]["high"], number),
             str(row["n_counted"]),
             "–" if row["observe"] == "none" else _percent(row["fall"]["estimate"]),
         )
@@ -132,8 +132,8 @@ def twin_table(summary: ClosingSummary) -> TableOnPage:
     rows = [
         (
             row["twin"],
-            _number(row["rms"]["estimate"]),
-            _number(row["standard_error"]),
+            number(row["rms"]["estimate"]),
+            number(row["standard_error"]),
             "yes" if row["counts"] else "no",
         )
         for row in summary["twins"]
@@ -145,7 +145,7 @@ def twin_table(summary: ClosingSummary) -> TableOnPage:
 def strategy_table(summary: ClosingSummary) -> TableOnPage:
     """Return a table of coverage on the twins by strategy."""
     rows = [
-        (row["strategy"], str(row["n"]), _number(row["estimate"]), _span(row["low"], row["high"], _number))
+        (row["strategy"], str(row["n"]), number(row["estimate"]), _span(row["low"], row["high"], number))
         for row in summary["strategies"]
     ]
     heads = ("strategy", "twins", "coverage on the twin", "95 % interval")
@@ -172,10 +172,6 @@ def _plain(goal: GoalRow, value: float | None) -> str:
 
 def _percent(value: float | None) -> str:
     return "–" if value is None else f"{100 * value:.0f} %".replace("-", "−")
-
-
-def _number(value: float | None) -> str:
-    return "–" if value is None else fixed(value, 3).replace("-", "−")
 
 
 def _span(low: float | None, high: float | None, form: Callable[[float], str]) -> str:

@@ -110,7 +110,7 @@ def draw_budget(summary: ClosingSummary) -> Drawing | None:
                 _budget_lines(axes, summary, family, observe)
             axes.set_xlabel("trials for calibrating", labelpad=2)
             head(axes, family, words.number(len(_of(summary, family))), stacked=True)
-        panels[0].set_ylabel(f"RMS gap, {words.label} less SIM", labelpad=3)
+        panels[0].set_ylabel(f"RMS gap, {words.label} minus SIM", labelpad=3)
         sheet.key(
             [line_key(each, color=color, linewidth=1.2) for each, color in colors.items()],
             place="upper right",
@@ -300,7 +300,7 @@ def draw_order(summary: ClosingSummary) -> Drawing | None:
         if gaps:
             groups[f"calibrated, {observe}"] = (observe, gaps)
     caption = (
-        "Left: Spearman’s correlation over the held-out controllers of coverage in simulation (SIM) and on the "
+        "Left: Spearman’s rank correlation of the held-out controllers of coverage in simulation (SIM) and on the "
         f"{words.robot} ({words.label}), disattenuated. Right: mean maximum rank violation over its floor, that of one "
         f"half of the {words.robot}’s trials by the other. Points: {words.units}; bars: medians; lines: goals. "
         f"Calibrated by {budget} trials."

@@ -13,7 +13,7 @@ import numpy.typing as npt
 import polars as pl
 import scipy
 
-from realitygap._wording import between
+from realitygap._wording import bracketed
 from realitygap.errors import RecordError, real_number, whole_number
 from realitygap.evolution import BehaviorDistance, CellOrder, behavior_distance, measure_of, pack_behaviors
 from realitygap.kernels.neat import distances
@@ -399,7 +399,7 @@ def _weight_note(audit: DistanceAudit) -> str:
     lead = {1: "low-numbered cells weigh most", -1: "high-numbered cells weigh most", 0: "cells weigh alike"}
     return (
         f"Weight: {lead[weight_bias(audit)]}. The first quarter of cells, as the paper sorts them, counts "
-        f"{front.value:.2f} times as much as the last ({between(front, 2)}); Spearman's correlation "
+        f"{front.value:.2f} times as much as the last {bracketed(front, 2)}; Spearman's correlation "
         f"of weight with the place in that order is {in_words(trend)}."
     )
 

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import polars as pl
 
 from realitygap._version import __version__
+from realitygap._wording import number
 from realitygap.errors import RealityGapError, RecordError
 from realitygap.platforms import described_platform, is_physical
 from realitygap.records import (
@@ -226,10 +227,10 @@ def _results_table(summary: pl.DataFrame) -> TableOnPage:
     for row in summary.iter_rows(named=True):
         cells: list[str | Cell] = [row["condition"], row["label"], f"{row['n']:,}"]
         for which in ("line", "ends"):
-            cells.append(_share(row[f"{which}_median"]))
+            cells.append(number(row[f"{which}_median"]))
             cells += [_range(row[f"{which}_{low}"], row[f"{which}_{high}"]) for low, high in _RANGES]
         published = [*(row["published"] or []), *[None] * n_published][:n_published]
-        cells += [Cell(_share(value), kind="none" if value is None else None) for value in published]
+        cells += [Cell(number(value), kind="none" if value is None else None) for value in published]
         rows.append(cells)
     caption = "Best coverage of a run by condition: the visited share of the reachable cells, best of all individuals."
     more = " Counterpart of the paper’s Table 2." if n_published else ""
@@ -489,12 +490,8 @@ def _is_built_in(description: DescribedStudy) -> bool:
     }
 
 
-def _share(value: float | None) -> str:
-    return "–" if value is None else f"{value:.3f}"
-
-
 def _range(low: float | None, high: float | None) -> Cell:
-    return Cell("–", element="none") if low is None else Cell(f"[{_share(low)}, {_share(high)}]")
+    return Cell("–", element="none") if low is None else Cell(f"[{number(low)}, {number(high)}]")
 
 
 def _count(value: int) -> str:

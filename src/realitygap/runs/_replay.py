@@ -81,7 +81,7 @@ def replay(condition: Condition | Mapping[str, Any], row: Mapping[str, Any]) -> 
     difference = _difference(condition, trajectory, row)
     if difference:
         raise RecordError(
-            f"Condition {row['condition']!r}, replicate {row['replicate']}, generation {row['generation']}, "
+            f"Condition {row['condition']!r}, run {row['replicate']}, generation {row['generation']}, "
             f"individual {row['individual']}: {difference}. Does the row belong to this condition, and was it "
             "computed by this version and not changed?"
         )

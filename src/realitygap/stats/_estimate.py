@@ -9,6 +9,8 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
+from realitygap._wording import with_interval
+
 Values = npt.NDArray[np.float64]
 
 CONFIDENCE = 0.95
@@ -88,8 +90,4 @@ class Estimate:
         return f"{type(self).__name__}({self}, n={self.n})"
 
     def __str__(self) -> str:
-        if self.value is None:
-            return "–"
-        if self.low is None or self.high is None:
-            return f"{self.value:.3f}".replace("-", "−")
-        return f"{self.value:.3f} [{self.low:.3f}, {self.high:.3f}]".replace("-", "−")
+        return with_interval(self)

@@ -77,8 +77,8 @@ def sample_controllers(
         controllers = _of_folder(ResultsFolder.open(kind), kind, allow_code)
         if len(controllers) < n:
             raise StudyError(
-                f"{kind} has champions of {len(controllers)} runs, but {n} controllers were requested. Run more "
-                "replicates, or request fewer."
+                f"{kind} has champions of {len(controllers)} runs, but {n} controllers were requested. Add "
+                "runs, or request fewer."
             )
         chosen = sorted(np.random.default_rng(seed).permutation(len(controllers))[:n])
         return _with_fresh_scores([controllers[k] for k in chosen])

@@ -215,7 +215,7 @@ class _Page:
             if standing.state.n_all_done:
                 ui.button("Report", on_click=self._report_now).props("outline no-caps")
             if standing.word == "Complete":
-                ui.button("Run more replicates", on_click=self._ask_replicates).props("outline no-caps")
+                ui.button("Add runs", on_click=self._ask_replicates).props("outline no-caps")
         if standing.word != "Complete":
             self._progress.show_bar()
         self._progress.put(self._standing)
@@ -239,11 +239,11 @@ class _Page:
         now = self._replicates
         with (
             self._dialogs,
-            ui.dialog(value=True).props('aria-label="Run more replicates"') as dialog,
+            ui.dialog(value=True).props('aria-label="Add runs"') as dialog,
             ui.card(),
         ):
             form = Form()
-            section("Run more replicates")
+            section("Add runs")
             form.summary()
             form.number(
                 "replicates",

@@ -55,7 +55,7 @@ class GapBetween(ShownAsCard):
 
     @property
     def rank_correlation(self) -> Estimate:
-        """Spearman's correlation over controllers between both platforms."""
+        """Spearman's rank correlation of the controllers' scores on both platforms."""
         return self.study.result.srcc
 
     @property

@@ -359,7 +359,7 @@ _PARTS = ("trials", "fresh", "champions", "calibrations")
 
 
 def _adopt(folder: Path, plan: TransferPlan) -> None:
-    """Make the folder that of a plan, or see that it is; more replicates, budgets and fresh trials extend it."""
+    """Give a folder to a plan, or check that it has it. More budgets, fresh trials, and repetitions extend it."""
     path = folder / "transfer.json"
     refuse_links(folder, path, folder / "result.json")
     refuse_links_in(folder, *_PARTS)

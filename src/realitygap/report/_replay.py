@@ -328,11 +328,11 @@ def pack_trial(
         steps,
         end_steps,
     ]
-    return b"".join(_differences(column) for column in columns)
+    return _differences(*columns)
 
 
-def _differences(column: npt.NDArray[np.int64]) -> bytes:
-    differences = np.diff(column, prepend=0)
+def _differences(*columns: npt.NDArray[np.int64]) -> bytes:
+    differences = np.concatenate([np.diff(column, prepend=0) for column in columns])
     return _sevens(np.where(differences < 0, -2 * differences - 1, 2 * differences))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Sequence
 
@@ -82,8 +83,9 @@ def is_enclosed(platform: JyroSettings, walls: NDArray[np.float64], heading: flo
     return bool(platform.speed * STEP_S < 2 * -inside[:, 2].max())
 
 
+@functools.lru_cache(maxsize=16)  # a report repeats a thousand single trials
 def jyro_scene(platform: JyroSettings, arena: Arena) -> TrialScene:
-    """Return arena, body and sensors in the form that kernels read.
+    """Return arena, body and sensors in the form that kernels read, which nobody may change.
 
     Raises:
         ValueError: More than 256 cells: a cell is kept as one byte; or the arena is not of straight walls.

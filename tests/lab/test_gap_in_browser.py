@@ -70,6 +70,22 @@ def test_gap_is_measured_with_its_progress_and_mistakes_are_shown_at_their_field
     assert (lab.root / "gaps" / "first.html").is_file()
 
 
+@pytest.mark.long
+def test_gap_is_closed_by_a_button_and_its_report_shows_both_gaps(lab, visit):
+    page = visit("gap")
+    page.get_by_label("Controllers", exact=True).fill("5")
+    page.get_by_label("Trials per controller").fill("2")
+    measure(page, Target="sim", Name="first")
+    page.get_by_role("button", name="Close the gap").click(timeout=120_000)
+    page.get_by_text("Gap first-closed", exact=True).wait_for()
+    page.get_by_text("Complete.", exact=True).wait_for(timeout=300_000)
+    report = page.frame_locator("iframe")
+    report.get_by_text("before and after a calibration with 20 trials").first.wait_for()
+    expect(report.locator(".motion .rg-player")).to_have_count(2)
+    assert page.get_by_role("button", name="Close the gap").count() == 0
+    assert (lab.root / "gaps" / "first-closed" / "fit.toml").is_file()
+
+
 def test_reports_come_after_2_4_8_trials_and_at_the_end():
     assert rounds(1) == [1]
     assert rounds(2) == [2]

@@ -13,12 +13,12 @@ from urllib.parse import parse_qsl
 from realitygap._wording import duration, with_interval
 from realitygap.errors import RealityGapError, StudyError
 from realitygap.gap import SHOWN
-from realitygap.orders import GapOrder
+from realitygap.orders import CloseOrder, GapOrder
 from realitygap.platforms import names_a_port, platform_of
-from realitygap.report import write_gap_report
+from realitygap.report import write_closed_gap, write_gap_report
 from realitygap.robots import is_in_this_program
 from realitygap.stats import Estimate, controllers_for_margin, detectable_difference, spread_of_differences
-from realitygap.study import GapStudy, gap_between
+from realitygap.study import GapStudy, close_gap, gap_between
 
 from ._channel import Channel, Pulses
 from ._files import check_name
@@ -100,6 +100,7 @@ class GapJob(MeasuringJob):
 
     Attributes:
         name: Name of its files.
+        closes: True if it calibrates, and measures again.
         order: The order.
         platform: The target.
         n_trials: Number of trials on each platform.
@@ -112,8 +113,11 @@ class GapJob(MeasuringJob):
         n_reports: Number of reports so far.
     """
 
-    def __init__(self, order: GapOrder, page: Path, root: Path, changed: Callable[[], None]) -> None:
+    def __init__(
+        self, order: GapOrder, page: Path, root: Path, changed: Callable[[], None], *, closes: bool = False
+    ) -> None:
         self.name = page.stem
+        self.closes = closes
         self.order = order
         self.n_trials = order.n_trials
         self.trials: dict[str, int] = {}
@@ -124,7 +128,13 @@ class GapJob(MeasuringJob):
         self.intervals: list[tuple[int, float, float, float]] = []
         self.pairs: ScorePairs | None = None
         self.n_reports = 0
-        super().__init__(GapWork(order.message(), str(page)), order.target, root, changed)
+        super().__init__(GapWork(order.message(), str(page), closes), order.target, root, changed)
+
+    @property
+    def can_close(self) -> bool:
+        """True if a calibration may close the gap that was measured."""
+        is_sim = self.order.sim.partition(":")[0] == "sim" and self.order.observe != "readings"
+        return self.is_complete and is_sim and self.order.target.partition(":")[0] not in ("jyro", "recorded")
 
     @property
     def has_met(self) -> bool:
@@ -181,11 +191,27 @@ def measure(channel: Channel, work: GapWork) -> None:
     def tell(name: str, done: int, total: int) -> None:
         channel.report(TrialCount(name, done, total), name, is_last=done == total)
 
+    if work.closes:
+        closed = close_gap(closing_of(order, page), pulse=pulses.tell, tell=tell)
+        write_closed_gap(closed, page)
+        measured = _measured(closed.after.study, order.trials)
+        channel.say(
+            GapMeasured(order.trials, closed.verdict, closed.main_measures, measured.rms, measured.pairs)
+        )
+        channel.say(GapDone())
+        return
     for trials in rounds(order.trials):
         gap = gap_between(order.model_copy(update={"trials": trials}), pulse=pulses.tell, tell=tell)
         write_gap_report(gap, page)
         channel.say(_measured(gap.study, trials))
     channel.say(GapDone())
+
+
+def closing_of(order: GapOrder, page: Path) -> CloseOrder:
+    """Return the order that closes a measured gap, in a folder next to its page."""
+    values = {field.name: getattr(order, field.name, None) for field in CloseOrder.fields()}
+    given = {name: value for name, value in values.items() if value is not None}
+    return CloseOrder(**given, out=page.with_suffix(""))
 
 
 def _measured(study: GapStudy, trials: int) -> GapMeasured:

@@ -256,13 +256,16 @@ class Lab:
 
     # gaps and calibrations
 
-    def measure_gap(self, name: str, values: dict[str, Any], visitor: Visitor) -> None:
+    def measure_gap(
+        self, name: str, values: dict[str, Any], visitor: Visitor, *, closes: bool = False
+    ) -> None:
         """Measure a gap.
 
         Args:
             name: Name of its files in the folder `gaps`.
             values: Fields of the order.
             visitor: Operator of the robot, if the target is one.
+            closes: True to calibrate then, and to measure again.
 
         Raises:
             FormError: Names or platforms that cannot be used.
@@ -278,7 +281,7 @@ class Lab:
             order = GapOrder(**values, results=existing_trials(trials))
             self.robot.take_for(order.target, visitor)
             page.parent.mkdir(exist_ok=True)
-            self.gap = GapJob(order, page, self.root, self.changed)
+            self.gap = GapJob(order, page, self.root, self.changed, closes=closes)
             self.robot.note(self.gap, order.target)
         self.changed()
 

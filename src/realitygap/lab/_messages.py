@@ -257,11 +257,13 @@ class GapWork(Work):
     Attributes:
         order: Message of a `GapOrder`.
         page: File of the report.
+        closes: True to calibrate then, and to measure again.
     """
 
     function: ClassVar[str] = "_gap:measure"
     order: dict[str, Any]
     page: str
+    closes: bool = False
 
 
 class CalibrationWork(Work):

@@ -231,6 +231,10 @@ class _Page:
                 ui.button("Resume", on_click=lambda: attempt(lambda: self._resume(job))).props(
                     "outline no-caps"
                 )
+            elif job.can_close and not job.closes:
+                ui.button("Close the gap", on_click=lambda: attempt(lambda: self._close(job))).props(
+                    "outline no-caps"
+                )
         if not work.is_over:
             ui.linear_progress(work.share, show_value=False).props(
                 f'aria-label="{100 * work.share:.0f} % of the trials"'
@@ -238,7 +242,11 @@ class _Page:
 
     def _resume(self, job: GapJob) -> None:
         values = job.order.model_dump(exclude={"results"})
-        self._lab.measure_gap(job.name, values, self._visitor)
+        self._lab.measure_gap(job.name, values, self._visitor, closes=job.closes)
+
+    def _close(self, job: GapJob) -> None:
+        values = job.order.model_dump(exclude={"results"})
+        self._lab.measure_gap(f"{job.name}-closed", values, self._visitor, closes=True)
 
     def _result(self) -> tuple[GapJob, ScorePairs, int] | None:
         job = self._lab.gap

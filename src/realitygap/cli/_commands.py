@@ -48,7 +48,7 @@ SECTIONS: dict[str, tuple[Command, ...]] = {
         Command("demo", "Take a two-minute tour with an emulated robot.", "_demo", "demo"),
         Command("run", "Run a study, or resume one that was interrupted.", "_study", "run"),
         Command("gap", "Measure the gap between a simulator and a target.", "_gap", "gap"),
-        Command("calibrate", "Fit the simulator to a robot.", "_calibrate", "calibrate"),
+        Command("close", "Measure the gap, calibrate, measure it again.", "_close", "close"),
         Command("lab", "Serve the web interface for studies, robots, and trials.", "_lab", "lab"),
     ),
     "Studies and their results": (
@@ -60,7 +60,7 @@ SECTIONS: dict[str, tuple[Command, ...]] = {
     ),
     "The gap": (
         Command("plan", "Estimate how many controllers and trials you need.", "_gap", "plan"),
-        Command("close", "Measure the gap, calibrate, measure it again.", "_close", "close"),
+        Command("calibrate", "Fit the simulator to a robot.", "_calibrate", "calibrate"),
         Command("transfer", "Compare strategies that transfer controllers.", "_transfer", "transfer"),
         Command("try", "Drive one exported controller on any platform.", "_transfer", "try_genome"),
         Command("again", "Repeat a measurement from its result.", "_order", "again", True),

@@ -173,11 +173,21 @@ def test_each_visitor_drives_an_emulated_robot_of_their_own(visit):
     drive_and_stop(first)
 
 
+def pass_preflight(page):
+    """Run the pre-flight check until it passes: on a busy machine, it may find the link too slow."""
+    passed = page.get_by_text("Pre-flight check passed.")
+    for _ in range(20):
+        page.get_by_role("button", name="Run pre-flight").click()
+        passed.or_(page.locator(".lab-problem", has_text="the link is too slow")).first.wait_for()
+        if passed.is_visible():
+            return
+    passed.wait_for()
+
+
 def test_its_preflight_and_its_picture_are_shown(visit):
     page = visit("robot")
     connect(page)
-    page.get_by_role("button", name="Run pre-flight").click()
-    page.get_by_text("Pre-flight check passed.").wait_for()
+    pass_preflight(page)
     page.get_by_role("button", name="Take picture").click()
     page.locator(".lab-senses").get_by_alt_text("Picture of the robot's camera").wait_for()
     assert (
@@ -211,8 +221,7 @@ def test_thymio_in_playground_is_driven_with_its_own_sensors(visit):
     page.get_by_role("progressbar", name="Rear right infrared").wait_for()
     expect(page.get_by_role("progressbar")).to_have_count(9)  # and two ground sensors
     drive_and_stop(page)
-    page.get_by_role("button", name="Run pre-flight").click()
-    page.get_by_text("Pre-flight check passed.").wait_for()
+    pass_preflight(page)
     assert not page.get_by_role("button", name="Take picture").is_visible()
 
 

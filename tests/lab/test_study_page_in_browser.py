@@ -82,10 +82,10 @@ def check_generations(page) -> None:
         page.locator(".lab-generations .lab-value"),
         page.get_by_label("Generation", exact=True).first,
     )
-    expect(words).to_have_text(re.compile(r"generation 4: 0\.\d{3}"))
+    expect(words).to_have_text(re.compile(r"generation 4: coverage 0\.\d{3}"))
     last = paths.last.get_attribute("points")
     slider.fill("0")
-    expect(words).to_have_text(re.compile(r"generation 0: 0\.\d{3}"))
+    expect(words).to_have_text(re.compile(r"generation 0: coverage 0\.\d{3}"))
     assert paths.last.get_attribute("points") != last
 
 

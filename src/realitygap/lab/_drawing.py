@@ -329,7 +329,7 @@ def _paths_of_run(folder: Path, wish: messages.RunWish) -> messages.Replay:
         last["paths"] += [
             (1000 * poses[:, :2]).round().astype(int).ravel().tolist() for poses, _ in path.tracks
         ]
-    title = f"{wish.condition}, run {run.replicate}"
+    title = f"{run.label}: {wish.condition}, run {run.replicate}"
     return messages.Replay(wish.folder, wish.key, pack_scene(run.arena, title), [], generations=generations)
 
 

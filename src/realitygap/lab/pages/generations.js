@@ -23,7 +23,7 @@ export default {
     paths() { return this.generations[this.index]?.paths || []; },
     words() {
       const { generation, coverage } = this.generations[this.index] || {};
-      return generation === undefined ? "" : `generation ${generation}: ${coverage.toFixed(3)}`;
+      return generation === undefined ? "" : `generation ${generation}: coverage ${coverage.toFixed(3)}`;
     },
     box() {
       const [left, right, bottom, top] = this.scene.extent.map((value) => 1000 * value);

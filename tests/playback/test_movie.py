@@ -134,8 +134,8 @@ def test_words_say_step_time_label_and_that_it_is_blocked():
         screen.picture(4.0)
         after = screen._clock.get_text()
     assert texts[:2] == ["EMULATED", "turning"]
-    assert before == "step 0 of 8 · 0.0 s · coverage .014"
-    assert after == "× blocked · step 8 of 8 · 4.0 s · coverage .014"
+    assert before == "step 0 of 8 · 0.0 s · coverage 0.014"
+    assert after == "× blocked · step 8 of 8 · 4.0 s · coverage 0.014"
 
 
 def test_a_small_picture_has_room_for_what_matters():

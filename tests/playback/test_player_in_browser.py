@@ -50,7 +50,7 @@ def visited(page) -> int:
 def test_the_slider_goes_through_the_trial(show):
     trial = straight(10)
     page = show(play(trial))
-    assert clock(page) == "step 0 of 10 · 0.0\u00a0s · coverage .014"
+    assert clock(page) == "step 0 of 10 · 0.0\u00a0s · coverage 0.014"
     assert visited(page) == 1
     scrub(page, 7)
     assert clock(page).startswith("step 7 of 10 · 0.7\u00a0s · coverage ")
@@ -198,7 +198,7 @@ def test_a_robot_that_runs_is_followed_and_can_be_played_afterwards(show):
     page.evaluate(
         "message => window.tell(message)", {**now, "pose": [0.2, 0.2, 0.0], "step": 1, "cells": [13]}
     )
-    assert clock(page) == "step 1 · 0.1\u00a0s · coverage .014"
+    assert clock(page) == "step 1 · 0.1\u00a0s · coverage 0.014"
     page.evaluate(
         "message => window.tell(message)",
         {
@@ -217,7 +217,7 @@ def test_a_robot_that_runs_is_followed_and_can_be_played_afterwards(show):
         " <= 0.2",
         arg=1000 * (0.4 - left),
     )
-    assert clock(page) == "step 2 · 0.2\u00a0s · coverage .042"
+    assert clock(page) == "step 2 · 0.2\u00a0s · coverage 0.042"
     page.evaluate(
         "trials => { window.model.set('was_live', true); window.model.set('trials', trials); "
         "window.model.set('live', false); }",

@@ -49,7 +49,7 @@ class CloseOrder(Order):
     )
     controllers: str = option(
         "random",
-        help="random for unrelated networks; or a study or a folder of results, for its champions.",
+        help="random for random networks; or a study or a folder of results, for its champions.",
         metavar="WHICH",
         label="Controllers from",
         refers="file",

@@ -300,14 +300,14 @@ class Screen:
         n_cells = self.trials[0].arena.grid.n_cells
         for word, moment in zip(self._words, moments, strict=False):
             blocked = "× " if moment.stalled else ""
-            word.set_text(f"{blocked}{moment.n_cells / n_cells:.3f}".replace("0.", ".", 1))
+            word.set_text(f"{blocked}{moment.n_cells / n_cells:.3f}")
             word.set_color(Ink.REACH if moment.stalled else Ink.MUTED)
         step = max(moment.step for moment in moments)
         counted = f"{step} of {self.n_steps}"
         is_roomy = self._wide >= _ROOMY
         parts = [f"step {counted}" if is_roomy else counted, f"{min(time, self.duration_s):.1f} s"]
         if not self._several and is_roomy:
-            parts.append(f"coverage {moments[0].n_cells / n_cells:.3f}".replace("0.", ".", 1))
+            parts.append(f"coverage {moments[0].n_cells / n_cells:.3f}")
         if not self._several and moments[0].stalled:
             parts.insert(0, "× blocked" if is_roomy else "×")
         self._clock.set_text(" · ".join(parts))

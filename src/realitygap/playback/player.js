@@ -359,7 +359,7 @@ function render({ model, el }) {
     const moments = live ? [liveMoment()] : trials.map((trial) => momentOf(trial, clock.at));
     stage.draw(moments, Object.fromEntries(boxes.map(({ name, checked }) => [name, checked])));
     const step = Math.max(0, ...moments.map((moment) => moment.step)), nCells = scene.grid ? scene.grid.columns * scene.grid.rows : 0;
-    const n = Math.max(...trials.map(nSteps)), time = live ? live.time : clock.at, share = (moment) => (moment.nCells / nCells).toFixed(3).replace(/^0/, "");
+    const n = Math.max(...trials.map(nSteps)), time = live ? live.time : clock.at, share = (moment) => (moment.nCells / nCells).toFixed(3);
     const facts = [live ? `step ${step}` : `step ${step} of ${n}`, `${time.toFixed(1)}\u00a0s`], [only] = moments;
     if (moments.length === 1 && nCells && trials[0].placed) facts.push(`coverage ${share(only)}`);
     if (moments.length === 1 && only.isStalled) facts.unshift("× blocked");

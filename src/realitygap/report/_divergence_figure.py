@@ -282,7 +282,7 @@ def _words(
     apart = " ".join(
         f"After {last} steps {distance:.2f} m apart{'' if len(others) == 1 else f' ({one.name} and {other.name})'}"
         f"{f', {alone}' if len(others) == 1 else ''}; headings differ by {turned:.2f} rad "
-        "(unrelated ones by 1.57 on average)."
+        "(random headings by 1.57 on average)."
         for (last, distance, turned), other in zip(ends, others, strict=True)
     )
     rest = "" if len(others) == 1 else f" Noise alone: {alone}."

@@ -23,7 +23,7 @@ from realitygap.study import GapStudy
 _MOST_ACROSS = 4.95
 """Maximum width of a scatter with its label [in]."""
 
-_KINDS = (("random", Ink.PUBLISHED, "s", "unrelated"), ("champion", Ink.OURS, "o", "champions"))
+_KINDS = (("random", Ink.PUBLISHED, "s", "random networks"), ("champion", Ink.OURS, "o", "champions"))
 """Kinds of controllers: color, mark, and name of each."""
 
 _DASHED: Dash = (0, (5, 1.5))

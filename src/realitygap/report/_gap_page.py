@@ -224,7 +224,7 @@ def _facts(gap: GapBetween) -> list[tuple[str, str]]:
         ("Target", f"{result.target} ({result.labels[1]}), {result.trials[1]} trials of each controller"),
         (
             "Controllers",
-            f"{len(kinds)}: {kinds.count('random')} unrelated networks and {kinds.count('champion')} champions",
+            f"{len(kinds)}: {kinds.count('random')} random networks and {kinds.count('champion')} champions",
         ),
         ("Arena", study.arena.name),
         ("Score", result.score),

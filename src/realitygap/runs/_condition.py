@@ -60,8 +60,8 @@ class Condition(Settings):
     selection: Selection = Field(
         "coverage",
         description="Rule that selects parents. coverage: the paper's objective NEAT. fitness: the fitness of another "
-        "task. novelty: novelty search. random: no selection. As many unrelated networks are tried, a control that the "
-        "paper lacks.",
+        "task. novelty: novelty search. random: no selection, a control that the paper lacks. It tries the same "
+        "number of random networks.",
     )
     platform: str = Field(
         "jyro",

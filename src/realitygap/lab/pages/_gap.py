@@ -268,7 +268,7 @@ class _Page:
                 section("Controllers on both platforms")
                 Scatter(pairs)
                 hint(
-                    "Crosses are 95 % intervals of the means. Circles are champions, squares unrelated networks. "
+                    "Crosses are 95 % intervals of the means. Circles are champions, squares random networks. "
                     "On the line there is no gap."
                 )
             if len(job.intervals) > 1:

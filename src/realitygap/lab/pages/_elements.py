@@ -103,12 +103,12 @@ class CellGrid(Element, component="cell_grid.js"):
     """Cells of an arena, to be tapped or drawn over.
 
     Args:
-        arena: Whose.
-        cells: Marked ones.
-        line: (x, y) [m] of what was drawn.
-        trace: What a photograph or a camera saw.
-        ink: Its color, as pens are named.
-        name: Of the grid, for who cannot see it.
+        arena: Arena whose cells are shown.
+        cells: Marked cells.
+        line: (x, y) [m] of the points of a line.
+        trace: Cells and lines that a photograph or a camera showed.
+        ink: Color of the line: the name of a pen, or any color of CSS.
+        name: Name of the grid for screen readers.
         change: Called with the marked cells after each tap; None where nothing can be tapped.
     """
 

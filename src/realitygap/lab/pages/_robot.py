@@ -231,7 +231,7 @@ class _Page:
                 if hand.arena is not None:
                     section("Position")
                     self._grid = CellGrid(
-                        hand.arena, ink="red", name="Position of the emulated robot"
+                        hand.arena, ink="var(--accent)", name="Position of the emulated robot"
                     ).classes("lab-sketch")
                 self._clock = ui.label("").classes("lab-value lab-finding")
             with ui.column().classes("lab-cards lab-drive-pad"):

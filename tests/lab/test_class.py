@@ -164,6 +164,14 @@ def test_damaged_lines_of_the_file_are_left_out(course, again, tmp_path):
     assert [drive.name for drive in again().room.drives()] == ["Ada"]
 
 
+def test_results_after_a_line_that_a_crash_cut_off_are_read(course, again, tmp_path):
+    (tmp_path / FILE).write_bytes(b'{"round": 1, "stu')
+    course.join("Ada")
+    course.room.start_round()
+    course.pass_time(0.1)
+    assert [drive.name for drive in again().room.drives()] == ["Ada"]
+
+
 def test_full_disk_is_shown_and_later_results_are_saved(course, monkeypatch, again):
     course.join("Ada")
     course.room.start_round()

@@ -72,7 +72,9 @@ def save_drives(root: Path, drives: list[Drive]) -> str:
     text = "".join(drive.model_dump_json() + "\n" for drive in drives)
     try:
         refuse_links(root, root / FILE)
-        with (root / FILE).open("ab") as file:
+        with (root / FILE).open("ab+") as file:
+            if file.tell() and file.seek(-1, os.SEEK_END) and file.read() != b"\n":
+                text = "\n" + text  # a crash has cut the last line off
             file.write(text.encode())
             file.flush()
             if any(drive.is_over for drive in drives):

@@ -48,9 +48,11 @@ def test_focus_returns_to_a_button_that_was_drawn_again_or_to_the_part_around_it
     assert page.evaluate("() => document.activeElement.closest('.lab-main') !== null")
 
 
-def test_focus_stays_near_when_a_robot_is_connected_and_never_returns_to_the_drive_pad(visit):
+def test_focus_stays_near_when_a_robot_is_connected_and_never_returns_to_the_drive_pad(visit, emulated):
     page = visit("robot")
-    press(page, "Use an emulated robot")
+    page.get_by_text("Another port").click()
+    page.get_by_label("Port", exact=True).fill(emulated[0])
+    press(page, "Connect")
     page.get_by_text("Battery").wait_for()
     has_focus(page, ".lab-main .lab-place")
     page.locator(".lab-pad").focus()

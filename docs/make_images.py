@@ -3,8 +3,8 @@
     uv run python docs/make_images.py
 
 Runs `realitygap run paper` (100 runs of each condition) in a temporary folder and draws from its records: the paths of
-a typical run next to the best coverage of the nine conditions, a film of the best trial of a typical run, and the
-divergence between `jyro`, `sim` and a twin of the family close.
+a typical run next to the best coverage of the nine conditions, and the divergence between `jyro`, `sim`, and a twin of
+the family close.
 """
 
 from __future__ import annotations
@@ -21,11 +21,10 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Polygon, Rectangle
 
 from realitygap import Condition, ResultsFolder, replay, run_study
-from realitygap.report import save_divergence, write_movie
+from realitygap.report import save_divergence
 from realitygap.robots.twin import sample_twin
 
 IMAGE = Path(__file__).parent / "images" / "paper.svg"
-FILM = Path(__file__).parent / "images" / "one-robot.gif"
 DIVERGENCE = Path(__file__).parent / "images" / "divergence.svg"
 SHOWN = "coverage-50"
 COLORS = {"coverage": "#0a4f8f", "novelty": "#b8480a", "random": "#6d7580"}
@@ -161,14 +160,13 @@ def main() -> None:
         draw_run(figure.add_axes((0.01, 0.15, 0.52, 0.70)), folder)
         draw_study(figure.add_axes((0.60, 0.13, 0.30, 0.72)), folder)
         DIVERGENCE.parent.mkdir(exist_ok=True)
-        write_movie(folder, FILM, condition="novelty-50", speed=2, width=480, title="Best of a typical run")
         twin = Path(temporary) / "close-1.toml"
         twin.write_text(sample_twin("close", 1).to_toml(), "utf-8")
         save_divergence(folder, DIVERGENCE, condition="novelty-50", against=f"sim,twin:{twin}")
     IMAGE.parent.mkdir(exist_ok=True)
     figure.savefig(IMAGE, metadata={"Date": None, "Creator": None})
     IMAGE.write_text(_shorter(IMAGE.read_text("utf-8")), "utf-8")
-    for image in (IMAGE, FILM, DIVERGENCE):
+    for image in (IMAGE, DIVERGENCE):
         print(f"Written: {image} ({image.stat().st_size / 1000:.0f} kB)")
 
 

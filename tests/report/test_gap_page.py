@@ -93,6 +93,24 @@ def test_controller_moves_until_it_is_paused_and_stands_with_reduced_motion(gap,
             assert complaints == []
 
 
+def test_players_of_a_page_play_stand_and_jump_together(gap, tmp_path):
+    path = write_gap_report(gap, tmp_path / "gap.html")
+    (motion,) = re.findall(r'<div class="motion">.*?</script>.*?</div>', path.read_text("utf-8"), re.S)
+    path.write_text(path.read_text("utf-8").replace(motion, motion * 2), "utf-8")
+    with open_browser() as browser:
+        page = browser.new_page()
+        page.goto(path.as_uri())
+        page.get_by_role("button", name="Pause trials").nth(1).click()
+        assert page.get_by_role("button", name="Play trials").count() == 2
+        slider = page.get_by_role("slider")
+        slider.nth(0).fill("7")
+        assert slider.nth(1).input_value() == "7"
+        page.get_by_role("combobox").nth(1).select_option("1")
+        assert page.get_by_role("combobox").nth(0).input_value() == "1"
+        page.get_by_role("button", name="Play trials").nth(0).click()
+        assert page.get_by_role("button", name="Pause trials").count() == 2
+
+
 def test_what_moves_has_the_cells_of_the_measured_trials():
     study = gap_between("sim", "jyro", n_controllers=5, trials=2, observe="cells").study
     k = study.shown.controller

@@ -375,7 +375,7 @@ function render({ model, el }) {
   play.addEventListener("click", clock.toggle);
   slider.addEventListener("input", () => clock.goTo(Number(slider.value)));
   speed.addEventListener("change", () => { model.set("speed", Number(speed.value)); model.save_changes(); });
-  listenToKeys(svg, clock, speed, () => live || clock.toggle());
+  listenToKeys(svg, clock, speed, () => live || play.click());
 
   // a robot that runs
 

@@ -146,7 +146,7 @@ def test_several_trials_have_a_pen_each_and_letters_that_do_not_hide_each_other(
     trials = [straight(4, title=name) for name in ("one", "two", "<b>three")]
     page = show(play([*trials, turning(2)], title="four"))
     assert page.text_content(".rg-head strong") == "four"
-    assert page.locator(".rg-name").all_text_contents()[2] == "C <b>three · .014"
+    assert page.locator(".rg-name").all_text_contents()[2] == "C <b>three · 0.014"
     places = {
         (letter.get_attribute("x"), letter.get_attribute("y")) for letter in page.locator(".rg-letter").all()
     }

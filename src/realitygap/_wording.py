@@ -351,7 +351,8 @@ def platform_in_words(spec: str, label: str) -> str:
 
 def trials_each(trials: tuple[int, int]) -> str:
     """Return the numbers of trials of each controller on the simulator and on the target."""
-    return f"{' and '.join(str(n) for n in dict.fromkeys(trials))} trials of each on both platforms"
+    numbers = " and ".join(f"{n:,}" for n in dict.fromkeys(trials))
+    return f"{numbers} {'trial' if trials == (1, 1) else 'trials'} of each on both platforms"
 
 
 def gap_equivalence(equivalence: Estimate) -> str:

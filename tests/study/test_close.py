@@ -108,6 +108,24 @@ def test_a_folder_of_other_settings_is_refused(folder):
         close("closed", n_controllers=2, trials=3)
 
 
+def test_another_margin_uses_the_same_trials(folder):
+    first = close("closed", n_controllers=5)
+    trials = read_observations("closed/fit.trials.sqlite").trials
+    again = close("closed", n_controllers=5, margin=0.5)
+    assert read_observations("closed/fit.trials.sqlite").trials == trials
+    assert again.after.study.result.rms == first.after.study.result.rms
+    assert again.after.study.result.equivalence != first.after.study.result.equivalence
+
+
+def test_a_folder_of_something_else_is_left_alone(folder):
+    Path("results").mkdir()
+    Path("results", "report.html").write_text("mine")
+    with pytest.raises(RealityGapError, match="has other files"):
+        close("results")
+    assert [path.name for path in Path("results").iterdir()] == ["report.html"]
+    assert Path("results", "report.html").read_text() == "mine"
+
+
 def test_the_change_is_that_of_the_same_controllers():
     rng = np.random.default_rng(1)
     quality = rng.uniform(0.2, 0.6, (12, 1))

@@ -221,11 +221,11 @@ def draw_distance(pairs: Sequence[tuple[str, Side, Side]]) -> Drawing:
     """
     measured = [_measured(one, other) for _, one, other in pairs]
     most = max(float(np.percentile(between.distance, 90, axis=0).max()) for between, _ in measured)
-    ends = [f"{between.distance[:, -1].mean():.2f} m" for between, _ in measured]
+    means = [f"{between.distance[:, 1:].mean():.2f} m" for between, _ in measured]
     n, last = measured[0][0].n_pairs, measured[0][0].n_steps
     caption = (
         f"Distance between the two robots after each step: mean and 10th to 90th percentile of n = {n}. Thin: distance "
-        f"between repeats on one platform, which noise alone causes. After {last} steps: {', then '.join(ends)}."
+        f"between repeats on one platform, which noise alone causes. Mean over {last} steps: {', then '.join(means)}."
     )
 
     def draw(width: float) -> Sheet:
@@ -242,7 +242,7 @@ def draw_distance(pairs: Sequence[tuple[str, Side, Side]]) -> Drawing:
     marks = tuple(
         Panel(f"distance-{k}", (_marks_of(between),), (0, 3)) for k, (between, _) in enumerate(measured)
     )
-    alt = f"Curves of the distance between the two robots, which reaches {' and '.join(ends)}."
+    alt = f"Curves of the distance between the two robots, with a mean of {' and '.join(means)}."
     return draw_wide(draw, "distance", caption, alt, marks=marks)
 
 

@@ -183,13 +183,17 @@ def _adopt(folder: Path, order: CloseOrder) -> None:
         stored = parse_toml(read_file(path, MOST_TABLE_BYTES).decode("utf-8", "replace")).get("order", {})
         now = order.record()
         other = sorted(
-            name for name in {*stored, *now} - {"version", "processes"} if stored.get(name) != now.get(name)
+            name
+            for name in {*stored, *now} - {"version", "processes", "margin"}  # which change no trial
+            if stored.get(name) != now.get(name)
         )
         if other:
             raise StudyError(
                 f"{folder} has results of other settings ({', '.join(other)}); nothing was run. Name another folder "
                 "with --out."
             )
+    elif any(folder.iterdir()):
+        raise StudyError(f"{folder} has other files; nothing was run. Name a new or empty folder with --out.")
     write_whole(path, order.to_toml().encode(), within=folder)
 
 

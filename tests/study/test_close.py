@@ -13,7 +13,7 @@ import pytest
 from realitygap.errors import RealityGapError
 from realitygap.gap import GapSide, measure_change
 from realitygap.orders import CloseOrder, read_order
-from realitygap.records import read_observations
+from realitygap.records import read_observations, trial_to_dict
 from realitygap.report import write_closed_gap
 from realitygap.study import close_gap
 from tests.forks import fork_context
@@ -110,11 +110,15 @@ def test_a_folder_of_other_settings_is_refused(folder):
 
 def test_another_margin_uses_the_same_trials(folder):
     first = close("closed", n_controllers=5)
-    trials = read_observations("closed/fit.trials.sqlite").trials
+    trials = stored("closed")
     again = close("closed", n_controllers=5, margin=0.5)
-    assert read_observations("closed/fit.trials.sqlite").trials == trials
+    assert stored("closed") == trials
     assert again.after.study.result.rms == first.after.study.result.rms
     assert again.after.study.result.equivalence != first.after.study.result.equivalence
+
+
+def stored(folder: str) -> list[dict[str, object]]:
+    return [trial_to_dict(trial) for trial in read_observations(f"{folder}/fit.trials.sqlite").trials]
 
 
 def test_a_folder_of_something_else_is_left_alone(folder):

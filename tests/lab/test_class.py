@@ -141,7 +141,7 @@ def test_results_survive_a_restart_even_in_a_round(course, again):
     (drive,) = after_crash.room.drives()
     assert (drive.name, drive.cells, drive.is_over) == ("Ada", cells, True)
     student, _ = after_crash.room.enter("Ada")
-    assert student.name == "Ada"
+    assert (student.name, after_crash.room.n_cells(student)) == ("Ada", len(cells))
     after_crash.room.start_round()
     assert after_crash.room.round == 2
 

@@ -178,6 +178,12 @@ class Classroom:
         """Return the student's drive in this round; None if there is none."""
         return self._drives.get((self.round, student.key)) if self.phase != "practice" else None
 
+    def n_cells(self, student: Student) -> int:
+        """Return the number of cells of a student's drive, in practice those of the robot."""
+        if (drive := self.drive_of(student)) is not None:
+            return len(drive.cells)
+        return 0 if student.robot is None else len(student.robot.cells)
+
     def seconds_left(self, student: Student) -> float:
         """Return the rest of a student's drive [s]."""
         drive = self.drive_of(student)

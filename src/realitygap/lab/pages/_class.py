@@ -143,7 +143,7 @@ class _Class:
                 "pose": [round(part, 4) for part in path[-1]],
                 "stalled": robot.is_blocked,
                 "left": math.ceil(room.seconds_left(student)),
-                "n_cells": len(cells),
+                "n_cells": room.n_cells(student),
                 "heard": student.n_heard,
                 "stops": student.n_stops,
             }

@@ -17,7 +17,7 @@ from realitygap.lab._saved import SavedFile, SavedTrials, saved_files
 from ._elements import CellGrid
 from ._fields import Form
 from ._frame import LONGEST_NAME, framed, hint, remember_who, section, text_of, visitor_of
-from ._notices import attempt
+from ._notices import attempt, notify
 
 _COLUMNS = {"number": "Trial", "name": "Description", "state": "State", "cells": "Cells", "notes": "Notes"}
 
@@ -152,6 +152,8 @@ class _Page:
         await self._enter(lambda: self._file.void(number, reason, who), done)
 
     async def _enter(self, act: Callable[[], None], done: str) -> None:
-        if await attempt(act, done):
-            await self._reload()
-            self._card.refresh()
+        with ui.context.client:  # the button that was pressed may be gone by then
+            if await attempt(act):
+                await self._reload()
+                self._card.refresh()
+                notify(done)  # last: what is typed after it stays

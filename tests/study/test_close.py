@@ -126,6 +126,8 @@ def test_a_folder_of_something_else_is_left_alone(folder):
     Path("results", "report.html").write_text("mine")
     with pytest.raises(RealityGapError, match="has other files"):
         close("results")
+    with pytest.raises(RealityGapError, match="is a file, expected a folder"):
+        close("results/report.html")
     assert [path.name for path in Path("results").iterdir()] == ["report.html"]
     assert Path("results", "report.html").read_text() == "mine"
 

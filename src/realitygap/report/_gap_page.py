@@ -74,10 +74,7 @@ def write_gap_report(gap: GapBetween, path: str | Path) -> Path:
     Raises:
         RecordError: The file cannot be written, or would take the place of a file of results.
     """
-    refuse_gap_page(path)
-    page = render_page("gap.html.jinja", _content(gap))
-    write_whole(Path(path), page.encode("utf-8", "replace"))
-    return Path(path)
+    return _write(path, _content(gap))
 
 
 def write_closed_gap(closed: ClosedGap, path: str | Path) -> Path:
@@ -93,8 +90,11 @@ def write_closed_gap(closed: ClosedGap, path: str | Path) -> Path:
     Raises:
         RecordError: The file cannot be written, or would take the place of a file of results.
     """
+    return _write(path, _content(closed.after, closed))
+
+
+def _write(path: str | Path, content: dict[str, Any]) -> Path:
     refuse_gap_page(path)
-    content = _content(closed.after, closed)
     write_whole(Path(path), render_page("gap.html.jinja", content).encode("utf-8", "replace"))
     return Path(path)
 

@@ -178,6 +178,8 @@ def _adopt(folder: Path, order: CloseOrder) -> None:
     """
     path = folder / ORDER_FILE
     refuse_links(folder, path, *(folder / name for name in ("fit.toml", "fit.trials.sqlite", "report.html")))
+    if folder.exists() and not folder.is_dir():
+        raise StudyError(f"{folder} is a file, expected a folder for the results. Name another with --out.")
     folder.mkdir(parents=True, exist_ok=True)
     if path.exists():
         stored = parse_toml(read_file(path, MOST_TABLE_BYTES).decode("utf-8", "replace")).get("order", {})

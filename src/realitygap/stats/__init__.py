@@ -54,6 +54,24 @@ from ._resampling import (
     robust_spread,
     share_above,
 )
+from ._sequential import (
+    LAMBDAS,
+    Look,
+    Null,
+    SequentialTest,
+    SequentialVerdict,
+    betting_mean,
+    e_holm,
+    mean_e,
+)
+from ._sequential_plan import (
+    FORECAST_FROM,
+    MOST_PAIRS,
+    Forecast,
+    PlannedPairs,
+    forecast_pairs,
+    plan_pairs,
+)
 from ._shares import (
     USUAL_EFFECTS,
     a12,
@@ -117,6 +135,21 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     "lattice",
     "ALPHA",
     "prove_equivalence",
+    # looks at any time
+    "SequentialTest",
+    "Look",
+    "Null",
+    "SequentialVerdict",
+    "LAMBDAS",
+    "betting_mean",
+    "e_holm",
+    "mean_e",
+    "Forecast",
+    "forecast_pairs",
+    "FORECAST_FROM",
+    "MOST_PAIRS",
+    "PlannedPairs",
+    "plan_pairs",
     # planning
     "Needed",
     "check_plan",

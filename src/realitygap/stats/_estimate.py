@@ -16,8 +16,12 @@ Values = npt.NDArray[np.float64]
 CONFIDENCE = 0.95
 """Level of all intervals except those of equivalence, which have 90 % because its test has two sides of 5 %."""
 
-Method = Literal["", "BCa", "Clopper-Pearson", "Fisher z", "Newcombe", "Wilson", "percentiles", "ranks", "t"]
-"""How an interval is made: `BCa` and `percentiles`, bootstraps; `ranks`, two observed values; the others, formulas."""
+Method = Literal[
+    "", "BCa", "Clopper-Pearson", "Fisher z", "Newcombe", "Wilson", "betting", "percentiles", "ranks",
+    "sign-symmetric", "t",
+]  # fmt: skip
+"""How an interval is made: `BCa` and `percentiles`, bootstraps; `ranks`, two observed values; `betting` and
+`sign-symmetric`, valid at any of all looks; the others, formulas."""
 
 Ends = tuple[float, float]
 """Lower and upper end of an interval, both included."""

@@ -121,7 +121,7 @@ def person(monkeypatch):
     def answering(*answers: str) -> Person:
         somebody = Person(*answers)
         monkeypatch.setattr(_calibration_operator, "_ask_at_terminal", somebody)
-        monkeypatch.setattr(_calibrate, "_is_led", lambda robot, witness: True)
+        monkeypatch.setattr(_calibrate, "needs_operator", lambda robot, witness: True)
         return somebody
 
     return answering
@@ -213,7 +213,7 @@ def test_a_person_is_told_how_far_from_the_wall_the_robot_has_to_stand(person, t
 
 
 def test_without_a_terminal_nobody_is_led(monkeypatch, tmp_path):
-    monkeypatch.setattr(_calibrate, "_is_led", lambda robot, witness: True)
+    monkeypatch.setattr(_calibrate, "needs_operator", lambda robot, witness: True)
     said = refused("sensors", "--robot", PORT, "-o", tmp_path / "fit.toml")
     assert "There is no terminal" in said
     assert "--from FILE" in said

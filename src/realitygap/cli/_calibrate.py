@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
 import shlex
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -17,9 +15,10 @@ from realitygap.errors import StudyError
 from realitygap.orders import CalibrateOrder
 
 from ._code import AllowPlatforms
-from ._observer import CameraOfRobots, sheet_observer, under_camera
+from ._observer import CameraOfRobots, needs_operator, sheet_observer, under_camera
 from ._options import Json, print_json
 from ._order import command_of
+from ._progress import resumable
 from ._tables import calibration_table, held_out_table, wide_console
 
 if TYPE_CHECKING:
@@ -77,35 +76,22 @@ def _measured(order: CalibrateOrder, camera: str | None, *, quiet: bool) -> Cali
     if order.observe is None and camera is not None:
         order = order.model_copy(update={"observe": "track"})
     where, model = realitygap.world.load_arena(order.arena), realitygap.world.load_robot(base)
-    is_led = _is_led(robot, order.witness)
+    is_led = needs_operator(robot, order.witness)
     operator = CalibrationOperator(where, model) if is_led else None
-    with _told_how_to_resume(order):
-        sheet = sheet_observer(asks_for_start=False) if is_led else None
-        with under_camera(camera, where, sheet) as observer:
-            return realitygap.study.make_calibration(
-                order,
-                observer=observer,
-                operator=operator,
-                tell=None if quiet or operator is not None else _tell,
-            )
-
-
-@contextlib.contextmanager
-def _told_how_to_resume(order: CalibrateOrder) -> Iterator[None]:
-    """End the command with a message if the operator stops it."""
+    kept = (order.out or Path("fit")).with_suffix(".trials.sqlite")
     try:
-        yield
-    except (realitygap.study.StoppedByPerson, KeyboardInterrupt) as error:
-        is_interrupted = isinstance(error, KeyboardInterrupt)
-        kept = "" if order.out is None else order.out.with_suffix(".trials.sqlite")
-        again = f"Recorded trials are in {kept}. Run the same command to resume."
-        echo(f"Interrupted. {again}" if is_interrupted else again, err=True)
-        raise typer.Exit(130 if is_interrupted else 0) from None
-
-
-def _is_led(robot: str, witness: str | None) -> bool:
-    """Return whether a person at the terminal has to place the robot."""
-    return witness is None and realitygap.platforms.platform_of(robot).needs_person
+        with resumable(kept):
+            sheet = sheet_observer(asks_for_start=False) if is_led else None
+            with under_camera(camera, where, sheet) as observer:
+                return realitygap.study.make_calibration(
+                    order,
+                    observer=observer,
+                    operator=operator,
+                    tell=None if quiet or operator is not None else _tell,
+                )
+    except realitygap.study.StoppedByPerson:
+        echo(f"Recorded trials are in {kept}. Run the same command to resume.", err=True)
+        raise typer.Exit(0) from None
 
 
 def _tell(done: int, n: int) -> None:

@@ -48,7 +48,7 @@ SECTIONS: dict[str, tuple[Command, ...]] = {
         Command("demo", "Take a two-minute tour with an emulated robot.", "_demo", "demo"),
         Command("run", "Run a study, or resume one that was interrupted.", "_study", "run"),
         Command("gap", "Measure the gap between a simulator and a target.", "_gap", "gap"),
-        Command("close", "Measure the gap, calibrate, measure it again.", "_close", "close"),
+        Command("close", "Measure the gap, calibrate, measure it again.", "_gap", "close"),
         Command("lab", "Serve the web interface for studies, robots, and trials.", "_lab", "lab"),
     ),
     "Studies and their results": (

@@ -8,12 +8,12 @@ from typing import Annotated
 import typer
 
 import realitygap
-from realitygap._terminal import echo
 from realitygap.robot_families import ports_by_family
 
 from ._code import AllowTasks, code_permission
 from ._observer import Camera, operated_under_camera
 from ._options import Json, OpenPage, Replicates, StudyFolder, StudySeed, who_option
+from ._progress import resumable
 from ._results import show_page, written_report
 from ._study import print_result
 
@@ -84,14 +84,13 @@ def drive(
     realitygap.study.check_has_robot(resolved)
     path = out or Path("results") / resolved.about.name
     operator = choose_operator(port, witness, answers, path, quiet=as_json)
-    try:
-        with operated_under_camera(camera, resolved, operator) as looking:
-            result = realitygap.study.drive_study(
-                resolved, port, path, operator=looking, allow_code=code_permission(allow_code)
-            )
-    except KeyboardInterrupt:
-        echo("Interrupted. Scored trials are saved. Run the same command to resume.", err=True)
-        raise typer.Exit(130) from None
+    with (
+        resumable("Scored trials are saved."),
+        operated_under_camera(camera, resolved, operator) as looking,
+    ):
+        result = realitygap.study.drive_study(
+            resolved, port, path, operator=looking, allow_code=code_permission(allow_code)
+        )
     print_result(result, as_json=as_json)
     if open_page:
         show_page(written_report(path, to_stderr=as_json))

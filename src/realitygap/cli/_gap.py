@@ -1,4 +1,4 @@
-"""`realitygap gap` and `realitygap plan`: measure a gap, and plan the trials for it."""
+"""`realitygap gap`, `close`, and `plan`: measure a gap, close it, and plan the trials for it."""
 
 from __future__ import annotations
 
@@ -10,19 +10,20 @@ import typer
 
 import realitygap
 from realitygap._terminal import echo
-from realitygap._wording import bracketed, counted, p_equation, reproduces, trials_each
-from realitygap.orders import GapOrder, PlanOrder
+from realitygap._wording import bracketed, counted, p_equation, reproduces
+from realitygap.orders import CloseOrder, GapOrder, PlanOrder
 
 from ._code import AllowPlatforms
-from ._observer import CameraOfRobots, attending_observer, under_camera
-from ._options import Json, print_json
+from ._observer import CameraOfRobots, attending_observer, needs_operator, under_camera
+from ._options import Json, ShowPage, print_json
 from ._order import command_of
-from ._progress import TrialsBar
+from ._progress import TrialsBar, resumable
+from ._results import show_page
 
 if TYPE_CHECKING:
     from realitygap.gap import GapResult, ReplayError, Why
     from realitygap.stats import Estimate, Needed
-    from realitygap.study import GapPlan
+    from realitygap.study import ClosedGap, GapPlan
 
 
 @command_of(GapOrder)
@@ -39,26 +40,18 @@ def gap(
     """Measure the gap, print the result, and write the page."""
     if report is not None:
         realitygap.report.refuse_gap_page(report)
-    try:
-        with (
-            TrialsBar(quiet=as_json) as bar,
-            under_camera(
-                camera,
-                realitygap.world.load_arena(order.arena or "paper"),
-                attending_observer(order.target, order.witness),
-            ) as observer,
-        ):
-            found = realitygap.study.gap_between(
-                order, observer=observer, allow_code=allow_code, tell=bar.show, say=bar.say
-            )
-    except KeyboardInterrupt:
-        kept = (
-            f"Finished trials are in {order.results}. Run the same command to resume."
-            if order.results
-            else "Nothing was saved. To save trials, add -o FILE."
+    with (
+        resumable(order.results, "" if order.results else "To save trials, add -o FILE."),
+        TrialsBar(quiet=as_json) as bar,
+        under_camera(
+            camera,
+            realitygap.world.load_arena(order.arena or "paper"),
+            attending_observer(order.target, order.witness),
+        ) as observer,
+    ):
+        found = realitygap.study.gap_between(
+            order, observer=observer, allow_code=allow_code, tell=bar.show, say=bar.say
         )
-        echo(f"Interrupted. {kept}", err=True)
-        raise typer.Exit(130) from None
     result = found.study.result
     if report is not None:
         realitygap.report.write_gap_report(found, report)
@@ -72,22 +65,50 @@ def gap(
     if full:
         _print_all(result, found.study.replay)
     else:
-        _print(result)
+        _print(result, result)
     if found.why is not None:
         _print_why(found.why)
     elif not full:
         echo(_next(order, report))
 
 
-def _print(result: GapResult) -> None:
-    """Print title, verdict, main measures, labels, and n."""
-    echo(f"Gap in {result.score}: {result.title}")
-    echo(result.verdict)
-    for title, words in result.main_measures:
-        echo(f"  {title:18}{words}")
-    labels = " and ".join(dict.fromkeys(result.labels))
-    n = counted(result.level.n, "controller")
-    echo(f"{labels}, {n}, {trials_each(result.trials)}, 95 % intervals")
+@command_of(CloseOrder)
+def close(
+    order: CloseOrder,
+    allow_code: AllowPlatforms = False,
+    as_json: Json = False,
+    open_page: ShowPage = False,
+) -> None:
+    """Measure, calibrate, measure again, print both gaps, and write the page."""
+    folder = order.folder
+    with resumable(folder / "fit.trials.sqlite"), TrialsBar(quiet=as_json) as bar:
+        closed = realitygap.study.close_gap(order, allow_code=allow_code, tell=bar.show, say=bar.say)
+    page = realitygap.report.write_closed_gap(closed, folder / "report.html")
+    before, after = closed.before.study.result, closed.after.study.result
+    if as_json:
+        values: dict[str, Any] = {
+            "before": before.to_dict(),
+            "after": after.to_dict(),
+            "change": closed.change.to_dict(),
+        }
+        values |= {"verdict": closed.verdict, "folder": folder, "report": page}
+        print_json(values | {"order": closed.order.record()})
+        return
+    _print(closed, after)
+    echo("The fit has seen none of these trials.")
+    echo(f"Page: {page}. Calibrated simulator: sim:{shlex.quote(str(folder / 'fit.toml'))}")
+    if open_page:
+        show_page(page)
+
+
+def _print(shown: GapResult | ClosedGap, result: GapResult) -> None:
+    """Print title, verdict, and main measures; labels, n, and notes of a result."""
+    echo(f"Gap in {result.score}: {shown.title}")
+    echo(shown.verdict)
+    width = max(len(name) for name, _ in shown.main_measures) + 2
+    for name, words in shown.main_measures:
+        echo(f"  {name:{width}}{words}")
+    echo(f"{' and '.join(dict.fromkeys(result.labels))}, {result.basis}, 95 % intervals")
     for note in result.notes:
         echo(note)
 
@@ -95,11 +116,9 @@ def _print(result: GapResult) -> None:
 def _next(order: GapOrder, report: Path | None) -> str:
     """Return how to get more of this result, and the command that may follow."""
     words = f"All measures: --full. {'Page: --report gap.html' if report is None else f'Page: {report}'}."
-    name, _, calibration = order.sim.partition(":")
-    if name != "sim" or calibration or order.target.partition(":")[0] in ("jyro", "recorded"):
+    if order.sim != "sim" or not order.can_close or needs_operator(order.target, order.witness):
         return words
-    robot = shlex.quote(order.target)
-    return f"{words} Next: realitygap close sim {robot}"
+    return f"{words} Next: realitygap {shlex.join(order.to_order(CloseOrder).words())}"
 
 
 def _print_all(result: GapResult, replay: ReplayError | None) -> None:

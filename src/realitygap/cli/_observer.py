@@ -35,19 +35,23 @@ CameraOfRobots = Annotated[
 ]
 
 
+def needs_operator(spec: str, witness: str | None) -> bool:
+    """Return whether a person has to place the robot of a platform.
+
+    Raises:
+        StudyError: There is no such platform.
+    """
+    return witness is None and realitygap.platforms.platform_of(spec).needs_person
+
+
 def attending_observer(spec: str, witness: str | None) -> PortObserver | None:
     """Return the person at the terminal, if there is one and the robot has no witness.
 
     Raises:
         StudyError: There is no such platform.
     """
-    if (
-        witness is not None
-        or not sys.stdin.isatty()
-        or not realitygap.platforms.platform_of(spec).needs_person
-    ):
-        return None
-    return sheet_observer(asks_for_start=True)
+    is_attended = needs_operator(spec, witness) and sys.stdin.isatty()
+    return sheet_observer(asks_for_start=True) if is_attended else None
 
 
 def sheet_observer(*, asks_for_start: bool) -> SheetObserver:

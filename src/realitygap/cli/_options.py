@@ -17,6 +17,7 @@ Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
 OpenPage = Annotated[
     bool, typer.Option("--open", help="When done, write the report and show it in the browser.")
 ]
+ShowPage = Annotated[bool, typer.Option("--open", help="When done, show the page in the browser.")]
 Replicates = Annotated[int | None, typer.Option(min=1, help="Runs per condition. [default: from the study]")]
 StudyFolder = Annotated[
     Path | None, typer.Option(metavar="DIR", help="Folder for the results. [default: results/NAME]")

@@ -1,13 +1,38 @@
-"""Progress on standard error, if that is a terminal."""
+"""Progress on standard error, and how interrupted work resumes."""
 
 from __future__ import annotations
 
+import contextlib
+from collections.abc import Iterator
+from pathlib import Path
 from typing import TYPE_CHECKING, Self
+
+import typer
+
+from realitygap._terminal import echo
 
 if TYPE_CHECKING:
     from rich.progress import TaskID
 
     from realitygap.study import Progress as StudyProgress
+
+
+@contextlib.contextmanager
+def resumable(kept: str | Path | None, how: str = "") -> Iterator[None]:
+    """End a command with status 130 at Ctrl-C, after a message that states what is saved, and how to resume.
+
+    Args:
+        kept: File or folder of the finished trials, as soon as it exists; None if no trial is saved. Or what is saved.
+        how: What saves trials, if nothing is saved.
+    """
+    try:
+        yield
+    except KeyboardInterrupt:
+        if isinstance(kept, Path):
+            kept = f"Finished trials are in {kept}." if kept.exists() else None
+        words = f"{kept} Run the same command to resume." if kept else f"Nothing was saved. {how}"
+        echo(f"Interrupted. {words}".strip(), err=True)
+        raise typer.Exit(130) from None
 
 
 class ProgressBar:

@@ -12,6 +12,8 @@ import typer
 import realitygap
 from realitygap._terminal import echo
 
+from ._options import ShowPage
+
 Folder = Annotated[Path, typer.Argument(metavar="DIR", help="Folder of results, such as results/paper.")]
 
 
@@ -26,7 +28,7 @@ def report(
             metavar="DIR2", help="Folder for every figure as SVG and PDF, and every table as CSV and LaTeX."
         ),
     ] = None,
-    open_page: Annotated[bool, typer.Option("--open", help="Show the page in the browser.")] = False,
+    open_page: ShowPage = False,
 ) -> None:
     """Write the HTML report of a study.
 

@@ -17,7 +17,7 @@ from realitygap.orders import ClosingOrder
 
 from ._code import AllowTasks, code_permission
 from ._options import Json, OpenPage, Replicates, StudyFolder, StudySeed, print_json
-from ._progress import RunsBar
+from ._progress import RunsBar, resumable
 from ._results import show_page, written_report
 from ._tables import summary_table, task_table, wide_console
 
@@ -106,21 +106,17 @@ def run(
             f"Every condition of study {resolved.about.name!r} is on a robot. Drive it: "
             f"realitygap drive {shlex.quote(study)} --port PORT"
         )
-    try:
-        with RunsBar(quiet=as_json) as bar:
-            result = realitygap.study.run_study(
-                resolved,
-                out,
-                threads=threads,
-                chunk=chunk,
-                fresh=fresh,
-                cluster=cluster,
-                tell=bar.show,
-                allow_code=code_permission(allow_code),
-            )
-    except KeyboardInterrupt:
-        echo("Interrupted. Published runs are saved. Run the same command to resume.", err=True)
-        raise typer.Exit(130) from None
+    with resumable("Published runs are saved."), RunsBar(quiet=as_json) as bar:
+        result = realitygap.study.run_study(
+            resolved,
+            out,
+            threads=threads,
+            chunk=chunk,
+            fresh=fresh,
+            cluster=cluster,
+            tell=bar.show,
+            allow_code=code_permission(allow_code),
+        )
     print_result(result, as_json=as_json)
     if open_page:
         show_page(written_report(result.folder.path, to_stderr=as_json))

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import statistics
-from typing import TYPE_CHECKING, Annotated
-
-import typer
+from typing import TYPE_CHECKING
 
 import realitygap
 from realitygap._terminal import echo
@@ -14,8 +12,9 @@ from realitygap.orders import ClosingOrder, TransferOrder, TryOrder
 
 from ._code import AllowPlatforms
 from ._observer import attending_observer
-from ._options import Json, print_json
+from ._options import Json, ShowPage, print_json
 from ._order import command_of
+from ._progress import resumable
 from ._results import show_page
 
 if TYPE_CHECKING:
@@ -50,16 +49,13 @@ def transfer(
     as_json: Json = False,
 ) -> None:
     """Run the transfer, and print the result."""
-    try:
+    with resumable("All trials are saved."):
         result = realitygap.study.run_transfer(
             order,
             observer=attending_observer(order.to, order.witness),
             allow_code=allow_code,
             tell=lambda text: echo(text, err=True),
         )
-    except KeyboardInterrupt:
-        echo("Interrupted. All trials are saved. Run the same command to resume.", err=True)
-        raise typer.Exit(130) from None
     folder = order.folder
     if as_json:
         about = {"score": result.score, "folder": folder, "champions_folder": folder / "champions"}
@@ -88,9 +84,7 @@ def _print(result: TransferResult) -> None:
 def closing(
     order: ClosingOrder,
     as_json: Json = False,
-    open_page: Annotated[
-        bool, typer.Option("--open", help="When done, show the page in the browser.")
-    ] = False,
+    open_page: ShowPage = False,
 ) -> None:
     """Run the study, or what is missing of it, print its goals, and write its page."""
     told = [0.0, -1]
@@ -104,11 +98,8 @@ def closing(
                 err=True,
             )
 
-    try:
+    with resumable("Finished parts are saved."):
         summary = realitygap.study.closing_the_gap(order, tell=tell)
-    except KeyboardInterrupt:
-        echo("Interrupted. Finished parts are saved. Run the same command to resume.", err=True)
-        raise typer.Exit(130) from None
     folder = order.folder
     page = realitygap.report.write_closing_page(summary, folder / "report.html")
     if as_json:

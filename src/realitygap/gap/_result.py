@@ -7,11 +7,13 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from realitygap._wording import (
+    counted,
     gap_equivalence,
     level_verdict,
     platform_in_words,
     rank_verdict,
     reproduces,
+    trials_each,
     with_interval,
 )
 from realitygap.drawing import ShownAsCard
@@ -183,6 +185,11 @@ class GapResult(ShownAsCard):
         if self.misspecified:
             sentences.append(reproduces(is_misspecified=True))
         return " ".join(sentences)
+
+    @property
+    def basis(self) -> str:
+        """The numbers of controllers and of trials, in words."""
+        return f"{counted(self.level.n, 'controller')}, {trials_each(self.trials)}"
 
     @property
     def _names(self) -> tuple[str, str]:

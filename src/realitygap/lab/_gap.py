@@ -133,8 +133,7 @@ class GapJob(MeasuringJob):
     @property
     def can_close(self) -> bool:
         """True if a calibration may close the gap that was measured."""
-        is_sim = self.order.sim.partition(":")[0] == "sim" and self.order.observe != "readings"
-        return self.is_complete and is_sim and self.order.target.partition(":")[0] not in ("jyro", "recorded")
+        return self.is_complete and self.order.can_close
 
     @property
     def has_met(self) -> bool:
@@ -192,7 +191,8 @@ def measure(channel: Channel, work: GapWork) -> None:
         channel.report(TrialCount(name, done, total), name, is_last=done == total)
 
     if work.closes:
-        closed = close_gap(closing_of(order, page), pulse=pulses.tell, tell=tell)
+        closing = order.to_order(CloseOrder, out=page.with_suffix(""))
+        closed = close_gap(closing, pulse=pulses.tell, tell=tell)
         write_closed_gap(closed, page)
         measured = _measured(closed.after.study, order.trials)
         channel.say(
@@ -205,13 +205,6 @@ def measure(channel: Channel, work: GapWork) -> None:
         write_gap_report(gap, page)
         channel.say(_measured(gap.study, trials))
     channel.say(GapDone())
-
-
-def closing_of(order: GapOrder, page: Path) -> CloseOrder:
-    """Return the order that closes a measured gap, in a folder next to its page."""
-    values = {field.name: getattr(order, field.name, None) for field in CloseOrder.fields()}
-    given = {name: value for name, value in values.items() if value is not None}
-    return CloseOrder(**given, out=page.with_suffix(""))
 
 
 def _measured(study: GapStudy, trials: int) -> GapMeasured:

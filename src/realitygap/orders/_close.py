@@ -8,11 +8,10 @@ from typing import ClassVar, Literal
 from realitygap.robot_families import port_platforms
 
 from ._field import argument, option
-from ._order import Order
-from ._shared import Processes, Seed, Witness, arena_option, folder_option, seed_option, task_option
+from ._shared import PairOrder, Processes, Seed, Witness, arena_option, folder_option, seed_option
 
 
-class CloseOrder(Order):
+class CloseOrder(PairOrder):
     """Measure the gap, calibrate, measure it again.
 
     The same controllers run on the target, in the simulator, and in the calibrated simulator. The calibration has other
@@ -47,31 +46,6 @@ class CloseOrder(Order):
     what: Literal["all", "path", "sensors", "motion", "contact"] = option(
         "all", help="Part of the robot to calibrate.", metavar="WHAT", label="Part of the robot"
     )
-    controllers: str = option(
-        "random",
-        help="random for random networks; or a study or a folder of results, for its champions.",
-        metavar="WHICH",
-        label="Controllers from",
-        refers="file",
-    )
-    n_controllers: int = option(
-        30, help="Number of controllers.", at_least=2, at_most=1024, label="Controllers"
-    )
-    trials: int = option(
-        10,
-        help="Trials per controller and platform.",
-        at_least=1,
-        at_most=4096,
-        label="Trials per controller",
-    )
-    margin: float | None = option(
-        None,
-        help="Largest difference in score that counts as equivalent, such as 0.05.",
-        above=0,
-        metavar="M",
-        label="Margin of equivalence",
-    )
-    task: str | None = task_option(None, default_is="the task of the controllers; coverage for random ones")
     observe: Literal["cells", "encoders", "track"] | None = option(
         None,
         help="Data recorded on the target.",

@@ -6,14 +6,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import ClassVar, Literal
 
-from realitygap.robot_families import port_platforms
-
-from ._field import argument, option
-from ._order import Order
-from ._shared import Processes, Seed, Witness, arena_option, seed_option, task_option
+from ._field import option
+from ._shared import PairOrder, Processes, Seed, Witness, arena_option, seed_option
 
 
-class GapOrder(Order):
+class GapOrder(PairOrder):
     """Measure the gap between a simulator and a target.
 
     Runs the same controllers on both platforms. Reports level, RMS gap without the noise of trials, ranking, behavior,
@@ -35,38 +32,6 @@ class GapOrder(Order):
 
     command: ClassVar[str] = "gap"
 
-    sim: str = argument("SIM", help="Simulator: sim, sim:FILE or jyro.", label="Simulator", refers="platform")
-    target: str = argument(
-        "TARGET",
-        help=f"Target: twin:FILE, {port_platforms()}, recorded:FILE, sim, sim:FILE or jyro.",
-        label="Target",
-        refers="platform",
-    )
-    controllers: str = option(
-        "random",
-        help="random for random networks; or a study or a folder of results, for its champions.",
-        metavar="WHICH",
-        label="Controllers from",
-        refers="file",
-    )
-    n_controllers: int = option(
-        30, help="Number of controllers.", at_least=2, at_most=1024, label="Controllers"
-    )
-    task: str | None = task_option(None, default_is="the task of the controllers; coverage for random ones")
-    trials: int = option(
-        10,
-        help="Trials per controller and platform.",
-        at_least=1,
-        at_most=4096,
-        label="Trials per controller",
-    )
-    margin: float | None = option(
-        None,
-        help="Largest difference in score that counts as equivalent, such as 0.05.",
-        above=0,
-        metavar="M",
-        label="Margin of equivalence",
-    )
     observe: Literal["readings", "cells", "encoders", "track"] | None = option(
         None,
         help="Data recorded on the target. track also measures replays.",
@@ -123,6 +88,14 @@ class GapOrder(Order):
                 "why",
                 "--why needs at least 2 trials of each controller, to separate the gap from noise.",
             )
+
+    @property
+    def can_close(self) -> bool:
+        """True if a calibration of the simulator may close the gap."""
+        is_sim = self.sim.partition(":")[0] == "sim" and self.observe != "readings"
+        return (
+            is_sim and self.target != self.sim and self.target.partition(":")[0] not in ("jyro", "recorded")
+        )
 
     @property
     def n_trials(self) -> int:

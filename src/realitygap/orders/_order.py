@@ -7,7 +7,7 @@ import inspect
 import os
 import re
 from collections.abc import Collection, Iterator, Mapping
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeVar
 
 from pydantic import ConfigDict, model_validator
 
@@ -17,6 +17,8 @@ from realitygap.errors import StudyError
 from realitygap.settings import Settings
 
 from ._field import OrderField, fields_of
+
+OrderT = TypeVar("OrderT", bound="Order")
 
 Plain = bool | int | float | str | list[bool | int | float | str]
 """Values of messages and records."""
@@ -113,6 +115,11 @@ class Order(Settings):
     def to_toml(self) -> str:
         """Return the record as a table of TOML."""
         return f"[order]\n{toml_table(self.record())}\n"
+
+    def to_order(self, model: type[OrderT], **others: object) -> OrderT:
+        """Return another kind of order, which has the settings of both kinds from this one, and others as named."""
+        names = [field.name for field in model.fields() if getattr(self, field.name, None) is not None]
+        return model(**{name: getattr(self, name) for name in names} | others)
 
     def words(self, leave_out: Collection[str] = ()) -> list[str]:
         """Return the words of the command for this order, without defaults, and without these options."""

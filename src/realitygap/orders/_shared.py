@@ -7,7 +7,10 @@ from typing import Annotated, Any
 from pydantic import AfterValidator
 from pydantic_core import PydanticKnownError
 
-from ._field import option
+from realitygap.robot_families import port_platforms
+
+from ._field import argument, option
+from ._order import Order
 
 ONLY_ROBOTS = "Only for robots"
 ONLY_TWINS = "Only for twins"
@@ -85,4 +88,41 @@ def task_option(default: str | None = "coverage", *, default_is: str = "") -> An
         metavar="KIND",
         label="Task",
         refers="file",
+    )
+
+
+class PairOrder(Order):
+    """The fields of every order that runs the same controllers on two platforms."""
+
+    sim: str = argument("SIM", help="Simulator: sim, sim:FILE or jyro.", label="Simulator", refers="platform")
+    target: str = argument(
+        "TARGET",
+        help=f"Target: twin:FILE, {port_platforms()}, recorded:FILE, sim, sim:FILE or jyro.",
+        label="Target",
+        refers="platform",
+    )
+    controllers: str = option(
+        "random",
+        help="random for random networks; or a study or a folder of results, for its champions.",
+        metavar="WHICH",
+        label="Controllers from",
+        refers="file",
+    )
+    n_controllers: int = option(
+        30, help="Number of controllers.", at_least=2, at_most=1024, label="Controllers"
+    )
+    task: str | None = task_option(None, default_is="the task of the controllers; coverage for random ones")
+    trials: int = option(
+        10,
+        help="Trials per controller and platform.",
+        at_least=1,
+        at_most=4096,
+        label="Trials per controller",
+    )
+    margin: float | None = option(
+        None,
+        help="Largest difference in score that counts as equivalent, such as 0.05.",
+        above=0,
+        metavar="M",
+        label="Margin of equivalence",
     )

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from realitygap._version import __version__
-from realitygap._wording import bracketed, counted, p_equation, platform_in_words, reproduces, trials_each
+from realitygap._wording import bracketed, p_equation, platform_in_words, reproduces
 from realitygap.errors import RecordError
 from realitygap.gap import SHOWN, GapResult
 from realitygap.records import is_special, refuse_results, write_whole
@@ -132,7 +132,7 @@ def _content(gap: GapBetween, closed: ClosedGap | None = None) -> dict[str, Any]
         "version": __version__,
         "title": f"The gap: {result.title if closed is None else closed.title}",
         "labels": [(label, LABELS[label]) for label in labels],
-        "n": f"{counted(result.level.n, 'controller')}, {trials_each(result.trials)}",
+        "n": result.basis,
         "verdict": result.verdict if closed is None else closed.verdict,
         "main": result.main_measures if closed is None else closed.main_measures,
         "is_closed": closed is not None,

@@ -21,20 +21,6 @@ from ._gap.between import GapBetween, Say, gap_between
 from ._gap.study import Tell
 from ._targets import refuse_more_than_is_seen
 
-_SHARED = (
-    "target",
-    "controllers",
-    "n_controllers",
-    "trials",
-    "margin",
-    "task",
-    "arena",
-    "processes",
-    "witness",
-    "seed",
-)
-"""Fields that a gap takes from the order."""
-
 
 @dataclass(frozen=True)
 class ClosedGap:
@@ -111,8 +97,7 @@ def close_gap(
     folder = order.folder
     _adopt(folder, order)
     fit, trials = folder / "fit.toml", folder / "fit.trials.sqlite"
-    shared = {name: getattr(order, name) for name in _SHARED}
-    gap = GapOrder(sim=order.sim, observe=order.observe, results=trials, **shared)
+    gap = order.to_order(GapOrder, results=trials)
     before = gap_between(gap, pulse=pulse, allow_code=allow_code, tell=tell, say=say)
     calibration = _calibrated(order, fit, pulse, tell, say)
     shown = before.study.shown
@@ -204,17 +189,7 @@ def _calibrated(
 ) -> Calibration:
     """Return the calibration: the one in the file if the same order made it, otherwise a new one."""
     base = order.sim.partition(":")[2] or class_of(order.target).base_robot
-    wanted = CalibrateOrder(
-        what=order.what,
-        robot=order.target,
-        out=fit,
-        observe=order.observe,
-        budget=order.budget,
-        base=base,
-        seed=order.seed,
-        arena=order.arena,
-        witness=order.witness,
-    )
+    wanted = order.to_order(CalibrateOrder, robot=order.target, out=fit, base=base)
     made = read_calibration(fit) if fit.exists() else None
     if made is not None and made.order == wanted.record():
         return made

@@ -438,6 +438,24 @@ def rank_verdict(raw: Estimate, ceiling: Estimate, without: Estimate) -> str:
     return f"The simulator’s ranking of controllers is undecided: {figures}"
 
 
+def worth_verdict(worth: float, noun: str, *, helps: bool) -> str:
+    """Return how many more units on the target a simulation was worth, as a sentence.
+
+    Args:
+        worth: Number of units; below 0 if the interval became wider.
+        noun: A unit, such as `controller`.
+        helps: True if the correlation is high enough to narrow intervals in most samples of this size.
+    """
+    if not helps:
+        return (
+            "The simulator is not shown to help. Both intervals are valid: report the one that you named before the "
+            "trials."
+        )
+    if worth < 0.5:
+        return f"The simulation was worth less than one more {noun} on the target."
+    return f"The simulation was worth about {counted(round(worth), f'more {noun}')} on the target."
+
+
 def reproduces(is_misspecified: bool) -> str:
     """Return whether a simulator can reproduce the observations of its calibration, as a sentence."""
     return f"The simulator {'cannot' if is_misspecified else 'can'} reproduce the observations of its calibration."

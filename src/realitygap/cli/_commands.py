@@ -60,6 +60,9 @@ SECTIONS: dict[str, tuple[Command, ...]] = {
     ),
     "The gap": (
         Command("plan", "Estimate how many controllers and trials you need.", "_gap", "plan"),
+        Command(
+            "estimate", "Estimate a robot's mean score, assisted by simulation.", "_estimate", "estimate"
+        ),
         Command("calibrate", "Fit the simulator to a robot.", "_calibrate", "calibrate"),
         Command("transfer", "Compare strategies that transfer controllers.", "_transfer", "transfer"),
         Command("try", "Drive one exported controller on any platform.", "_transfer", "try_genome"),

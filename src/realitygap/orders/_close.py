@@ -8,7 +8,16 @@ from typing import ClassVar, Literal
 from realitygap.robot_families import port_platforms
 
 from ._field import argument, option
-from ._shared import PairOrder, Processes, Seed, Witness, arena_option, folder_option, seed_option
+from ._shared import (
+    PairOrder,
+    Processes,
+    Seed,
+    Witness,
+    arena_option,
+    folder_option,
+    margin_option,
+    seed_option,
+)
 
 
 class CloseOrder(PairOrder):
@@ -46,6 +55,7 @@ class CloseOrder(PairOrder):
     what: Literal["all", "path", "sensors", "motion", "contact"] = option(
         "all", help="Part of the robot to calibrate.", metavar="WHAT", label="Part of the robot"
     )
+    margin: float | None = margin_option()
     observe: Literal["cells", "encoders", "track"] | None = option(
         None,
         help="Data recorded on the target.",

@@ -7,7 +7,17 @@ from pathlib import Path
 from typing import ClassVar, Literal
 
 from ._field import option
-from ._shared import PairOrder, Processes, Seed, Witness, arena_option, seed_option
+from ._shared import (
+    PairOrder,
+    Processes,
+    Seed,
+    Witness,
+    arena_option,
+    margin_option,
+    noise_option,
+    saved_trials_option,
+    seed_option,
+)
 
 
 class GapOrder(PairOrder):
@@ -32,6 +42,7 @@ class GapOrder(PairOrder):
 
     command: ClassVar[str] = "gap"
 
+    margin: float | None = margin_option()
     observe: Literal["readings", "cells", "encoders", "track"] | None = option(
         None,
         help="Data recorded on the target. track also measures replays.",
@@ -39,14 +50,7 @@ class GapOrder(PairOrder):
         label="Observation level",
     )
     arena: str | None = arena_option(None, default_is="that of the controllers")
-    noise: float | None = option(
-        None,
-        help="Noise level a of the paper, on simulators.",
-        default_is="0.1 on jyro, 0 on others",
-        at_least=0,
-        at_most=10,
-        label="Noise",
-    )
+    noise: float | None = noise_option()
     randomize: Literal["no", "posterior"] = option(
         "no",
         help="posterior: sample the robot of each trial from the calibration SIM. no: use its estimate.",
@@ -64,13 +68,7 @@ class GapOrder(PairOrder):
         help="Report how much of the gap each part of the model explains. SIM must be a calibration.",
         label="Explain the gap",
     )
-    results: Path | None = option(
-        None,
-        help="File to save the target's trials in (.sqlite). Run the command again to resume.",
-        metavar="FILE",
-        names=("-o", "--out"),
-        is_output=True,
-    )
+    results: Path | None = saved_trials_option()
     processes: Processes = None
     witness: Witness = None
     seed: Seed = seed_option()

@@ -13,6 +13,7 @@ from realitygap.errors import StudyError, did_you_mean
 
 from ._calibrate import CalibrateOrder
 from ._close import CloseOrder
+from ._estimate import EstimateOrder
 from ._gap import GapOrder
 from ._order import Order
 from ._plan import PlanOrder
@@ -20,7 +21,16 @@ from ._transfer import ClosingOrder, TransferOrder, TryOrder
 
 ORDERS: dict[str, type[Order]] = {
     model.command: model
-    for model in (CalibrateOrder, CloseOrder, ClosingOrder, GapOrder, PlanOrder, TransferOrder, TryOrder)
+    for model in (
+        CalibrateOrder,
+        CloseOrder,
+        ClosingOrder,
+        EstimateOrder,
+        GapOrder,
+        PlanOrder,
+        TransferOrder,
+        TryOrder,
+    )
 }
 """Orders by the name of their command."""
 

@@ -91,6 +91,40 @@ def task_option(default: str | None = "coverage", *, default_is: str = "") -> An
     )
 
 
+def margin_option() -> Any:
+    """Return the field of a margin of equivalence."""
+    return option(
+        None,
+        help="Largest difference in score that counts as equivalent, such as 0.05.",
+        above=0,
+        metavar="M",
+        label="Margin of equivalence",
+    )
+
+
+def noise_option() -> Any:
+    """Return the field of the noise of simulators."""
+    return option(
+        None,
+        help="Noise level a of the paper, on simulators.",
+        default_is="0.1 on jyro, 0 on others",
+        at_least=0,
+        at_most=10,
+        label="Noise",
+    )
+
+
+def saved_trials_option() -> Any:
+    """Return the field of the file with the target's trials."""
+    return option(
+        None,
+        help="File to save the target's trials in (.sqlite). Run the command again to resume.",
+        metavar="FILE",
+        names=("-o", "--out"),
+        is_output=True,
+    )
+
+
 class PairOrder(Order):
     """The fields of every order that runs the same controllers on two platforms."""
 
@@ -118,11 +152,4 @@ class PairOrder(Order):
         at_least=1,
         at_most=4096,
         label="Trials per controller",
-    )
-    margin: float | None = option(
-        None,
-        help="Largest difference in score that counts as equivalent, such as 0.05.",
-        above=0,
-        metavar="M",
-        label="Margin of equivalence",
     )

@@ -4,6 +4,7 @@ Arrays in, values out; nothing here reads a file or names a robot. SciPy supplie
 when the first is used.
 """
 
+from ._assisted import FEW_UNITS, Assisted, assisted_mean, least_correlation
 from ._correlation import rank_correlation, spearman
 from ._equivalence import prove_equivalence
 from ._estimate import CONFIDENCE, Ends, Estimate, Method
@@ -95,6 +96,11 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     "Range",
     "range_of_differences",
     "SMALLEST_N",
+    # means on the target, assisted by a simulator
+    "assisted_mean",
+    "Assisted",
+    "least_correlation",
+    "FEW_UNITS",
     # medians
     "median_interval",
     "interval_ranks",

@@ -18,7 +18,7 @@ CONFIDENCE = 0.95
 
 Method = Literal[
     "", "BCa", "Clopper-Pearson", "Fisher z", "Newcombe", "Wilson", "betting", "percentiles", "ranks",
-    "sign-symmetric", "t",
+    "regression", "sign-symmetric", "t",
 ]  # fmt: skip
 """How an interval is made: `BCa` and `percentiles`, bootstraps; `ranks`, two observed values; `betting` and
 `sign-symmetric`, valid at any of all looks; the others, formulas."""

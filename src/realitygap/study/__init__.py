@@ -20,6 +20,7 @@ from ._controllers import sample_controllers
 from ._duration import estimate_seconds
 from ._file import DEFAULT_NEAT, SECTIONS, load_study, named_studies, parse_study, platform_sections
 from ._gap.between import GapBetween, gap_between
+from ._gap.estimate import EstimatedScore, estimate_score
 from ._gap.plan import GapPlan, plan_gap, recorded_spreads
 from ._gap.study import MOST_CONTROLLERS, GapStudy, ShownTrials
 from ._kept_target import StoppedByPerson
@@ -61,6 +62,7 @@ __all__ = [
     "ClosingProgress",
     "ClosingSummary",
     "ConditionNotes",
+    "EstimatedScore",
     "GapBetween",
     "GapPlan",
     "GapStudy",
@@ -88,6 +90,7 @@ __all__ = [
     "close_gap",
     "closing_the_gap",
     "drive_study",
+    "estimate_score",
     "estimate_seconds",
     "export_trials",
     "gap_between",

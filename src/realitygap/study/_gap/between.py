@@ -10,7 +10,7 @@ import realitygap
 from realitygap.drawing import ShownAsCard
 from realitygap.errors import StudyError
 from realitygap.gap import Why
-from realitygap.orders import GapOrder, takes_order
+from realitygap.orders import EstimateOrder, GapOrder, takes_order
 from realitygap.platforms import RecordedTarget, class_of, open_target, split_spec
 from realitygap.stats import Estimate
 from realitygap.tasks import Task
@@ -132,7 +132,7 @@ def gap_between(
         open_target(
             order.sim,
             setting.arena,
-            noise=_noise(order, order.sim),
+            noise=noise_on(order.sim, order.noise),
             key=2 * order.seed,
             randomize=order.randomize,
         ) as source,
@@ -143,7 +143,7 @@ def gap_between(
             witness=order.witness,
             observer=observer,
             pulse=pulse,
-            noise=_noise(order, order.target),
+            noise=noise_on(order.target, order.noise),
             key=2 * order.seed + 1,
         ) as costly,
     ):
@@ -229,14 +229,14 @@ def _setting(
         )
     if task is None:
         task = task_of(controllers) if order.task is None else task_named(order.task, allow_code=allow_code)
-    place = arena or _arena(order, controllers)
+    place = arena or arena_of(order, controllers)
     condition = controllers[0].condition
     steps = steps if condition is None else condition.on.steps
     return _Setting(controllers, trials, task, place, steps, bool(recorded))
 
 
-def _arena(order: GapOrder, controllers: Sequence[Controller]) -> Arena:
-    """Return the arena of the gap.
+def arena_of(order: GapOrder | EstimateOrder, controllers: Sequence[Controller]) -> Arena:
+    """Return the arena of an order: the one that it names, or the one that its controllers come with.
 
     Raises:
         StudyError: None is named, and the controllers were selected in several.
@@ -275,5 +275,6 @@ def _misspecified(calibration: Calibration | None) -> bool | None:
     return calibration.misspecified if calibration.kind == "all" else calibration.misspecified or None
 
 
-def _noise(order: GapOrder, platform: str) -> float:
-    return class_of(platform).default_noise if order.noise is None else order.noise
+def noise_on(platform: str, noise: float | None) -> float:
+    """Return the noise level a of the paper on a platform, which has its own default."""
+    return class_of(platform).default_noise if noise is None else noise

@@ -167,10 +167,10 @@ def study_gap(
         refuse_inputs(controllers, platform)
     refuse_inputs(reevolved, target)
     file = None if results is None else open_trials(results, target, observe)
-    on_target = _carry_out(target, [*plans, *more], observe, tell, file)
+    on_target = carry_out(target, [*plans, *more], observe, tell, file)
     source, pace_notes = _paced(source, target, on_target) if at_its_pace else (source, ())
     own = [replace(plan, number=plan.number - TARGET_FROM) for plan in plans]
-    in_source = _carry_out(source, own, seen, tell)
+    in_source = carry_out(source, own, seen, tell)
     one = side_of(source, in_source, len(controllers), task)
     other = side_of(target, on_target[: len(plans)], len(controllers), task)
     result = measure_gap(one, other, margin=margin, misspecified=misspecified, seed=seed)
@@ -241,7 +241,7 @@ def _as_much(observe: Observe, platform: Target) -> Observe:
     return OBSERVATIONS[min(OBSERVATIONS.index(observe), OBSERVATIONS.index(platform.observes))]
 
 
-def _carry_out(
+def carry_out(
     platform: Target,
     plans: Sequence[TrialPlan],
     observe: Observe,
@@ -301,7 +301,7 @@ def _replay(source: Target, observed: Sequence[TrialRecord], n: int, tell: Tell 
         for k in range(REPLAYS)
         for i in range(len(there))
     ]
-    replayed = _carry_out(source, plans, "track", tell)
+    replayed = carry_out(source, plans, "track", tell)
     poses = np.array([trial.poses[: t + 1] for trial in replayed])
     return replay_error(
         np.array([trial.poses[: t + 1] for trial in there]),

@@ -5,6 +5,7 @@ The terminal, the lab, and the reports use these functions, so that one result r
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -410,10 +411,15 @@ def change_verdict(change: Estimate, before: Estimate, after: Estimate) -> str:
     """
     if change.value is None or change.ends is None or before.value is None or after.value is None:
         return "Too few controllers or trials to judge the calibration."
-    figures = f"from {before.value:.3f} to {after.value:.3f}, a difference of {with_interval(change)}."
+    figures = f"from {before.value:.3f} to {after.value:.3f}."
     if change.ends[0] <= 0 <= change.ends[1]:
-        return f"The calibration is not shown to change the RMS gap: {figures}"
+        return f"The calibration is not shown to change the RMS gap, {figures}"
     return f"The calibration {'lowers' if change.value < 0 else 'raises'} the RMS gap {figures}"
+
+
+def claims(verdict: str) -> str:
+    """Return a verdict without its figures, which follow a colon in a sentence."""
+    return re.sub(r": .*?\.(?= |$)", ".", verdict)
 
 
 def rank_verdict(raw: Estimate, ceiling: Estimate, without: Estimate) -> str:

@@ -85,6 +85,7 @@ def test_at_most_twelve_lines_state_title_verdict_labels_n_and_what_follows(comm
     assert "the level of coverage" in lines[1]
     assert "SIM, 5 controllers, 2 trials of each" in out
     assert "--full" in lines[-1]
+    assert "close" not in lines[-1]  # of a simulator against itself
     assert lines[1] in command(*words, "--full")[1]
 
 

@@ -7,6 +7,7 @@ import pytest
 from realitygap.errors import StudyError
 from realitygap.lab._files import LONGEST_TEXT, files_outside, refuse_outside, refuse_port
 from realitygap.lab._form import written_form
+from realitygap.lab._gap import gap_mistakes
 
 
 @pytest.mark.parametrize(
@@ -88,3 +89,16 @@ def test_text_that_is_no_study_file_is_refused(tmp_path, text):
 def test_titles_and_notes_may_hold_anything(tmp_path):
     text = '[study]\ntitle = "/etc/passwd: a study"\nnote = "../.."'
     assert files_outside(tmp_path, text)[0] == []
+
+
+@pytest.mark.parametrize(
+    "file", ["twin:nowhere.toml", "recorded:nowhere.sqlite", "sim:nowhere.toml", "jyrro"]
+)
+def test_platforms_that_are_not_there_are_named_together_with_wrong_numbers(tmp_path, file):
+    values = {"sim": "sim:fit.toml", "target": file, "n_controllers": 0}
+    (tmp_path / "fit.toml").write_text('base = "khepera"\n')  # not in the current folder
+    assert set(gap_mistakes(tmp_path, values).problems) == {"target", "n_controllers"}
+    (tmp_path / "fit.toml").write_text("bass = 1\n")
+    problem = gap_mistakes(tmp_path, values).problems["sim"]
+    assert problem.startswith("sim:fit.toml: ")
+    assert str(tmp_path) not in problem

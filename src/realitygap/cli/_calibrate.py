@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import shlex
-import sys
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 import realitygap
-from realitygap._terminal import draw, echo
+from realitygap._terminal import echo
 from realitygap.errors import StudyError
 from realitygap.orders import CalibrateOrder
 
@@ -18,7 +18,7 @@ from ._code import AllowPlatforms
 from ._observer import CameraOfRobots, needs_operator, sheet_observer, under_camera
 from ._options import Json, print_json
 from ._order import command_of
-from ._progress import resumable
+from ._progress import TrialsBar, resumable
 from ._tables import calibration_table, held_out_table, wide_console
 
 if TYPE_CHECKING:
@@ -80,24 +80,15 @@ def _measured(order: CalibrateOrder, camera: str | None, *, quiet: bool) -> Cali
     operator = CalibrationOperator(where, model) if is_led else None
     kept = (order.out or Path("fit")).with_suffix(".trials.sqlite")
     try:
-        with resumable(kept):
+        with resumable(kept), TrialsBar(quiet=quiet or is_led) as bar:
             sheet = sheet_observer(asks_for_start=False) if is_led else None
             with under_camera(camera, where, sheet) as observer:
                 return realitygap.study.make_calibration(
-                    order,
-                    observer=observer,
-                    operator=operator,
-                    tell=None if quiet or operator is not None else _tell,
+                    order, observer=observer, operator=operator, tell=partial(bar.show, robot)
                 )
     except realitygap.study.StoppedByPerson:
         echo(f"Recorded trials are in {kept}. Run the same command to resume.", err=True)
         raise typer.Exit(0) from None
-
-
-def _tell(done: int, n: int) -> None:
-    if sys.stderr.isatty():
-        draw("\r", err=True)
-        echo(f"{done} of {n} trials", nl=done == n, err=True)
 
 
 def _print(made: Calibration, out: Path, figure: Path | None, *, as_json: bool) -> None:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import inspect
+import itertools
+import os
 import shlex
 from collections.abc import Callable
 from pathlib import Path
@@ -66,6 +68,14 @@ def _parameter(field: OrderField) -> inspect.Parameter:
     return parameter.replace(annotation=Annotated[parameter.annotation, shown])
 
 
+def _free_folder(folder: Path) -> Path:
+    """Return the first of the names DIR-2, DIR-3, and so on, that is free."""
+    folder = Path(os.path.normpath(folder))
+    return next(
+        path for n in itertools.count(2) if not (path := folder.with_name(f"{folder.name}-{n}")).exists()
+    )
+
+
 def again(
     file: Annotated[
         Path,
@@ -82,7 +92,8 @@ def again(
     """Repeat a measurement from its result.
 
     A result states the command that made it, with all settings. This command runs it again, in the current folder, from
-    which the names of files are resolved. New trials are driven, unless -o names a file that has them.
+    which the names of files are resolved. New trials are driven, unless -o names a file or folder that has them. A
+    folder DIR is repeated next to it, in DIR-2 or the next free name.
 
     Example: realitygap again gap.html
 
@@ -95,5 +106,7 @@ def again(
     order = read_order(file)
     given = {option.partition("=")[0] for option in options or ()}
     words = [*order.words(leave_out=given), *(options or ())]
+    if file.is_dir() and given.isdisjoint(("-o", "--out")):
+        words += ["--out", str(_free_folder(file))]
     echo(f"realitygap {shlex.join(words)}", err=True)
     app_for(words)(words, prog_name="realitygap")

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
@@ -15,6 +16,9 @@ if TYPE_CHECKING:
     from rich.progress import TaskID
 
     from realitygap.study import Progress as StudyProgress
+
+_LINE_EVERY_S = 10.0
+"""Minimum time between two lines of progress in a file [s]."""
 
 
 @contextlib.contextmanager
@@ -101,15 +105,22 @@ class RunsBar(ProgressBar):
 
 
 class TrialsBar(ProgressBar):
-    """A display of the finished trials on each platform, on standard error if that is a terminal."""
+    """A display of the finished trials on each platform, on standard error. A file gets a line now and then.
 
-    def __init__(self, *, quiet: bool) -> None:
+    Args:
+        quiet: True to show nothing.
+        clock: Clock [s].
+    """
+
+    def __init__(self, *, quiet: bool, clock: Callable[[], float] = time.monotonic) -> None:
         super().__init__("trials", quiet=quiet)
         self._tasks: dict[tuple[str, int], TaskID] = {}
+        self._clock, self._printed = clock, clock()
 
     def show(self, name: str, done: int, total: int) -> None:
         """Show the number of finished trials."""
         if not self._console.is_terminal:
+            self.say(f"{name}: {done:,} of {total:,} trials")
             return
         if not self._progress.live.is_started:
             self._progress.start()
@@ -119,6 +130,7 @@ class TrialsBar(ProgressBar):
         self._progress.update(self._tasks[key], completed=done)
 
     def say(self, text: str) -> None:
-        """Print other progress, on a terminal."""
-        if self._console.is_terminal:
+        """Print other progress."""
+        if self._console.is_terminal or self._clock() - self._printed >= _LINE_EVERY_S:
+            self._printed = self._clock()
             self._console.print(text)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import re
 import stat
 from collections.abc import Collection
@@ -12,7 +13,7 @@ from urllib.parse import parse_qsl
 
 from realitygap._limits import parse_toml
 from realitygap.errors import StudyError
-from realitygap.platforms import names_a_port, platform_names, platform_of, split_spec
+from realitygap.platforms import Platform, names_a_port, platform_of, split_spec
 from realitygap.robot_families import ports_in_words
 from realitygap.robots import split_port
 from realitygap.runs import NAME_PATTERN
@@ -151,18 +152,31 @@ def refuse_camera(root: Path, spec: str) -> None:
         refuse_outside(root, value)
 
 
-def refuse_platform(root: Path, platform: str) -> None:
-    """Refuse a platform that there is not, or whose port or file would be outside a folder.
+def refuse_platform(root: Path, spec: str) -> None:
+    """Refuse a platform that there is not, or whose port or file is not in a folder.
 
     Raises:
-        StudyError: There is no such platform, or it would.
+        StudyError: There is no such platform, or it is not there.
     """
-    if not platform.startswith(_PYTHON) and split_spec(platform)[0] not in platform_names():
-        platform_of(platform)  # raises, and names the platform that may be meant
-    if names_a_port(platform):
-        refuse_port(root, platform)
-    else:
-        refuse_outside(root, platform)
+    has_port = names_a_port(spec)
+    (refuse_port if has_port else refuse_outside)(root, spec)
+    file = split_spec(spec)[1]
+    is_open = has_port or spec.startswith(_PYTHON)
+    if not is_open and platform_in(root, spec).needs_rest and not (root / file).exists():
+        raise StudyError(f"There is no file {shown(file)} in the lab's folder.")
+
+
+def platform_in(root: Path, spec: str) -> Platform:
+    """Return the platform that a visitor named, with its file from a folder.
+
+    Raises:
+        StudyError: There is no such platform, or it cannot be made of this.
+    """
+    name, file = split_spec(spec)
+    try:
+        return platform_of(f"{name}:{root / file}" if file and (root / file).is_file() else spec)
+    except StudyError as error:
+        raise StudyError(str(error).replace(f"{root}{os.sep}", "")) from None
 
 
 def _without_outside(root: Path, value: Any, place: str, mistakes: list[str]) -> Any:

@@ -21,7 +21,7 @@ from realitygap.stats import Estimate, controllers_for_margin, detectable_differ
 from realitygap.study import GapStudy, close_gap, gap_between
 
 from ._channel import Channel, Pulses
-from ._files import check_name
+from ._files import check_name, platform_in
 from ._job import MeasuringJob, Pace
 from ._messages import GapDone, GapMeasured, GapWork, Interrupted, Message, ScorePairs, TrialCount
 from ._mistakes import Mistakes
@@ -87,7 +87,7 @@ def gap_mistakes(root: Path, values: Mapping[str, Any]) -> Mistakes:
     mistakes.in_order(GapOrder, values, root)
     if "target" in values and "target" not in mistakes.problems and not values.get("witness"):
         with mistakes.in_field("target"):
-            if platform_of(values["target"]).needs_person:
+            if platform_in(root, values["target"]).needs_person:
                 raise StudyError(
                     "In the lab, a gap needs a target without an operator. For an emulator in another program, "
                     "enter its witness. For a robot, use the command: realitygap gap"

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from realitygap._limits import MOST_TABLE_BYTES, parse_toml, read_file
-from realitygap._wording import change_verdict, counted, platform_in_words, with_interval
+from realitygap._wording import change_verdict, claims, counted, platform_in_words, with_interval
 from realitygap.errors import StudyError
 from realitygap.gap import GapChange, measure_change
 from realitygap.orders import ORDER_FILE, CalibrateOrder, CloseOrder, GapOrder, takes_order
@@ -52,7 +52,7 @@ class ClosedGap:
     def verdict(self) -> str:
         """The effect of the calibration, and whether the calibrated simulator can be trusted."""
         before, after = self.before.study.result, self.after.study.result
-        return f"{change_verdict(self.change.rms, before.rms, after.rms)} {after.verdict}"
+        return f"{change_verdict(self.change.rms, before.rms, after.rms)} {claims(after.verdict)}"
 
     @property
     def main_measures(self) -> list[tuple[str, str]]:

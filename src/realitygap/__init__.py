@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from .records import ResultsFolder
     from .report import summarize, watch, write_movie, write_report
     from .runs import Condition, replay
-    from .study import Study, close_gap, drive_study, estimate_score, load_study, run_study
+    from .study import Study, close_gap, compare_scores, drive_study, estimate_score, load_study, run_study
     from .study import gap_between as measure_gap
     from .study import make_calibration as calibrate
     from .trials import simulate_case
@@ -57,6 +57,7 @@ _HOME = {
     "Study": "study",
     "calibrate": "study:make_calibration",
     "close_gap": "study",
+    "compare_scores": "study",
     "drive_study": "study",
     "estimate_score": "study",
     "load_study": "study",
@@ -83,6 +84,7 @@ __all__ = [
     "__version__",
     "calibrate",
     "close_gap",
+    "compare_scores",
     "drive_study",
     "estimate_score",
     "load_study",

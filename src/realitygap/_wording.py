@@ -350,8 +350,25 @@ def platform_in_words(spec: str, label: str) -> str:
     return {"sim": f"sim with {stem}", "twin": f"the twin {stem}"}.get(name, f"the recorded trials {stem}")
 
 
-def trials_each(trials: tuple[int, int]) -> str:
-    """Return the numbers of trials of each controller on the simulator and on the target."""
+def trials_each(
+    trials: tuple[int, int], most: tuple[int, int] = (0, 0), platforms: tuple[str, str] = ("", "")
+) -> str:
+    """Return the numbers of trials of each controller on the simulator and on the target.
+
+    Args:
+        trials: The fewest trials of a controller on both; 0 for means without trials.
+        most: The most trials of a controller on both. Default: as many.
+        platforms: Both platforms in words, for numbers that differ.
+    """
+    if trials == (0, 0):
+        return "means without trials on both platforms"
+    ends = [(few, max(few, many)) for few, many in zip(trials, most, strict=True)]
+    if 0 in trials or any(few != many for few, many in ends):
+        parts = [
+            "means without trials" if few == 0 else f"{counted_range((few, many), 'trial')} of each"
+            for few, many in ends
+        ]
+        return joined([f"{part} on {name}" for part, name in zip(parts, platforms, strict=True)])
     numbers = " and ".join(f"{n:,}" for n in dict.fromkeys(trials))
     return f"{numbers} {'trial' if trials == (1, 1) else 'trials'} of each on both platforms"
 
@@ -460,6 +477,21 @@ def worth_verdict(worth: float, noun: str, *, helps: bool) -> str:
     if worth < 0.5:
         return f"The simulation was worth less than one more {noun} on the target."
     return f"The simulation was worth about {counted(round(worth), f'more {noun}')} on the target."
+
+
+def rank_violation(better: str, worse: str, violation: float, sim: str, target: str) -> str:
+    """Return the two controllers whose order a simulator gets most wrong, without a period."""
+    return f"{better} is {violation:.3f} better than {worse} on {target}, and not on {sim}"
+
+
+def ties_in_words(n: int, ties: str) -> str:
+    """Return how pairs of controllers that tie on one platform only count, as a sentence; empty if there are none."""
+    if n == 0:
+        return ""
+    counts = "count as violated" if ties == "both" else "count as in the code of SIMPLER"
+    if n == 1:
+        counts = counts.replace("count", "counts")
+    return f"{counted(n, 'pair')} of controllers {'ties' if n == 1 else 'tie'} on one platform only, and {counts}."
 
 
 def reproduces(is_misspecified: bool) -> str:

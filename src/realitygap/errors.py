@@ -58,7 +58,7 @@ class DescriptionError(RealityGapError, ValueError):
 
 
 class TableError(RealityGapError):
-    """A table of results for `realitygap audit-results` cannot be read as written."""
+    """A table of results for `realitygap audit-results`, or of scores for `compare`, cannot be used as written."""
 
 
 class LogError(RealityGapError):

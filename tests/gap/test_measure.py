@@ -81,8 +81,10 @@ def test_one_trial_a_controller_carries_level_and_order_but_no_size():
 
 def test_four_controllers_carry_no_order_and_no_interval():
     found = measure_gap(*sides(c=4))
-    assert found.srcc.value is None
-    assert "1 of 24" in found.srcc.refused
+    for measure in (found.srcc, found.pearson, found.mmrv, found.mean_violation):
+        assert measure.value is not None
+        assert measure.low is None
+        assert "1 of 24" in measure.refused
     assert found.level.value is not None
     assert found.level.low is None
     assert "at least 5 are needed" in found.level.refused

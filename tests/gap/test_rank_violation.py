@@ -27,10 +27,11 @@ PUBLISHED = {
 
 
 def by_hand(source, target):
-    """As the paper writes it."""
+    """As the paper writes it, but with a pair that ties on one side only violated for both."""
     worst = []
     for s, t in zip(source, target, strict=True):
-        worst.append(max(abs(t - u) * ((s < r) != (t < u)) for r, u in zip(source, target, strict=True)))
+        violated = [(s < r) != (t < u) or (s > r) != (t > u) for r, u in zip(source, target, strict=True)]
+        worst.append(max(abs(t - u) * wrong for u, wrong in zip(target, violated, strict=True)))
     return sum(worst) / len(worst)
 
 

@@ -59,6 +59,7 @@ SECTIONS: dict[str, tuple[Command, ...]] = {
         Command("export", "Export a network as JSON, ONNX, C, Aseba, or a graph.", "_export", "export"),
     ),
     "The gap": (
+        Command("compare", "Measure the gap in a table of scores.", "_compare", "compare"),
         Command("plan", "Estimate how many controllers and trials you need.", "_gap", "plan"),
         Command(
             "estimate", "Estimate a robot's mean score, assisted by simulation.", "_estimate", "estimate"

@@ -129,12 +129,12 @@ def _print_all(result: GapResult, replay: ReplayError | None) -> None:
         f"{result.level.n} controllers, {one} and {other} trials each, {result.score}"
     )
     for measure in realitygap.gap.SHOWN:
-        _print_row(measure.row, getattr(result, measure.name))
+        print_row(measure.row, getattr(result, measure.name))
     if replay is not None:
-        _print_row("replays off at their end [m]", replay.at_end)
+        print_row("replays off at their end [m]", replay.at_end)
     echo("Separate from the transfer gap:")
-    _print_row("re-evolved gap", result.reevolved)
-    _print_row("luck of selection", result.luck)
+    print_row("re-evolved gap", result.reevolved)
+    print_row("luck of selection", result.luck)
     if result.misspecified is not None:
         echo(reproduces(result.misspecified))
     for note in result.notes:
@@ -142,7 +142,8 @@ def _print_all(result: GapResult, replay: ReplayError | None) -> None:
     echo(result.verdict)
 
 
-def _print_row(title: str, found: Estimate) -> None:
+def print_row(title: str, found: Estimate) -> None:
+    """Print a measure with its interval, and the reason if one of them is missing."""
     number = "–" if found.value is None else f"{found.value:.3f}".replace("-", "−")
     p = found.more.get("p")
     more = "" if p is None else p_equation(p)

@@ -8,10 +8,19 @@ from ._card import gap_card, pairs_picture
 from ._change import GapChange, measure_change
 from ._level import rms_interval, square_differences
 from ._measure import measure_gap
-from ._ranks import mean_maximum_rank_violation, rank_violation_interval
+from ._ranks import (
+    Ties,
+    WorstPair,
+    mean_maximum_rank_violation,
+    mean_violation,
+    rank_violation_interval,
+    ties_on_one_side,
+    worst_pair,
+)
 from ._replay_error import ReplayError, replay_error
 from ._resampling import bootstrap
 from ._result import COVERAGE, SHOWN, GapResult
+from ._scores import Comparison, ScoredController, ScoreGap, compare_scores
 from ._side import GapSide
 from ._why import Why, coalitions, explain_gap
 
@@ -22,6 +31,11 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     "GapResult",
     "COVERAGE",
     "SHOWN",
+    # tables of scores
+    "compare_scores",
+    "Comparison",
+    "ScoreGap",
+    "ScoredController",
     # another simulator
     "measure_change",
     "GapChange",
@@ -31,6 +45,11 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     # order
     "mean_maximum_rank_violation",
     "rank_violation_interval",
+    "mean_violation",
+    "worst_pair",
+    "WorstPair",
+    "ties_on_one_side",
+    "Ties",
     # behavior
     "CoverageMaps",
     "coverage_maps",

@@ -9,7 +9,7 @@ import scipy
 
 from realitygap.stats import CONFIDENCE, Ends, percentile_interval
 
-from ._side import Values
+from ._side import Values, trial_means, trial_noise
 
 LEAST_RATIO = 1.5
 """Minimum of the mean square in standard errors for the upper end, because a logarithm has no scale near 0."""
@@ -22,10 +22,10 @@ def mean_difference(source: Values, target: Values) -> Values:
         source: (b, c, r) and
         target: (b, c, q) quality of each trial of b samples.
     """
-    return np.asarray((target.mean(axis=2) - source.mean(axis=2)).mean(axis=1))
+    return np.asarray((trial_means(target) - trial_means(source)).mean(axis=1))
 
 
-def square_differences(source: Values, target: Values) -> Values:
+def square_differences(source: Values, target: Values, *, paired: bool = False) -> Values:
     """Return unbiased estimates of the square of each controller's true difference, (b, c), which may be negative.
 
     The square of a difference of means is too large by the variance of both means, which is taken out:
@@ -34,14 +34,16 @@ def square_differences(source: Values, target: Values) -> Values:
     Args:
         source: (b, c, r) and
         target: (b, c, q), r and q at least 2.
+        paired: True if trial k of both sides had the same conditions, r = q. The noise is then that of the differences
+            of pairs, which shared conditions do not add to.
 
     Raises:
         ValueError: Some side has one trial a controller, which says nothing of noise.
     """
     if min(source.shape[2], target.shape[2]) < 2:
         raise ValueError("The noise of trials needs at least 2 of each controller on both sides.")
-    difference = target.mean(axis=2) - source.mean(axis=2)
-    noise = source.var(axis=2, ddof=1) / source.shape[2] + target.var(axis=2, ddof=1) / target.shape[2]
+    difference = trial_means(target) - trial_means(source)
+    noise = trial_noise(target - source) if paired else trial_noise(source) + trial_noise(target)
     return np.asarray(difference**2 - noise)
 
 
@@ -60,8 +62,16 @@ def shares_above(source: Values, target: Values) -> Values:
     Source: A12 of Vargha & Delaney (2000), Journal of Educational and Behavioral Statistics 25(2), 101-132, within
     each controller.
     """
+    if np.isnan(source[:, -1]).any() or np.isnan(target[:, -1]).any():
+        pairs = zip(source, target, strict=True)
+        return np.array([float(shares_above(_given(s), _given(t))[0]) for s, t in pairs])
     one, other = target[:, :, None], source[:, None, :]
     return np.asarray(((one > other).mean(axis=(1, 2)) + (one >= other).mean(axis=(1, 2))) / 2)
+
+
+def _given(row: Values) -> Values:
+    """Return the trials of one controller without nan, (1, r)."""
+    return row[~np.isnan(row)][None]
 
 
 def rms_interval(

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from realitygap._wording import counted
 from realitygap.stats import (
     ALPHA,
     POWER,
@@ -16,6 +17,7 @@ from realitygap.stats import (
     Estimate,
     Method,
     exact_share_interval,
+    pearson,
     percentile_interval,
     prove_equivalence,
     range_of_differences,
@@ -27,15 +29,19 @@ from . import _resampling
 from ._behavior import energy_distances, energy_test, smallest_energy_p
 from ._level import mean_difference, rms_interval, rms_of, shares_above, square_differences
 from ._ranks import (
+    Ties,
     mean_maximum_rank_violation,
+    mean_violation,
+    mean_violation_interval,
     rank_violation_floor,
     rank_violation_interval,
     reliability,
+    ties_on_one_side,
     trials_for_reliability,
 )
 from ._resampling import bootstrap, over_controllers
 from ._result import GapResult
-from ._side import GapSide, Values
+from ._side import GapSide, Values, trial_means
 
 SEED = 7
 """Seed of every random draw in a measure, so that the same trials give the same numbers."""
@@ -48,6 +54,9 @@ LEAST_RELIABILITY = 0.2
 WANTED_RELIABILITY = 0.5
 """Reliability for which the required number of trials is reported."""
 
+LEAST_ORDERED = 3
+"""Fewer controllers have no order that could be compared."""
+
 _FEW_SPLITS = 6
 """Halves in each resample, whose number makes up for how few they are."""
 
@@ -58,6 +67,8 @@ def measure_gap(
     *,
     margin: float | None = None,
     misspecified: bool | None = None,
+    ties: Ties = "both",
+    paired: bool = False,
     resamples: int = RESAMPLES,
     seed: int = SEED,
 ) -> GapResult:
@@ -68,6 +79,8 @@ def measure_gap(
         target: The target's, of the same controllers; the number of trials may differ.
         margin: Margin of equivalence in level, in units of quality. Without one, equivalence is not tested.
         misspecified: True if a check showed that the simulator cannot reproduce the observations.
+        ties: Counting of pairs of controllers that tie on one platform only, in rank violations.
+        paired: True if trial k of a controller had the same conditions on both sides, such as its start.
         resamples: Number of resamples of the bootstrap.
         seed: Seed of all random draws.
 
@@ -88,34 +101,53 @@ def measure_gap(
         )
     if margin is not None and not (math.isfinite(margin) and margin > 0):
         raise ValueError(f"margin is {margin}, expected a number above 0, such as 0.05.")
-    work = _Work(source, target, resamples, np.random.default_rng(seed))
+    if paired and not np.array_equal(source.counts, target.counts):
+        raise ValueError(
+            f"{source.name} and {target.name} have different numbers of trials, expected pairs of trials."
+        )
+    work = _Work(source, target, resamples, np.random.default_rng(seed), ties, paired=paired)
     return GapResult(
         source.name,
         target.name,
         (source.label, target.label),
-        (source.trials, target.trials),
+        (0 if source.are_means else source.trials, 0 if target.are_means else target.trials),
         rms=work.rms(),
+        raw_rms=work.raw_rms(),
         level=work.level(),
         a12=work.a12(),
         srcc=work.srcc(),
+        pearson=work.pearson(),
         srcc_disattenuated=work.disattenuated(),
         noise_ceiling=work.ceiling(),
         mmrv=work.mmrv(),
         mmrv_floor=work.mmrv_floor(),
+        mean_violation=work.mean_violation(),
         energy=work.energy(
             source.cells.astype(float), target.cells.astype(float), "which cells were crossed"
         ),
         energy_ends=work.energy(source.ends, target.ends, "where trials end (observe track)"),
         equivalence=work.equivalence(margin),
         misspecified=misspecified,
+        most_trials=(int(source.counts.max()), int(target.counts.max())),
+        words=(source.in_words, target.in_words),
     )
 
 
 class _Work:
     """Trials of both sides, the statistics of their resamples, and one method for each measure."""
 
-    def __init__(self, source: GapSide, target: GapSide, n_resamples: int, rng: np.random.Generator) -> None:
+    def __init__(
+        self,
+        source: GapSide,
+        target: GapSide,
+        n_resamples: int,
+        rng: np.random.Generator,
+        ties: Ties,
+        *,
+        paired: bool,
+    ) -> None:
         self.source, self.target, self.n = source, target, source.n
+        self.ties, self.paired = ties, paired
         self.n_resamples, self.rng = n_resamples, rng
         self.differences = range_of_differences(source.score_range)
         self.pair = source.values[None], target.values[None]
@@ -127,14 +159,14 @@ class _Work:
 
     def _draw_orders(self) -> None:
         """Add statistics of ranks, and the reliability of both sides of the same resamples."""
-        ranks: dict[str, _resampling.Statistic] = {"srcc": _srcc}
-        if _mmrv(*self.pair)[0] == 0:  # any other violation has an interval without resamples
-            ranks["mmrv"] = _mmrv
+        ranks: dict[str, _resampling.Statistic] = {"srcc": _srcc, "pearson": _pearson}
+        if self._mmrv(*self.pair)[0] == 0:  # any other violation has an interval without resamples
+            ranks["mmrv"] = self._mmrv
         if self.fewest >= 2:
             ranks |= {
                 "source": lambda one, _: reliability(one, self.rng, _FEW_SPLITS),
                 "target": lambda _, other: reliability(other, self.rng, _FEW_SPLITS),
-                "floor": lambda _, other: rank_violation_floor(other, self.rng, _FEW_SPLITS),
+                "floor": lambda _, other: rank_violation_floor(other, self.rng, _FEW_SPLITS, self.ties),
             }
         self.drawn |= bootstrap(ranks, self.source, self.target, self.n_resamples, self.rng, smooth=True)
         if self.fewest < 2:
@@ -160,22 +192,45 @@ class _Work:
         drawn = np.clip(self.drawn["level"], *self.differences)
         return self._estimate(float(mean_difference(*self.pair)[0]), drawn)
 
-    def rms(self) -> Estimate:
-        if self.fewest < 2:
-            return Estimate.refusal(
-                self.n,
-                (
-                    "With one trial of each controller, noise and gap cannot be separated. Drive at least 2 of "
-                    "each on both sides."
-                ),
+    def _without_trials(self, what: str) -> str:
+        """Return why one of the sides has too few trials, and what to do; empty if both have enough."""
+        of_means = [side.name for side in (self.source, self.target) if side.are_means]
+        if of_means:
+            return (
+                f"The scores of {' and '.join(of_means)} are means, without trials, so {what}. Give a row for each "
+                "trial; for means of successes, --binary and the number of trials (n)."
             )
-        squares = square_differences(*self.pair)[0]
+        if self.fewest < 2:
+            some = "each controller" if self.most < 2 else "some controllers"
+            return f"With one trial of {some}, {what}. Drive at least 2 of each on both sides."
+        return ""
+
+    @property
+    def most(self) -> int:
+        """Largest number of trials of a controller, on the side with fewer."""
+        return int(min(self.source.counts.max(), self.target.counts.max()))
+
+    def raw_rms(self) -> Estimate:
+        differences = self.target.means - self.source.means
+        squares = differences**2
+        resampled = resampled_means(squares, self.n_resamples, self.rng.spawn(1)[0])
+        return self._with_ends(
+            float(rms_of(squares.mean())),
+            rms_interval(differences, squares, resampled, most=self.differences[1]),
+        )
+
+    def rms(self) -> Estimate:
+        if why := self._without_trials("noise and gap cannot be separated"):
+            return Estimate.refusal(self.n, why)
+        squares = square_differences(*self.pair, paired=self.paired)[0]
         value = float(rms_of(squares.mean()))
         resampled = resampled_means(squares, self.n_resamples, self.rng.spawn(1)[0])
         differences = self.target.means - self.source.means
         return self._with_ends(value, rms_interval(differences, squares, resampled, most=self.differences[1]))
 
     def a12(self) -> Estimate:
+        if self.source.are_means or self.target.are_means:
+            return Estimate.refusal(self.n, self._without_trials("single trials cannot be compared"))
         shares = shares_above(self.source.values, self.target.values)
         value = float(shares.mean())
         if self.n >= SMALLEST_N and value in (0.0, 1.0):
@@ -185,13 +240,16 @@ class _Work:
 
     # order
 
-    def _no_order(self) -> Estimate | None:
-        if self.n < SMALLEST_N:
-            return Estimate.refusal(
-                self.n,
-                f"With {self.n} controllers, an order is too likely by chance (a perfect one in 1 of "
-                f"{math.factorial(self.n)}). At least {SMALLEST_N} are needed.",
-            )
+    def _few(self) -> str:
+        """Return the reason why these controllers support no claim about their order."""
+        return (
+            f"With {counted(self.n, 'controller')}, an order is too likely by chance (a perfect one in 1 of "
+            f"{math.factorial(self.n)}). At least {SMALLEST_N} are needed."
+        )
+
+    def _no_order(self, least: int = LEAST_ORDERED) -> Estimate | None:
+        if self.n < least:
+            return Estimate.refusal(self.n, self._few())
         if self.alike:
             return Estimate.refusal(
                 self.n,
@@ -200,24 +258,56 @@ class _Work:
             )
         return None
 
+    def _of_order(self, value: float, ends: Callable[[], Estimate]) -> Estimate:
+        """Return a number about the order of controllers, without an interval if they are few."""
+        if self.n < SMALLEST_N:
+            return Estimate(value, None, None, self.n, self._few(), needed=SMALLEST_N)
+        return ends()
+
     def srcc(self) -> Estimate:
-        return self._no_order() or self._estimate(float(_srcc(*self.pair)[0]), self.drawn["srcc"])
+        return self._no_order() or self._correlation(float(_srcc(*self.pair)[0]), "srcc")
+
+    def pearson(self) -> Estimate:
+        return self._no_order() or self._correlation(float(_pearson(*self.pair)[0]), "pearson")
+
+    def _correlation(self, value: float, name: str) -> Estimate:
+        return self._of_order(value, lambda: self._estimate(value, self.drawn[name]))
+
+    def _mmrv(self, source: Values, target: Values) -> Values:
+        return mean_maximum_rank_violation(trial_means(source), trial_means(target), self.ties)
 
     def mmrv(self) -> Estimate:
         refused = self._no_order()
         if refused:
             return refused
-        value = float(_mmrv(*self.pair)[0])
-        if value == 0:
-            return self._estimate(value, self.drawn["mmrv"])
-        return self._with_ends(value, rank_violation_interval(self.source.means, self.target.means), "t")
+        value, means = float(self._mmrv(*self.pair)[0]), (self.source.means, self.target.means)
+
+        def ends() -> Estimate:
+            if value == 0:
+                return self._estimate(value, self.drawn["mmrv"])
+            return self._with_ends(value, rank_violation_interval(*means, ties=self.ties), "t")
+
+        return replace(self._of_order(value, ends), more={"ties": ties_on_one_side(*means)})
+
+    def mean_violation(self) -> Estimate:
+        refused = self._no_order()
+        if refused:
+            return refused
+        means = (self.source.means, self.target.means)
+        value = mean_violation(*means, self.ties)
+
+        def ends() -> Estimate:
+            if value == 0:
+                why = "No pair is violated, so the spread of violations is unknown."
+                return Estimate(value, None, None, self.n, why)
+            return self._with_ends(value, mean_violation_interval(*means, ties=self.ties), "t")
+
+        return self._of_order(value, ends)
 
     def _no_halves(self) -> Estimate | None:
-        if self.fewest < 2:
-            return Estimate.refusal(
-                self.n, "One trial of each controller has no halves; at least 2 on both sides are needed."
-            )
-        return self._no_order()
+        if why := self._without_trials("there are no halves to compare"):
+            return Estimate.refusal(self.n, why)
+        return self._no_order(SMALLEST_N)
 
     def ceiling(self) -> Estimate:
         return self._no_halves() or self._estimate(
@@ -253,7 +343,8 @@ class _Work:
 
     def mmrv_floor(self) -> Estimate:
         return self._no_halves() or self._estimate(
-            float(rank_violation_floor(self.target.values[None], self.rng)[0]), self.drawn["floor"]
+            float(rank_violation_floor(self.target.values[None], self.rng, ties=self.ties)[0]),
+            self.drawn["floor"],
         )
 
     # behavior
@@ -318,8 +409,8 @@ def _within_one(value: float) -> float:
 
 
 def _srcc(source: Values, target: Values) -> Values:
-    return spearman(source.mean(axis=2), target.mean(axis=2))
+    return spearman(trial_means(source), trial_means(target))
 
 
-def _mmrv(source: Values, target: Values) -> Values:
-    return mean_maximum_rank_violation(source.mean(axis=2), target.mean(axis=2))
+def _pearson(source: Values, target: Values) -> Values:
+    return pearson(trial_means(source), trial_means(target))

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from typing import Literal, NamedTuple
 
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
 from realitygap.stats import CONFIDENCE, spearman
 
@@ -19,6 +21,13 @@ _BLOCK = 4_000_000
 
 Rng = np.random.Generator
 
+Ties = Literal["both", "simpler"]
+"""Counting of pairs that tie on one platform only: `both`, as violated for both controllers; `simpler`, as the code of
+SIMPLER does, for the one that is better on the other platform."""
+
+_DECIMALS = 12
+"""Means that differ only beyond this are equal, because sums of the same numbers in another order differ there."""
+
 
 def halves(values: Values, rng: Rng) -> tuple[Values, Values]:
     """Return the means of two random halves of the trials, floor(r / 2) each, (b, c).
@@ -28,12 +37,25 @@ def halves(values: Values, rng: Rng) -> tuple[Values, Values]:
         rng: Draws the halves, the same ones for all samples.
     """
     order = rng.permutation(values.shape[2])
+    if np.isnan(values[:, :, -1]).any():
+        return _ragged_halves(values[:, :, order])
     size = values.shape[2] // 2
     one, other = order[:size], order[size : 2 * size]
     return np.asarray(values[:, :, one].mean(axis=2)), np.asarray(values[:, :, other].mean(axis=2))
 
 
-def lengthened(correlation: Values, times: float) -> Values:
+def _ragged_halves(shuffled: Values) -> tuple[Values, Values]:
+    """Return the means of two halves of each controller's own trials, whose nan are anywhere, (b, c)."""
+    given = ~np.isnan(shuffled)
+    place, size = np.cumsum(given, axis=2), given.sum(axis=2) // 2
+    numbers = np.where(given, shuffled, 0.0)
+    ends = [
+        np.where(given & (place <= most[:, :, None]), numbers, 0.0).sum(axis=2) for most in (size, 2 * size)
+    ]
+    return ends[0] / size, (ends[1] - ends[0]) / size
+
+
+def lengthened(correlation: Values, times: float | Values) -> Values:
     """Return the reliability of a test that is longer by a factor.
 
     Source: Spearman (1910) and Brown (1910), British Journal of Psychology 3. Differs: 0 for a correlation below 0,
@@ -46,7 +68,8 @@ def lengthened(correlation: Values, times: float) -> Values:
 def reliability(values: Values, rng: Rng, splits: int = SPLITS) -> Values:
     """Return the reliability of the means of r trials: their rank correlation with those of new trials, 0 to 1, (b,).
 
-    The rank correlation between halves, mean of `splits` random ones, lengthened to r trials.
+    The rank correlation between halves, mean of `splits` random ones, lengthened to r trials. If numbers of trials
+    differ, it is lengthened by the mean factor of the controllers.
 
     Args:
         values: (b, c, r), r at least 2.
@@ -54,8 +77,11 @@ def reliability(values: Values, rng: Rng, splits: int = SPLITS) -> Values:
         splits: Number of random splits.
     """
     between = [spearman(*halves(values, rng)) for _ in range(splits)]
-    size = values.shape[2] // 2
-    return lengthened(np.nan_to_num(np.mean(between, axis=0)), values.shape[2] / size)
+    times: float | Values = values.shape[2] / (values.shape[2] // 2)
+    if np.isnan(values[:, :, -1]).any():
+        counts = (~np.isnan(values)).sum(axis=2)
+        times = np.asarray((counts / (counts // 2)).mean(axis=1))
+    return lengthened(np.nan_to_num(np.mean(between, axis=0)), times)
 
 
 def trials_for_reliability(observed: float, trials: int, wanted: float) -> int | None:
@@ -65,39 +91,126 @@ def trials_for_reliability(observed: float, trials: int, wanted: float) -> int |
     return int(np.ceil(trials * wanted * (1 - observed) / (observed * (1 - wanted)) - 1e-9))
 
 
-def mean_maximum_rank_violation(source: Values, target: Values) -> Values:
+def mean_maximum_rank_violation(source: Values, target: Values, ties: Ties = "both") -> Values:
     """Return the mean over controllers of the largest violation of the target's order, (b,).
 
-    For each controller i the largest `|target_i - target_j|` over all j with (source_i < source_j) differing from
-    (target_i < target_j); 0 where the simulator orders all as the target does. It is in the unit of the *target's*
-    quality, so the order of arguments matters.
+    For each controller i the largest `|target_i - target_j|` over all j that the two platforms order differently; 0 if
+    the simulator orders all as the target does. It is in the unit of the *target's* quality, so the order of arguments
+    matters.
 
     Args:
         source: (b, c) means in simulation.
         target: (b, c) means on the target.
+        ties: Counting of pairs that tie on one platform only.
 
     Source: Li et al. (2024), Evaluating Real-World Robot Manipulation Policies in Simulation (SIMPLER), section III.
+    Differs: a pair that ties on one platform only is violated for both controllers, so the sign of the score does not
+    matter. The paper writes <, its code >, which count such a pair for one controller only, and for different ones.
     """
     b, c = target.shape
     size = max(1, _BLOCK // (c * c))
     return np.concatenate(
-        [_of_block(source[first : first + size], target[first : first + size]) for first in range(0, b, size)]
+        [
+            _of_block(source[first : first + size], target[first : first + size], ties)
+            for first in range(0, b, size)
+        ]
     )
 
 
-def _of_block(source: Values, target: Values) -> Values:
-    return np.asarray(_violations(source, target).max(axis=2).mean(axis=1))
+def _of_block(source: Values, target: Values, ties: Ties) -> Values:
+    return np.asarray(_violations(source, target, ties).max(axis=2).mean(axis=1))
 
 
-def _violations(source: Values, target: Values) -> Values:
+def _violations(source: Values, target: Values, ties: Ties = "both") -> Values:
     """Return the difference on the target of two controllers that the simulator orders otherwise, or 0, (b, c, c)."""
-    violated = (source[:, :, None] < source[:, None, :]) != (target[:, :, None] < target[:, None, :])
+    violated = _is_above(source) != _is_above(target)
+    if ties == "both":
+        violated |= violated.swapaxes(1, 2)
     apart = np.abs(target[:, :, None] - target[:, None, :])
     return np.where(violated, apart, 0.0)
 
 
+def _is_above(values: Values) -> NDArray[np.bool_]:
+    """Return whether controller i is above controller j, (b, c, c)."""
+    rounded = values.round(_DECIMALS)
+    return np.asarray(rounded[:, :, None] > rounded[:, None, :])
+
+
+def ties_on_one_side(source: Values, target: Values) -> int:
+    """Return the number of pairs of controllers that tie on exactly one platform.
+
+    Args:
+        source: (c,) means in simulation.
+        target: (c,) means on the target.
+    """
+    tied = []
+    for values in (source, target):
+        above = _is_above(values[None])[0]
+        tied.append(~(above | above.T))
+    return int((tied[0] != tied[1]).sum()) // 2
+
+
+class WorstPair(NamedTuple):
+    """The two controllers that the platforms order differently and that are farthest apart on the target.
+
+    Attributes:
+        better: Index of the one that is better on the target.
+        worse: Index of the other one.
+        violation: Difference of their means on the target.
+    """
+
+    better: int
+    worse: int
+    violation: float
+
+
+def worst_pair(source: Values, target: Values, ties: Ties = "both") -> WorstPair | None:
+    """Return the pair of controllers with the largest violation; None if none is violated.
+
+    Args:
+        source: (c,) means in simulation.
+        target: (c,) means on the target.
+        ties: Counting of pairs that tie on one platform only.
+    """
+    violations = _violations(source[None], target[None], ties)[0]
+    pair = np.unravel_index(int(violations.argmax()), violations.shape)
+    worse, better = sorted(map(int, pair), key=lambda k: float(target[k]))
+    violation = float(violations.max())
+    return WorstPair(better, worse, violation) if violation > 0 else None
+
+
+def mean_violation(source: Values, target: Values, ties: Ties = "both") -> float:
+    """Return the mean over all pairs of controllers of the violation, which is 0 for pairs in the same order.
+
+    Unlike the mean of maxima, it does not grow with the number of controllers.
+
+    Args:
+        source: (c,) means in simulation.
+        target: (c,) means on the target.
+        ties: Counting of pairs that tie on one platform only.
+    """
+    c = len(target)
+    return float(_violations(source[None], target[None], ties).sum() / (c * (c - 1)))
+
+
+def mean_violation_interval(
+    source: Values, target: Values, confidence: float = CONFIDENCE, ties: Ties = "both"
+) -> tuple[float, float]:
+    """Return the t interval of a mean violation with the jackknife's standard error, from 0 to the range of means.
+
+    Source: Arvesen (1969), Annals of Mathematical Statistics 40(6), 2076-2100, for means over pairs.
+    """
+    c = len(target)
+    violations = _violations(source[None], target[None], ties)[0]
+    total = float(violations.sum())
+    left = (total - violations.sum(axis=0) - violations.sum(axis=1)) / ((c - 1) * (c - 2))
+    reach = float(scipy.special.stdtrit(c - 1, (1 + confidence) / 2)) * _jackknife_error(left)
+    value = total / (c * (c - 1))
+    return max(value - reach, 0.0), min(value + reach, float(np.ptp(target)))
+
+
 def rank_violation_interval(
-    source: Values, target: Values, confidence: float = CONFIDENCE
+    source: Values, target: Values, confidence: float = CONFIDENCE, ties: Ties = "both"
 ) -> tuple[float, float]:
     """Return the interval of a mean maximum rank violation above 0.
 
@@ -109,19 +222,24 @@ def rank_violation_interval(
         source: (c,) means in simulation.
         target: (c,) means on the target.
         confidence: Probability, between 0 and 1.
+        ties: Counting of pairs that tie on one platform only.
 
     Raises:
         ValueError: The violation is 0, which has no logarithm.
     """
-    violations = _violations(source[None], target[None])[0]
+    violations = _violations(source[None], target[None], ties)[0]
     value = float(violations.max(axis=1).mean())
     if value == 0:
         raise ValueError("The rank violation is 0, expected one above 0.")
-    c = len(source)
-    left = _left_out(violations)
-    error = math.sqrt((c - 1) / c * float(((left - left.mean()) ** 2).sum()))
-    factor = math.exp(float(scipy.special.stdtrit(c - 1, (1 + confidence) / 2)) * error / value)
+    error = _jackknife_error(_left_out(violations))
+    factor = math.exp(float(scipy.special.stdtrit(len(source) - 1, (1 + confidence) / 2)) * error / value)
     return value / factor, min(value * factor, float(np.ptp(target)))
+
+
+def _jackknife_error(left: Values) -> float:
+    """Return the standard error of a number from its values with each controller left out, (c,)."""
+    c = len(left)
+    return math.sqrt((c - 1) / c * float(((left - left.mean()) ** 2).sum()))
 
 
 def _left_out(violations: Values) -> Values:
@@ -133,13 +251,14 @@ def _left_out(violations: Values) -> Values:
     return np.asarray((first.sum() - first - less) / (c - 1))
 
 
-def rank_violation_floor(target: Values, rng: Rng, splits: int = SPLITS) -> Values:
+def rank_violation_floor(target: Values, rng: Rng, splits: int = SPLITS, ties: Ties = "both") -> Values:
     """Return the violation of one random half of the target's trials by the other, (b,), which noise alone causes.
 
     Args:
         target: (b, c, q), q at least 2.
         rng: Draws the halves.
         splits: Number of random splits, of which the mean is taken.
+        ties: Counting of pairs that tie in one half only.
     """
-    violations = [mean_maximum_rank_violation(*halves(target, rng)) for _ in range(splits)]
+    violations = [mean_maximum_rank_violation(*halves(target, rng), ties) for _ in range(splits)]
     return np.asarray(np.mean(violations, axis=0))

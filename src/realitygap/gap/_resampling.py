@@ -48,14 +48,14 @@ def resampled(
     noise's diagonal less. Smoothing: Silverman & Young (1987), Biometrika 74(3), 469-479.
     """
     latent = shrunk_means(source, target)
-    residuals = [_residuals(side) for side in (source, target)]
+    residuals = [(_residuals(side), side.n_trials) for side in (source, target)]
     n, size = source.n, source.values.size + target.values.size
     block = max(1, _BLOCK // size)
     for first in range(0, n_resamples, block):
         b = min(block, n_resamples - first)
         who = rng.integers(0, n, (b, n))
         means = _smoothed(latent[who], latent, rng) if smooth else latent[who]
-        drawn = [_drawn(residual, who, rng) for residual in residuals]
+        drawn = [_drawn(residual, counts, who, rng) for residual, counts in residuals]
         yield means[:, :, :1] + drawn[0], means[:, :, 1:] + drawn[1]
 
 
@@ -96,13 +96,23 @@ def _power(matrix: Values, exponent: float) -> Values:
 
 def _residuals(side: GapSide) -> Values:
     """Return the deviations of trials from their controller's mean, with the trials' variance, (c, r); 0 for one."""
-    if side.trials < 2:
+    if side.values.shape[1] < 2:
         return np.zeros_like(side.values)
-    return (side.values - side.means[:, None]) * math.sqrt(side.trials / (side.trials - 1))
+    deviations = side.values - side.means[:, None]
+    if side.n_trials:
+        return deviations * np.sqrt(side.counts / np.maximum(side.counts - 1, 1))[:, None]
+    return deviations * math.sqrt(side.trials / (side.trials - 1))
 
 
-def _drawn(residuals: Values, who: NDArray[np.int64], rng: np.random.Generator) -> Values:
+def _drawn(
+    residuals: Values, counts: tuple[int, ...], who: NDArray[np.int64], rng: np.random.Generator
+) -> Values:
+    """Return residuals drawn for each controller, (b, c, r); as many as it has trials, and nan after them."""
     r = residuals.shape[1]
+    if counts:
+        own = np.array(counts)[who][:, :, None]
+        drawn = residuals[who[:, :, None], rng.integers(0, own, (*who.shape, r))]
+        return np.where(np.arange(r) < own, drawn, np.nan)
     which = rng.integers(0, r, (*who.shape, r))
     return residuals[who[:, :, None], which]
 

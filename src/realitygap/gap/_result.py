@@ -47,6 +47,12 @@ SHOWN: tuple[Measure, ...] = (
         "root mean square over controllers of the difference in {score}, with noise subtracted",
     ),
     Measure(
+        "raw_rms",
+        "  noise not removed",
+        "Raw RMS",
+        "root mean square of the difference in {score}, noise not removed",
+    ),
+    Measure(
         "level",
         "level: target minus simulator",
         "Level",
@@ -63,6 +69,12 @@ SHOWN: tuple[Measure, ...] = (
         "rank correlation",
         "Rank correlation",
         "Spearman’s, over controllers, of the mean {score}",
+    ),
+    Measure(
+        "pearson",
+        "linear correlation",
+        "Linear correlation",
+        "Pearson’s, over controllers, of the mean {score}",
     ),
     Measure(
         "noise_ceiling",
@@ -82,6 +94,12 @@ SHOWN: tuple[Measure, ...] = (
         "  of the target by itself",
         "MMRV floor",
         "that of one half of the target’s trials by the other half",
+    ),
+    Measure(
+        "mean_violation",
+        "mean violation of pairs",
+        "Mean violation",
+        "mean over all pairs of controllers of the violation, in {score} on the target",
     ),
     Measure(
         "energy",
@@ -104,7 +122,7 @@ SHOWN: tuple[Measure, ...] = (
 )
 """All measures of a gap, in the order of tables."""
 
-_LATE = ("a12", "energy_ends")  # after the others in JSON
+_LATE = ("a12", "energy_ends", "raw_rms", "pearson", "mean_violation")  # after the others in JSON
 
 MEASURES = tuple(each.name for each in SHOWN if each.name not in _LATE)
 """Names of the measures that come first in JSON, each with estimate, low, high, and n."""
@@ -120,15 +138,19 @@ class GapResult(ShownAsCard):
         source: Name of the simulator.
         target: Name of the target.
         labels: Labels of both: SIM, TWIN, EMULATED or REAL.
-        trials: Number of trials of each controller on both.
+        trials: Number of trials of each controller on both; the fewest, if the numbers differ; 0 for means alone.
         rms: Root mean square over controllers of the difference of means, the variance of noise taken out.
+        raw_rms: The same with the noise.
         level: Mean over controllers of the difference of means.
         a12: Probability that a trial on the target is above one of the same controller in simulation.
         srcc: Spearman's correlation of means over controllers.
+        pearson: Pearson's correlation of means over controllers.
         srcc_disattenuated: The rank correlation divided by the noise ceiling.
         noise_ceiling: The correlation that noise alone leaves of a perfect one.
-        mmrv: Mean maximum rank violation of the simulator's order, in units of the target's quality.
+        mmrv: Mean maximum rank violation of the simulator's order, in units of the target's quality; `more` has the
+            number of pairs that tie on one platform only.
         mmrv_floor: The violation of one half of the target's trials by the other half.
+        mean_violation: Mean violation over all pairs of controllers.
         energy: Energy distance of behaviors (visited cells), mean over controllers; `more` has its p.
         equivalence: The level with the 90 % interval of TOST; `more` has margin, p and whether they are equivalent.
         energy_ends: Energy distance of the final positions of trials [m]; refused if they are unknown.
@@ -138,6 +160,8 @@ class GapResult(ShownAsCard):
             if there are none.
         notes: Notes on the result.
         score: Score of trials, with its unit, such as `distance along walls [m]`.
+        most_trials: Largest number of trials of a controller on both.
+        words: Both platforms in words. Default: derived from their names.
     """
 
     source: str
@@ -145,13 +169,16 @@ class GapResult(ShownAsCard):
     labels: tuple[str, str]
     trials: tuple[int, int]
     rms: Estimate
+    raw_rms: Estimate
     level: Estimate
     a12: Estimate
     srcc: Estimate
+    pearson: Estimate
     srcc_disattenuated: Estimate
     noise_ceiling: Estimate
     mmrv: Estimate
     mmrv_floor: Estimate
+    mean_violation: Estimate
     energy: Estimate
     equivalence: Estimate
     energy_ends: Estimate
@@ -160,6 +187,8 @@ class GapResult(ShownAsCard):
     reevolved: Estimate = field(default_factory=lambda: Estimate.refusal(0, "Nothing was evolved apart."))
     notes: tuple[str, ...] = ()
     score: str = COVERAGE
+    most_trials: tuple[int, int] = (0, 0)
+    words: tuple[str, str] = ("", "")
 
     def __repr__(self) -> str:
         n = f"n={self.rms.n}×{self.trials[1]}"
@@ -194,8 +223,15 @@ class GapResult(ShownAsCard):
     @property
     def _names(self) -> tuple[str, str]:
         """The simulator and the target in words."""
+        if all(self.words):
+            return self.words
         sim, target = map(platform_in_words, (self.source, self.target), self.labels)
         return sim, target
+
+    @property
+    def trials_in_words(self) -> str:
+        """The number of trials of each controller, such as `5 trials of each on both platforms`."""
+        return trials_each(self.trials, self.most_trials, self._names)
 
     @property
     def main_measures(self) -> list[tuple[str, str]]:

@@ -14,6 +14,7 @@ from ._mistakes import Diagnosis, Mistake, diagnose
 from ._open import KINDS, map_beside, open_source
 from ._range_table import RangeTable, read_range_table, round_robot
 from ._read import read_logs
+from ._scores import ScoreRow, read_scores
 from ._source import Batch, Source
 from ._table_map import MeasuredFrom, TableColumns, TableMap, load_table_map
 from ._write_bag import WHEEL_DIAMETER_MM, BagReport, write_bag
@@ -34,6 +35,7 @@ __all__ = [
     "Poses",
     "RangeTable",
     "Readings",
+    "ScoreRow",
     "Source",
     "TableColumns",
     "TableMap",
@@ -53,6 +55,7 @@ __all__ = [
     "open_source",
     "read_logs",
     "read_range_table",
+    "read_scores",
     "robot_of",
     "round_robot",
     "target_of",

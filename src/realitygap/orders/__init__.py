@@ -5,6 +5,7 @@ A command, a function, a form of the lab, the message to a worker, and the recor
 
 from ._calibrate import CalibrateOrder
 from ._close import CloseOrder
+from ._compare import CompareOrder
 from ._estimate import EstimateOrder
 from ._field import Limits, OrderField
 from ._function import takes_order, with_fields
@@ -22,6 +23,7 @@ __all__ = [
     "CalibrateOrder",
     "CloseOrder",
     "ClosingOrder",
+    "CompareOrder",
     "EstimateOrder",
     "GapOrder",
     "Limits",

@@ -13,6 +13,7 @@ from realitygap.errors import StudyError, did_you_mean
 
 from ._calibrate import CalibrateOrder
 from ._close import CloseOrder
+from ._compare import CompareOrder
 from ._estimate import EstimateOrder
 from ._gap import GapOrder
 from ._order import Order
@@ -26,6 +27,7 @@ ORDERS: dict[str, type[Order]] = {
         CloseOrder,
         ClosingOrder,
         EstimateOrder,
+        CompareOrder,
         GapOrder,
         PlanOrder,
         TransferOrder,
@@ -56,8 +58,10 @@ def read_order(path: str | Path) -> Order:
         )
     order = ORDERS[str(command)](**values)
     for field in order.fields():
-        if field.face.is_argument and str(getattr(order, field.name)).startswith("-"):  # would be an option
-            raise StudyError(f"{path}: {field.name} is {getattr(order, field.name)!r}, expected a name.")
+        value = getattr(order, field.name)
+        for part in value if field.is_list else (value,):
+            if field.face.is_argument and str(part).startswith("-"):  # would be an option
+                raise StudyError(f"{path}: {field.name} is {part!r}, expected a name.")
     return order
 
 

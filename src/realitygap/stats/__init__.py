@@ -5,7 +5,7 @@ when the first is used.
 """
 
 from ._assisted import FEW_UNITS, Assisted, assisted_mean, least_correlation
-from ._correlation import rank_correlation, spearman
+from ._correlation import pearson, rank_correlation, spearman
 from ._equivalence import prove_equivalence
 from ._estimate import CONFIDENCE, Ends, Estimate, Method
 from ._means import (
@@ -115,7 +115,8 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     "effect_of_a12",
     "a12_of_effect",
     "USUAL_EFFECTS",
-    # rank correlation
+    # correlation
+    "pearson",
     "rank_correlation",
     "spearman",
     # resampling

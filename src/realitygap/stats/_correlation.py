@@ -1,4 +1,4 @@
-"""Rank correlations, their interval, and the effect of noise on them."""
+"""Correlations, the interval of rank correlations, and the effect of noise on them."""
 
 from __future__ import annotations
 
@@ -21,7 +21,17 @@ def spearman(one: Values, other: Values) -> Values:
         other: (b, c); ties get their mean rank.
     """
     ranks = [scipy.stats.rankdata(values, axis=1) for values in (one, other)]
-    a, b = (rank - rank.mean(axis=1, keepdims=True) for rank in ranks)
+    return pearson(*ranks)
+
+
+def pearson(one: Values, other: Values) -> Values:
+    """Return Pearson's correlation of b pairs of samples, (b,); nan if all values of one sample are equal.
+
+    Args:
+        one: (b, c) and
+        other: (b, c) values.
+    """
+    a, b = (values - values.mean(axis=1, keepdims=True) for values in (one, other))
     with np.errstate(invalid="ignore", divide="ignore"):
         return np.asarray((a * b).sum(axis=1) / np.sqrt((a * a).sum(axis=1) * (b * b).sum(axis=1)))
 

@@ -62,7 +62,8 @@ class Estimate:
     @classmethod
     def of_few(cls, value: float, n: int, needed: int, noun: str = "values") -> Estimate:
         """Return a number without an interval, because n is below the smallest that gives one."""
-        refused = f"{n} {noun} are too few for an interval; at least {needed} are needed."
+        some = f"{n} {noun} are" if n != 1 else f"1 {noun.removesuffix('s')} is"
+        refused = f"{some} too few for an interval; at least {needed} are needed."
         return cls(value, None, None, n, refused, needed=needed)
 
     @property

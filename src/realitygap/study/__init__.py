@@ -16,6 +16,7 @@ from ._closing.rows import CalibratedRow, ClosingSummary, GoalRow, TwinRow
 from ._closing.study import ClosingProgress, closing_the_gap
 from ._closing.summary import summarize_closing
 from ._code import AllowCode, check_files, python_tasks, task_named
+from ._compare import ComparedScores, compare_scores
 from ._controllers import sample_controllers
 from ._duration import estimate_seconds
 from ._file import DEFAULT_NEAT, SECTIONS, load_study, named_studies, parse_study, platform_sections
@@ -61,6 +62,7 @@ __all__ = [
     "ClosingPlan",
     "ClosingProgress",
     "ClosingSummary",
+    "ComparedScores",
     "ConditionNotes",
     "EstimatedScore",
     "GapBetween",
@@ -89,6 +91,7 @@ __all__ = [
     "choose_condition",
     "close_gap",
     "closing_the_gap",
+    "compare_scores",
     "drive_study",
     "estimate_score",
     "estimate_seconds",

@@ -1,0 +1,115 @@
+"""The gap in a table of scores, as `realitygap compare` measures it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from realitygap._limits import is_file
+from realitygap.errors import TableError, did_you_mean
+from realitygap.gap import Comparison, ScoreGap
+from realitygap.gap import compare_scores as compare_rows
+from realitygap.logs import ScoreRow, read_scores
+from realitygap.orders import CompareOrder, takes_order
+
+_SIM, _REAL = "sim", "real"
+
+
+@dataclass(frozen=True)
+class ComparedScores:
+    """The gap between two platforms in a table of scores.
+
+    Attributes:
+        gaps: The gap of each task; one without tasks.
+        order: The order.
+    """
+
+    gaps: tuple[ScoreGap, ...]
+    order: CompareOrder
+
+    @property
+    def title(self) -> str:
+        """Both platforms in words."""
+        return self.gaps[0].result.title
+
+    @property
+    def common_reasons(self) -> list[str]:
+        """Reasons for missing numbers that are the same for all tasks."""
+        first, *others = (gap.reasons for gap in self.gaps)
+        return [reason for reason in first if all(reason in other for other in others)]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain values: the gap of each task."""
+        return {"tasks": [gap.to_dict() for gap in self.gaps]}
+
+
+@takes_order(CompareOrder)
+def compare_scores(order: CompareOrder) -> ComparedScores:
+    """Measure the gap between two platforms in a table of scores, as `realitygap compare`.
+
+    Raises:
+        TableError: A table cannot be read, or does not support a comparison. The message states the reason.
+    """
+    rows = [row for table in order.table for row in _read(table, order)]
+    if order.task is not None:
+        tasks = {row.task for row in rows}
+        if order.task not in tasks:
+            raise TableError(f"There is no task {order.task!r}. {did_you_mean(order.task, tasks - {''})}")
+        rows = [row for row in rows if row.task == order.task]
+    sim, real = _platforms(rows, order)
+    how = Comparison(
+        sim,
+        real,
+        labels=(order.sim_label, order.real_label),
+        score_range=order.ends,
+        score=order.score or ("success" if order.binary else "score"),
+        margin=order.margin,
+        shared=order.shared,
+        ties=order.ties,
+        is_binary=order.binary,
+        uses_blocks=not order.unpaired,
+        seed=order.seed,
+    )
+    return ComparedScores(tuple(compare_rows(rows, how)), order)
+
+
+def _read(table: str, order: CompareOrder) -> list[ScoreRow]:
+    platform, equals, path = table.partition("=")
+    if not equals or is_file(table):
+        platform, path = "", table
+    return read_scores(
+        Path(path), platform=platform, controller=order.controller or "", score=order.score or ""
+    )
+
+
+def _platforms(rows: Sequence[ScoreRow], order: CompareOrder) -> tuple[str, str]:
+    """Return the platform that predicts and the one that is predicted.
+
+    Raises:
+        TableError: The table does not have them, or it is open which ones they are.
+    """
+    names = list(dict.fromkeys(row.platform for row in rows))
+    if len(names) < 2:
+        raise TableError(
+            f"All scores are of the platform {names[0]}, expected two. Add those of the other one, in this table or in "
+            "another: NAME=FILE"
+        )
+    chosen = {"sim": order.sim, "real": order.real}
+    for option, name in chosen.items():
+        if name is not None and name not in names:
+            raise TableError(f"There is no platform {name!r} (--{option}). {did_you_mean(name, names)}")
+    for option, other, default in (("sim", "real", _SIM), ("real", "sim", _REAL)):
+        if chosen[option] is None and default in names and chosen[other] != default:
+            chosen[option] = default
+    for option, other in (("sim", "real"), ("real", "sim")):
+        if chosen[option] is None and chosen[other] is not None and len(names) == 2:
+            chosen[option] = next(name for name in names if name != chosen[other])
+    sim, real = chosen["sim"], chosen["real"]
+    if sim is None or real is None:
+        raise TableError(
+            f"The platforms are {', '.join(names)}. Name the one that predicts (--sim) and the one that is predicted "
+            "(--real)."
+        )
+    return sim, real

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:  # the help of a command needs no NumPy
-    from realitygap.stats import Ends, Estimate
+    from realitygap.stats import Ends, Estimate, Forecast, Null, SequentialVerdict
 
 
 @dataclass(frozen=True)
@@ -497,6 +497,106 @@ def ties_in_words(n: int, ties: str) -> str:
 def reproduces(is_misspecified: bool) -> str:
     """Return whether a simulator can reproduce the observations of its calibration, as a sentence."""
     return f"The simulator {'cannot' if is_misspecified else 'can'} reproduce the observations of its calibration."
+
+
+PLANNED_LOOKS = {
+    "planned": "The comparison was stored before trial 1.",
+    "changed": "The comparison was changed after trial 1. These figures are those of the present plan, and are valid "
+    "only if the trials so far did not lead to the change.",
+    "unplanned": "Nobody planned these looks in advance. The figures are valid at any look if these trials did not "
+    "decide what is compared, and by which score and test.",
+}
+"""What a look rests on, as sentences: whether the comparison was stored before the first trial."""
+
+MULTIPLE_LOOKS = "The error rate and E are corrected for {n} comparisons."
+"""Note on several comparisons."""
+
+
+def look_figures(
+    first: str, second: str, n: int, unit: str, shift: Estimate, e: float, needed: float, fewest: int
+) -> str:
+    """Return the figures of a sequential test after n pairs, as a sentence.
+
+    Args:
+        first, second: The two that are compared.
+        n: Number of pairs.
+        unit: Noun for a pair.
+        shift: Mean difference, first minus second, with its anytime-valid interval.
+        e: E of the test.
+        needed: Value of E that shows a difference.
+        fewest: Smallest number of pairs with an interval.
+    """
+    pairs = counted(n, unit)
+    if shift.value is None:
+        return f"{first} and {second}: no complete {unit} yet."
+    if shift.ends is None:
+        return f"{pairs}: {first} − {second} is {number(shift.value)}. {shift.refused}"
+    size = fixed(e, 1) if e < 1000 else significant(e, 2)
+    difference = with_interval(shift, signs=True) if n >= fewest else signed(shift.value)
+    return f"{pairs}: {first} − {second} is {difference}, E = {size} ({needed:.0f} shows a difference)."
+
+
+def look_verdict(
+    first: str,
+    second: str,
+    verdict: SequentialVerdict,
+    margin: float | None,
+    claimed_at: int | None = None,
+    *,
+    are_platforms: bool = False,
+) -> str:
+    """Return what a sequential test shows, as a sentence.
+
+    Args:
+        first, second: The two that are compared.
+        verdict: The result.
+        margin: Margin of equivalence.
+        claimed_at: Number of pairs after which a difference was shown.
+        are_platforms: True if two platforms are compared, of which neither is better.
+    """
+    if verdict == "equivalent":
+        return f"Stop: {first} and {second} are equivalent within ±{margin:g}."
+    if verdict == "open":
+        return "Not shown yet. You may stop at any time."
+    better, worse = (first, second) if verdict == "higher" else (second, first)
+    since = "" if claimed_at is None else f", shown at number {claimed_at}"
+    if are_platforms:
+        return f"Stop: scores are higher on {better} than on {worse}{since}."
+    return f"Stop: {better} is better than {worse}{since}."
+
+
+def pairs_forecast(forecast: Forecast | None, n: int, unit: str, fewest: int, maximum: int | None) -> str:
+    """Return how many more pairs a comparison may need, as a sentence that calls it a forecast.
+
+    Args:
+        forecast: The forecast, if there is one.
+        n: Number of pairs so far.
+        unit: Noun for a pair.
+        fewest: Smallest number of pairs after which a claim is possible.
+        maximum: Maximum number of pairs that is planned.
+    """
+    if maximum is not None and n >= maximum:
+        return f"The planned maximum of {counted(maximum, unit)} is reached."
+    if forecast is None:
+        return f"A claim needs at least {counted(fewest, unit)}." if n < fewest else ""
+    if forecast.more is None:
+        return f"Forecast: probably no result by {counted(forecast.maximum, unit)}."
+    limit = (
+        f"80 %: at most {forecast.quantile:,}"
+        if forecast.quantile is not None
+        else f"{100 * (1 - forecast.ended):.0f} %: none by {forecast.maximum:,}"
+    )
+    return f"Forecast, if later {unit}s are like these: about {forecast.more:,} more ({limit})."
+
+
+def distribution_caveat(null: Null) -> str:
+    """Return the limit of a sequential test, as sentences: which hypothesis it refutes."""
+    if null == "mean":
+        return "The hypothesis is that both have the same mean score."
+    return (
+        "The hypothesis is that both have the same distribution of scores. It is also false if the means are equal and "
+        "the spreads or shapes differ. `realitygap trials advise --null mean` tests the means alone, with more pairs."
+    )
 
 
 FEW_RUNS = "[few runs]"

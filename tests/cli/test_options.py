@@ -94,6 +94,7 @@ PRINTED_BY = {
     "study/_task.py": ("bench",),
     "study/_tracked.py": ("track",),
     "study/_kept_target.py": ("calibrate", "gap", "transfer", "try"),
+    "study/_try_pairs.py": ("try",),
     "tasks/_python.py": ("drive", "gap", "lab", "plan", "run", "try"),
     "vision/_ros_map.py": ("arena",),
     "vision/_sheet_trials.py": ("score",),

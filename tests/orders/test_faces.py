@@ -54,7 +54,10 @@ WITH = {
     "gap": {},
     "plan": {"margin": {"effect": None}, "correlation": {"effect": None, "correlation": 0.9}},
     "transfer": {},
-    "try": {},
+    "try": {
+        name: {"against": "other.json", "trials": 40, "out": "pairs.sqlite"}
+        for name in ("against", "margin", "null")
+    },
 }
 """Values that a field needs with it."""
 

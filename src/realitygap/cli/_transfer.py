@@ -19,6 +19,7 @@ from ._results import show_page
 
 if TYPE_CHECKING:
     from realitygap.study import ClosingProgress, ClosingSummary, TransferResult
+    from realitygap.trials import PortObserver
 
 
 @command_of(TryOrder)
@@ -27,8 +28,11 @@ def try_genome(
     allow_code: AllowPlatforms = False,
     as_json: Json = False,
 ) -> None:
-    """Drive the trials, and print the coverage."""
+    """Drive the trials, and print the coverage, or what is shown of two controllers."""
     observer = attending_observer(order.on, order.witness)
+    if order.against is not None:
+        _try_pairs(order, observer, as_json=as_json)
+        return
     tried = realitygap.study.try_genome(order, observer=observer)
     coverage = tried.coverage
     mean = statistics.fmean(coverage)
@@ -40,6 +44,20 @@ def try_genome(
         f"{tried.target} ({tried.label}): {len(coverage)} trial{'s' if len(coverage) > 1 else ''}, mean coverage "
         f"{mean:.3f} of {tried.n_cells} cells: {' '.join(f'{value:.3f}' for value in coverage)}"
     )
+
+
+def _try_pairs(order: TryOrder, observer: PortObserver | None, *, as_json: bool) -> None:
+    with resumable(f"All trials are in {order.out}."):
+        tried = realitygap.study.try_pairs(
+            order, observer=observer, tell=lambda advice: echo(advice.line, err=True)
+        )
+    if as_json:
+        about = {"target": tried.target, "label": tried.label, "file": tried.file}
+        print_json(about | tried.advice.to_dict() | {"order": order.record()})
+        return
+    echo(f"{tried.target} ({tried.label}), {tried.advice.score}, in {tried.file}")
+    for sentence in tried.advice.sentences:
+        echo(sentence)
 
 
 @command_of(TransferOrder)

@@ -30,11 +30,12 @@ from ._tables import wide_console
 
 if TYPE_CHECKING:
     from realitygap.records import Ledger, ScoreRole, Trial
+    from realitygap.stats import Null
     from realitygap.world import Arena
 
-_WHAT = ("list", "show", "score", "undo", "void", "note", "export", "agreement")
+_WHAT = ("list", "show", "score", "undo", "void", "note", "export", "agreement", "advise")
 _READING = ("list", "show", "export", "agreement")
-_PRINTING = ("list", "show", "agreement")
+_PRINTING = ("list", "show", "agreement", "advise")
 """Actions that change nothing."""
 
 
@@ -45,7 +46,7 @@ def trials(
     what: Annotated[
         str,
         typer.Argument(
-            metavar="WHAT", help="Action: list, show, score, undo, void, note, export or agreement."
+            metavar="WHAT", help="Action: list, show, score, undo, void, note, export, agreement or advise."
         ),
     ],
     source: Annotated[
@@ -82,6 +83,22 @@ def trials(
         ),
     ] = None,
     out: Annotated[Path | None, export_option("Only for export")] = None,
+    margin: Annotated[
+        float | None,
+        typer.Option(
+            metavar="M",
+            help="Largest difference that counts as equivalent. [default: from the plan]",
+            rich_help_panel="Only for advise",
+        ),
+    ] = None,
+    null: Annotated[
+        str | None,
+        typer.Option(
+            metavar="WHICH",
+            help="Hypothesis of the test: distribution or mean. [default: from the plan, or distribution]",
+            rich_help_panel="Only for advise",
+        ),
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """List, show, score, annotate, and export trials.
@@ -96,6 +113,9 @@ def trials(
 
     When the command that saved the trials resumes, it uses the new cells, and drives void trials again. If you remove
     a score without a new one, the command asks for it.
+
+    advise prints what the trials so far show of two that are compared: controllers, conditions, strategies, or
+    platforms. You may look after each pair, and stop at any time. TRIALS may also be the folder of a transfer.
 
     Example: realitygap trials list results/paper-robot
 
@@ -113,6 +133,8 @@ def trials(
 
     Example: realitygap trials agreement results/paper-robot
 
+    Example: realitygap trials advise pairs.sqlite --margin 0.05
+
     In Python: realitygap.records.Ledger.open("results/paper-robot/ledger.sqlite").trials()
     """
     if what not in _WHAT:
@@ -129,6 +151,11 @@ def trials(
         raise StudyError(f"--json is only for {', '.join(_PRINTING)}, not for {what}. Leave it out.")
     if out is not None and what != "export":
         raise StudyError(f"--out is only for export, not for {what}. Leave it out.")
+    if what != "advise" and (margin is not None or null is not None):
+        raise StudyError(f"--margin and --null are only for advise, not for {what}. Leave them out.")
+    if what == "advise":
+        _advise(source, margin, null, as_json=as_json)
+        return
     name = who or getpass.getuser()
     with realitygap.records.open_ledger(source, writable=what not in _READING) as opened:
         if what == "list":
@@ -370,6 +397,20 @@ def _hidden(opened: Ledger) -> set[int]:
     if not _Titles(opened).blind:
         return set()
     return {trial.trial for trial in opened.trials() if not trial.is_closed}
+
+
+def _advise(source: Path, margin: float | None, null: str | None, *, as_json: bool) -> None:
+    if margin is not None and not (math.isfinite(margin) and margin > 0):
+        raise StudyError(f"--margin is {margin}, expected a number above 0, such as 0.05.")
+    hypothesis: Null | None = "mean" if null == "mean" else "distribution" if null == "distribution" else None
+    if null is not None and hypothesis is None:
+        raise StudyError(f"--null is {null!r}, expected distribution or mean.")
+    advice = realitygap.study.advise(source, margin=margin, null=hypothesis)
+    if as_json:
+        print_json(advice.to_dict())
+        return
+    for sentence in advice.sentences:
+        echo(sentence)
 
 
 def _agreement(source: Path, *, as_json: bool) -> None:

@@ -14,6 +14,11 @@ from ._field import argument, option
 from ._order import Order
 from ._shared import Processes, Seed, Witness, arena_option, folder_option, seed_option
 
+ONLY_PAIRS = "Only to compare two controllers"
+
+FEWEST_PAIRS = 6
+"""Pairs below which a test at 5 % can show nothing: each of them at most doubles E/2, which begins at 1/2."""
+
 
 class TryOrder(Order):
     """Drive one exported controller on any platform.
@@ -21,7 +26,14 @@ class TryOrder(Order):
     The command prints how much of the arena the controller covers. A controller can drive in simulation, on a twin, and
     on a real or emulated robot, if the platform has its inputs.
 
+    With --against, the command compares two controllers in pairs of trials, and a coin decides which of them goes
+    first. It prints what is shown after each pair, and ends as soon as a difference or equivalence is shown, or after
+    --trials pairs. The plan is stored before trial 1, so looking costs nothing. `realitygap trials advise` prints the
+    result again.
+
     Example: realitygap try champion.json --on twin:worn-1.toml --trials 20
+
+    Example: realitygap try one.json --against two.json --on emulator://s2 --trials 40 -o pairs.sqlite
 
     In Python: realitygap.study.try_genome("champion.json", on="twin:worn-1.toml", trials=20)
     """
@@ -36,8 +48,31 @@ class TryOrder(Order):
         metavar="PLATFORM",
         refers="platform",
     )
-    trials: int = option(1, help="Number of trials.", at_least=1, at_most=9999)
+    trials: int = option(
+        1, help="Number of trials. With --against, maximum number of pairs.", at_least=1, at_most=9999
+    )
     steps: int = option(100, help="Number of commands per trial.", at_least=1)
+    against: Path | None = option(
+        None,
+        help="Genome of a second controller, to compare both.",
+        metavar="GENOME",
+        refers="file",
+        panel=ONLY_PAIRS,
+    )
+    margin: float | None = option(
+        None,
+        help="Largest difference in coverage that counts as equivalent, such as 0.05.",
+        above=0,
+        metavar="M",
+        panel=ONLY_PAIRS,
+    )
+    null: Literal["distribution", "mean"] = option(
+        "distribution",
+        help="Hypothesis to refute: that both have the same distribution of coverage, or the same mean, which needs "
+        "more pairs.",
+        metavar="WHICH",
+        panel=ONLY_PAIRS,
+    )
     observe: Literal["readings", "cells", "encoders", "track"] = option(
         "cells", help="Observation level: cells, encoders or track.", metavar="HOW"
     )
@@ -59,6 +94,19 @@ class TryOrder(Order):
         names=("-o", "--out"),
         is_output=True,
     )
+
+    def conflicts(self) -> Iterator[tuple[str, str]]:
+        """Yield the field and the message for each setting that others exclude."""
+        if self.against is None:
+            if self.margin is not None or self.null != "distribution":
+                yield "against", "--margin and --null need a second controller (--against GENOME)."
+            return
+        if self.trials < FEWEST_PAIRS:
+            yield (
+                "trials",
+                f"--trials is {self.trials}, expected at least {FEWEST_PAIRS} pairs with --against: fewer can show "
+                "nothing. For example: --trials 40",
+            )
 
 
 class TransferOrder(Order):

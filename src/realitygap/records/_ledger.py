@@ -16,6 +16,7 @@ from realitygap.records._ending import UNDER_WAY, EndReason, is_taken_back, is_w
 from realitygap.records._ledger_file import create_file, speaking
 from realitygap.records._ledger_kinds import (
     OBSERVER,
+    PLAN_EVENT,
     ROBOT,
     Generation,
     Score,
@@ -120,6 +121,23 @@ class Ledger(LedgerReader):
         """
         with self._writing():
             self._append(trial, _now())
+
+    # a comparison
+
+    def plan_comparison(self, plan: Mapping[str, Any]) -> None:
+        """Store how trials will be compared, as an event; nothing if the last such plan is the same.
+
+        A plan that differs from an earlier one is added to it. `comparison` reports whether the plans were stored
+        before the first trial.
+        """
+        last = self._one("SELECT details FROM events WHERE what = ? ORDER BY id DESC LIMIT 1", PLAN_EVENT)
+        if last is not None and self._value(last["details"]) == json.loads(_json(plan)):
+            return
+        with self._writing():
+            self._run(
+                "INSERT INTO events (time, trial, what, details) VALUES (?, NULL, ?, ?)",
+                *(_now(), PLAN_EVENT, _json(plan)),
+            )
 
     # conditions and sittings
 

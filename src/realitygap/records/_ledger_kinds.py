@@ -127,6 +127,23 @@ class PhotoCount:
     is_confirmed: bool
 
 
+PLAN_EVENT = "comparison planned"
+"""Event that has the plan of a comparison."""
+
+
+@dataclass(frozen=True)
+class PlannedComparison:
+    """The plan of a comparison, as the ledger has it.
+
+    Attributes:
+        plan: The last plan.
+        first: The plan that was stored before the first trial; None if there was none.
+    """
+
+    plan: Mapping[str, Any]
+    first: Mapping[str, Any] | None
+
+
 PATH_PARTS = 4
 """Number of parts of a step in a stored path, so that arcs look like arcs."""
 

@@ -18,6 +18,8 @@ from realitygap.records._ending import UNDER_WAY, EndReason
 from realitygap.records._ledger_file import connect, speaking
 from realitygap.records._ledger_kinds import (
     PATH_PARTS,
+    PLAN_EVENT,
+    PlannedComparison,
     Score,
     Trial,
     TrialState,
@@ -295,6 +297,17 @@ class LedgerReader(ClosedOnExit, ShownAsCard):
     def events(self) -> list[dict[str, Any]]:
         """Return everything that changed a trial, oldest first."""
         return [self._decoded(row, "details") for row in self._all("SELECT * FROM events ORDER BY id")]
+
+    def comparison(self) -> PlannedComparison | None:
+        """Return the plan of a comparison, and the plan of before the first trial; None without a plan."""
+        rows = self._all("SELECT id, details FROM events WHERE what = ? ORDER BY id", PLAN_EVENT)
+        if not rows:
+            return None
+        begun = self._one("SELECT min(id) AS id FROM events WHERE what = 'running'")
+        first_trial = None if begun is None else begun["id"]
+        before = [row for row in rows if first_trial is None or row["id"] < first_trial]
+        first = self._value(before[-1]["details"]) if before else None
+        return PlannedComparison(self._value(rows[-1]["details"]), first)
 
     def used_codes(self) -> set[str]:
         """Return the codes that are names of trials."""

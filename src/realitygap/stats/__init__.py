@@ -56,6 +56,7 @@ from ._resampling import (
     share_above,
 )
 from ._sequential import (
+    BINARY_LAMBDAS,
     LAMBDAS,
     Look,
     Null,
@@ -148,6 +149,7 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     "Null",
     "SequentialVerdict",
     "LAMBDAS",
+    "BINARY_LAMBDAS",
     "betting_mean",
     "e_holm",
     "mean_e",

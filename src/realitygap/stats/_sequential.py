@@ -20,6 +20,9 @@ from ._permutation import ALPHA
 LAMBDAS = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0)
 """Stakes of the sign-symmetric bets, for scores in [0, 1]. Their mean needs no knowledge of the spread."""
 
+BINARY_LAMBDAS = tuple(round(math.atanh(part / 20), 6) for part in range(1, 20))
+"""Stakes for successes and failures, whose differences are -1, 0, and 1: bets of 5 %, 10 %, ..., 95 %."""
+
 Null = Literal["distribution", "mean"]
 """The hypothesis: that both have the same distribution of scores, or the same mean."""
 
@@ -52,7 +55,7 @@ class SequentialTest:
             so that a difference and its negative are equally likely. `mean`: bounded betting. Its hypothesis is that
             the differences have mean 0. It needs more pairs if scores vary little.
         margin: Margin of equivalence; None to test no equivalence.
-        lambdas: Stakes of the sign-symmetric bets.
+        lambdas: Stakes of the sign-symmetric bets. Take `BINARY_LAMBDAS` if all scores are 0 or 1.
 
     Raises:
         ValueError: A setting is out of range.

@@ -3,6 +3,7 @@
 from realitygap.platforms import open_target
 
 from . import _cards  # noqa: F401  # what notebooks show
+from ._advise import Advice, Advised, Planned, advise_on
 from ._bench import measure_speed
 from ._calibrate.from_log import calibrate_from_log
 from ._calibrate.from_table import calibrate_from_table
@@ -26,6 +27,7 @@ from ._gap.plan import GapPlan, plan_gap, recorded_spreads
 from ._gap.study import MOST_CONTROLLERS, GapStudy, ShownTrials
 from ._kept_target import StoppedByPerson
 from ._mazes import MAZE_SEEDS, measure_maze
+from ._paired import advise
 from ._physical import physical_conditions
 from ._placing import parse_length, placing_words, with_ruled_end
 from ._problems import StudyFileError
@@ -48,6 +50,7 @@ from ._transfer.result import TransferResult
 from ._transfer.strategies import choose_condition, transfer
 from ._trial_export import export_trials, write_trials
 from ._try_on import try_genome, try_on
+from ._try_pairs import TriedPairs, try_pairs
 
 __all__ = [
     "DEFAULT_NEAT",
@@ -55,6 +58,8 @@ __all__ = [
     "MOST_CONTROLLERS",
     "PLANS",
     "SECTIONS",
+    "Advice",
+    "Advised",
     "AllowCode",
     "CalibratedRow",
     "CameraObserver",
@@ -69,6 +74,7 @@ __all__ = [
     "GapPlan",
     "GapStudy",
     "GoalRow",
+    "Planned",
     "Progress",
     "ReportSection",
     "ShownTrials",
@@ -81,7 +87,10 @@ __all__ = [
     "TransferResult",
     "TrialToTrack",
     "TrialsSection",
+    "TriedPairs",
     "TwinRow",
+    "advise",
+    "advise_on",
     "calibrate",
     "calibrate_all",
     "calibrate_from_log",
@@ -133,6 +142,7 @@ __all__ = [
     "trial_of_ledger",
     "try_genome",
     "try_on",
+    "try_pairs",
     "with_ruled_end",
     "write_trials",
 ]

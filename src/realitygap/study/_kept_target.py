@@ -128,6 +128,11 @@ class KeptTarget(ClosedOnExit):
         self._refuse_lost(sum(key not in self._saved for key in keys))
         return [self._saved[key] for key in keys]
 
+    def read_again(self) -> None:
+        """Take note of what was scored or declared void in the file meanwhile."""
+        if self._file is not None:
+            self._read(self._file)
+
     def _read(self, file: Ledger) -> None:
         """Take note of the trials that count, and of those that were under way."""
         observations = file.observations()

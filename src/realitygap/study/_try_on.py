@@ -84,16 +84,7 @@ def try_genome(order: TryOrder, *, observer: PortObserver | None = None) -> Trie
         RecordError: The file is of another controller or target, or cannot be written.
         RobotError: The robot failed; what is in the file is safe.
     """
-    if order.genome.is_dir():
-        raise StudyError(
-            f"{order.genome} is a folder, expected a genome. Export one: realitygap export "
-            f"{shlex.quote(str(order.genome))} -o champion.json"
-        )
-    genome = Genome.load(order.genome)
-    if order.inputs is not None or order.outputs is not None:
-        inputs = genome.interface.inputs if order.inputs is None else _names(order.inputs)
-        outputs = OUTPUTS if order.outputs is None else _names(order.outputs)
-        genome = genome.with_interface(ControllerInterface(inputs, outputs))
+    genome = genome_of(order.genome, order)
     arena = load_arena(order.arena)
     with open_target(order.on, arena, witness=order.witness, observer=observer, key=order.seed) as target:
         trials = try_on(
@@ -105,6 +96,25 @@ def try_genome(order: TryOrder, *, observer: PortObserver | None = None) -> Trie
             out=order.out,
         )
         return TriedGenome(target.name, target.label, target.arena.grid.n_cells, trials)
+
+
+def genome_of(path: Path, order: TryOrder) -> Genome:
+    """Return the controller in a file, with the inputs and outputs of the order.
+
+    Raises:
+        StudyError: It is a folder, or no controller.
+    """
+    if path.is_dir():
+        raise StudyError(
+            f"{path} is a folder, expected a genome. Export one: realitygap export {shlex.quote(str(path))} -o "
+            "champion.json"
+        )
+    genome = Genome.load(path)
+    if order.inputs is None and order.outputs is None:
+        return genome
+    inputs = genome.interface.inputs if order.inputs is None else _names(order.inputs)
+    outputs = OUTPUTS if order.outputs is None else _names(order.outputs)
+    return genome.with_interface(ControllerInterface(inputs, outputs))
 
 
 def _names(text: str) -> tuple[str, ...]:

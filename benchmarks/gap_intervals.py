@@ -2,11 +2,12 @@
 
     python benchmarks/gap_intervals.py rms mmrv plan --out docs/data
     python benchmarks/gap_intervals.py printed --studies 200
+    python benchmarks/gap_intervals.py coverage --studies 2000 --out docs/data
 
 `rms` and `mmrv`: how often the upper end of the 95 % interval is below the truth, and the lower end above it; both
 should be 2.5 %. `plan`: how often a study of the size that `realitygap plan --correlation` names shows it, by the rule
-of the plan. `printed`: the same by the interval that `realitygap gap` prints, a second a study. Writes a table of each,
-`gap-NAME.csv`. Seeds are fixed.
+of the plan. `printed`: the same by the interval that `realitygap gap` prints. `coverage`: how often the interval of
+each measure holds the truth, in 12 designs. Writes a table of each, `gap-NAME.csv`. Seeds are fixed.
 """
 
 from __future__ import annotations
@@ -44,6 +45,14 @@ BETWEEN, NOISE = 0.1, 0.08
 
 FAILING = 0.15
 """Share of the controllers that have a gap, where few have one."""
+
+
+COVERED_RESAMPLES = 1_000
+MANY = 200_000
+"""Controllers by which the truth of a measure is computed."""
+
+ENDS = 0.1
+"""Standard deviations of the final positions of a controller's trials, and of their shift over controllers [m]."""
 
 
 class Setting(NamedTuple):
@@ -88,6 +97,9 @@ SETTINGS = (
     Setting(30, 20, 20, -0.1, 0.1, "cells"),
 )
 
+COVERED = tuple(SETTINGS[k] for k in (0, 3, 4, 5, 6, 7, 9, 16, 19, 21, 23, 24))
+"""The designs of the table of coverage."""
+
 PLANS = ((0.9, 0.7, 0.8, 10), (0.9, 0.5, 0.8, 5), (0.8, 0.3, 0.9, 5))
 """Correlation, at least, reliability of both sides' means, trials of each controller."""
 
@@ -110,14 +122,7 @@ def qualities(setting: Setting, shape: tuple[int, ...], rng: np.random.Generator
 
 def study(setting: Setting, rng: np.random.Generator) -> tuple[Values, Values]:
     """Return the trials of one study: (c, r) in simulation and (c, q) on the target."""
-    sides = qualities(setting, (setting.controllers, 1), rng)
-    sizes = [(setting.controllers, n) for n in (setting.in_simulation, setting.on_target)]
-    if setting.shape == "cells":
-        source, target = (
-            rng.binomial(CELLS, side, size) / CELLS for side, size in zip(sides, sizes, strict=True)
-        )
-    else:
-        source, target = (side + rng.normal(0, NOISE, size) for side, size in zip(sides, sizes, strict=True))
+    source, target = trials_of(setting, qualities(setting, (setting.controllers, 1), rng), rng)
     return source, target
 
 
@@ -234,12 +239,105 @@ def printed(studies: int) -> Iterator[list[str]]:
         yield [*row, *(f"{each:.3f}" for each in shares)]
 
 
+def trials_of(setting: Setting, sides: tuple[Values, Values], rng: np.random.Generator) -> list[Values]:
+    """Return trials of controllers with these true qualities, (c, r) in simulation and (c, q) on the target."""
+    sizes = [(len(sides[0]), n) for n in (setting.in_simulation, setting.on_target)]
+    if setting.shape == "cells":
+        return [rng.binomial(CELLS, side, size) / CELLS for side, size in zip(sides, sizes, strict=True)]
+    return [side + rng.normal(0, NOISE, size) for side, size in zip(sides, sizes, strict=True)]
+
+
+def ends_of(setting: Setting, n: int, sizes: tuple[int, int], rng: np.random.Generator) -> list[Values]:
+    """Return the final positions of trials of n controllers on both sides, (n, r, 2) and (n, q, 2)."""
+    shift = rng.normal(0, ENDS, (n, 1, 2)) * (setting.level != 0 or setting.spread != 0)
+    places = rng.normal(0, 1, (n, 1, 2))
+    return [
+        at + rng.normal(0, ENDS, (n, r, 2)) for at, r in zip((places, places + shift), sizes, strict=True)
+    ]
+
+
+def correlation(one: Values, other: Values) -> float:
+    """Return Spearman's correlation."""
+    return float(stats.spearmanr(one, other).statistic)
+
+
+def true_ceiling(setting: Setting, rng: np.random.Generator) -> float:
+    """Return the noise ceiling of as many controllers: means of trials against those of new trials."""
+    repeats = []
+    for _ in range(STUDIES):
+        sides = qualities(setting, (setting.controllers, 1), rng)
+        pairs = zip(*(trials_of(setting, sides, rng) for _ in range(2)), strict=True)
+        repeats.append([correlation(*(trials.mean(axis=1) for trials in pair)) for pair in pairs])
+    return math.sqrt(math.prod(np.nanmean(repeats, axis=0)))
+
+
+def truths(setting: Setting, rng: np.random.Generator) -> dict[str, float]:
+    """Return the truth of each measure, of many controllers or, if it depends on their number, of as many."""
+    sides = qualities(setting, (MANY, 1), rng)
+    one = trials_of(setting, sides, rng)
+    means = [side.mean(axis=1) for side in one]
+    single = [side[:, 0] for side in one]
+    above = (single[1] > single[0]).mean() + (single[1] == single[0]).mean() / 2
+    studies = [study(setting, rng) for _ in range(STUDIES)]
+    halves = [np.array_split(rng.permuted(target, axis=1), 2, axis=1) for _, target in studies]
+    size = setting.on_target // 2
+    floors = [violation(first[None, :, :size], second[None, :, :size])[0] for first, second in halves]
+    (x, also_x), (y, also_y) = (side.swapaxes(0, 1) for side in ends_of(setting, MANY, (2, 2), rng))
+    apart, within, also_within = (
+        float(np.linalg.norm(one - other, axis=1).mean()) for one, other in ((x, y), (x, also_x), (y, also_y))
+    )
+    level = float((sides[1] - sides[0]).mean())
+    return {
+        "level": level,
+        "rms": true_rms(setting, rng),
+        "a12": float(above),
+        "srcc": correlation(*means),
+        "srcc_disattenuated": correlation(*(side[:, 0] for side in sides)),
+        "noise_ceiling": true_ceiling(setting, rng),
+        "mmrv": float(np.mean([violation(source[None], target[None]) for source, target in studies])),
+        "mmrv_floor": float(np.mean(floors)),
+        "energy_ends": 2 * apart - within - also_within,
+        "equivalence": level,
+    }
+
+
+def coverage(studies: int) -> Iterator[list[str]]:
+    """Yield the rows of a table of coverage, head first: how often the interval of each measure holds the truth."""
+    yield [
+        "controllers", "trials in simulation", "on the target", "level", "spread", "differences", "measure", "truth",
+        "refused [%]", "holds the truth [%]", "upper end misses [%]", "lower end misses [%]",
+    ]  # fmt: skip
+    for number, setting in enumerate(COVERED):
+        rng = np.random.default_rng([19, number])
+        true = truths(setting, rng)
+        found: dict[str, list[Ends]] = {name: [] for name in true}
+        for _ in range(studies):
+            ends = ends_of(setting, setting.controllers, setting[1:3], rng)
+            sides = [
+                GapSide(name, "SIM", values, ends=places)
+                for name, values, places in zip(("sim", "target"), study(setting, rng), ends, strict=True)
+            ]
+            result = measure_gap(*sides, margin=0.05, resamples=COVERED_RESAMPLES)
+            for name, kept in found.items():
+                if (interval := getattr(result, name).ends) is not None:
+                    kept.append(interval)
+        head = [str(each) for each in setting[:3]] + [f"{each:g}" for each in setting[3:5]] + [setting.shape]
+        for name, kept in found.items():
+            row = [*head, name, f"{true[name]:.3f}", f"{100 * (1 - len(kept) / studies):.1f}"]
+            if not kept:
+                yield [*row, "", "", ""]
+                continue
+            low, high = np.array(kept).T
+            below, above = float((high < true[name] - 1e-9).mean()), float((low > true[name] + 1e-9).mean())
+            yield [*row, *(f"{100 * share:.1f}" for share in (1 - below - above, below, above))]
+
+
 def main() -> None:
     """Parse, simulate, write."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("tables", nargs="+", choices=("rms", "mmrv", "plan", "printed"))
+    parser.add_argument("tables", nargs="+", choices=("rms", "mmrv", "plan", "printed", "coverage"))
     parser.add_argument("--studies", type=int, default=STUDIES)
     parser.add_argument("--out", type=Path, default=Path(), metavar="FOLDER")
     given = parser.parse_args()
@@ -249,6 +347,7 @@ def main() -> None:
             "mmrv": lambda: misses(violation_ends, true_violation, given.studies),
             "plan": lambda: plans(given.studies),
             "printed": lambda: printed(given.studies),
+            "coverage": lambda: coverage(given.studies),
         }[name]()
         with (given.out / f"gap-{name}.csv").open("w", encoding="utf-8", newline="") as file:
             writer = csv.writer(file, lineterminator="\n")

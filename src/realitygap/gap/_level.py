@@ -85,11 +85,9 @@ def rms_interval(
 ) -> Ends | None:
     """Return the interval of the RMS gap; none below 5 controllers.
 
-    The mean square is a mean of c independent values with a long tail to the right. Its lower end is the percentile of
-    resamples (`percentile_interval`). Their upper percentile is too low. So the upper end is a t interval on the
-    logarithmic scale, with the standard error of the squares or, if that is larger, the one that normal differences
-    would have: a sample without large squares shows too small a standard error. `benchmarks/gap_intervals.py` measures
-    how often the ends miss.
+    It has the roots of the ends of `skewed_interval` for the mean square, with the standard error of the squares or, if
+    that is larger, the one that normal differences would have: a sample without large squares shows too small a
+    standard error. `benchmarks/gap_intervals.py` measures how often the ends miss.
 
     Args:
         differences: (c,) difference of the two means of each controller.
@@ -102,27 +100,39 @@ def rms_interval(
     Returns:
         Both ends, from 0 to `most`.
     """
-    c = len(squares)
-    percentiles = percentile_interval(resampled, c, confidence)
+    variance = max(float(squares.var(ddof=1)), _variance_if_normal(differences)) if len(squares) > 1 else 0.0
+    error = math.sqrt(variance / len(squares) + more_variance)
+    ends = skewed_interval(float(squares.mean()), error, resampled, len(squares), confidence)
+    if ends is None:
+        return None
+    return math.sqrt(max(ends[0], 0.0)), min(math.sqrt(ends[1]), most)
+
+
+def skewed_interval(
+    mean: float, error: float, resampled: Values, n: int, confidence: float = CONFIDENCE
+) -> Ends | None:
+    """Return the interval of the mean of n independent values with a long tail to the right; none below 5.
+
+    The lower end is the percentile of resamples (`percentile_interval`). Their upper percentile is too low, so the
+    upper end is a t interval on the logarithmic scale.
+
+    Args:
+        mean: The mean, 0 or more in truth; an unbiased estimate may be below.
+        error: Its standard error.
+        resampled: (b,) means of resampled values.
+        n: Number of values.
+        confidence: Probability, between 0 and 1.
+    """
+    percentiles = percentile_interval(resampled, n, confidence)
     if percentiles is None:
         return None
-    errors = [
-        math.sqrt(variance / c + more_variance)
-        for variance in (float(squares.var(ddof=1)), _variance_if_normal(differences))
-    ]
-    reach = float(scipy.special.stdtrit(c - 1, (1 + confidence) / 2))
-    high = math.sqrt(_upper_end(float(squares.mean()), max(errors), reach))
-    return math.sqrt(max(percentiles[0], 0.0)), min(high, most)
+    reach = float(scipy.special.stdtrit(n - 1, (1 + confidence) / 2))
+    scale = max(mean, LEAST_RATIO * error)
+    above = 0.0 if scale == 0 else scale * math.expm1(reach * error / scale)
+    return percentiles[0], max(mean, 0.0) + above
 
 
 def _variance_if_normal(differences: Values) -> float:
     """Return the variance of the square of a normal number with the mean and the variance of these."""
     variance = float(differences.var(ddof=1))
     return 4 * float(differences.mean()) ** 2 * variance + 2 * variance**2
-
-
-def _upper_end(mean: float, error: float, reach: float) -> float:
-    scale = max(mean, LEAST_RATIO * error)
-    if scale == 0:
-        return 0.0
-    return max(mean, 0.0) + scale * math.expm1(reach * error / scale)

@@ -17,6 +17,7 @@ from realitygap.stats import (
     Estimate,
     Method,
     exact_share_interval,
+    mean_interval,
     pearson,
     percentile_interval,
     prove_equivalence,
@@ -27,9 +28,11 @@ from realitygap.stats import (
 
 from . import _resampling
 from ._behavior import energy_distances, energy_test, smallest_energy_p
-from ._level import mean_difference, rms_interval, rms_of, shares_above, square_differences
+from ._level import mean_difference, rms_interval, rms_of, shares_above, skewed_interval, square_differences
 from ._ranks import (
     Ties,
+    fisher_interval,
+    floor_interval,
     mean_maximum_rank_violation,
     mean_violation,
     mean_violation_interval,
@@ -105,7 +108,7 @@ def measure_gap(
         raise ValueError(
             f"{source.name} and {target.name} have different numbers of trials, expected pairs of trials."
         )
-    work = _Work(source, target, resamples, np.random.default_rng(seed), ties, paired=paired)
+    work = _Work(source, target, resamples, seed, ties, paired=paired)
     return GapResult(
         source.name,
         target.name,
@@ -141,14 +144,15 @@ class _Work:
         source: GapSide,
         target: GapSide,
         n_resamples: int,
-        rng: np.random.Generator,
+        seed: int,
         ties: Ties,
         *,
         paired: bool,
     ) -> None:
         self.source, self.target, self.n = source, target, source.n
         self.ties, self.paired = ties, paired
-        self.n_resamples, self.rng = n_resamples, rng
+        self.n_resamples, self.seed = n_resamples, seed
+        self.rng = rng = np.random.default_rng(seed)
         self.differences = range_of_differences(source.score_range)
         self.pair = source.values[None], target.values[None]
         self.fewest = min(source.trials, target.trials)
@@ -162,11 +166,12 @@ class _Work:
         ranks: dict[str, _resampling.Statistic] = {"srcc": _srcc, "pearson": _pearson}
         if self._mmrv(*self.pair)[0] == 0:  # any other violation has an interval without resamples
             ranks["mmrv"] = self._mmrv
+        if self.fewest >= 2 and self._floor() == 0:
+            ranks["floor"] = lambda _, other: rank_violation_floor(other, self.rng, _FEW_SPLITS, self.ties)
         if self.fewest >= 2:
             ranks |= {
                 "source": lambda one, _: reliability(one, self.rng, _FEW_SPLITS),
                 "target": lambda _, other: reliability(other, self.rng, _FEW_SPLITS),
-                "floor": lambda _, other: rank_violation_floor(other, self.rng, _FEW_SPLITS, self.ties),
             }
         self.drawn |= bootstrap(ranks, self.source, self.target, self.n_resamples, self.rng, smooth=True)
         if self.fewest < 2:
@@ -236,7 +241,7 @@ class _Work:
         if self.n >= SMALLEST_N and value in (0.0, 1.0):
             # all samples are alike; so many controllers could have come out so of a share a little off
             return exact_share_interval(self.n if value else 0, self.n)
-        return self._estimate(value, resampled_means(shares, self.n_resamples, self.rng))
+        return mean_interval(shares, (0.0, 1.0), noun="controllers")
 
     # order
 
@@ -310,9 +315,12 @@ class _Work:
         return self._no_order(SMALLEST_N)
 
     def ceiling(self) -> Estimate:
-        return self._no_halves() or self._estimate(
-            float(np.sqrt(np.prod(self.reliabilities))), np.sqrt(self.drawn["source"] * self.drawn["target"])
-        )
+        refused = self._no_halves()
+        if refused:
+            return refused
+        value = float(np.sqrt(np.prod(self.reliabilities)))
+        drawn = np.sqrt(self.drawn["source"] * self.drawn["target"])
+        return self._with_ends(value, fisher_interval(value, drawn, self.n), "Fisher z")
 
     def disattenuated(self) -> Estimate:
         refused = self._no_halves() or self._unreliable()
@@ -342,10 +350,22 @@ class _Work:
         return None
 
     def mmrv_floor(self) -> Estimate:
-        return self._no_halves() or self._estimate(
-            float(rank_violation_floor(self.target.values[None], self.rng, ties=self.ties)[0]),
-            self.drawn["floor"],
+        refused = self._no_halves()
+        if refused:
+            return refused
+        value = self._floor()
+        if value == 0:
+            return self._estimate(value, self.drawn["floor"])
+        return self._with_ends(
+            value, floor_interval(self.target.values, self._halving(), ties=self.ties), "t"
         )
+
+    def _floor(self) -> float:
+        return float(rank_violation_floor(self.target.values[None], self._halving(), ties=self.ties)[0])
+
+    def _halving(self) -> np.random.Generator:
+        """Return the generator of the halves of the floor, always the same ones."""
+        return np.random.default_rng(self.seed)
 
     # behavior
 
@@ -357,9 +377,10 @@ class _Work:
                 self.n, "An energy distance needs 2 trials of each controller on both sides."
             )
         distances = energy_distances(one, other)
-        estimate = self._estimate(
-            float(distances.mean()), resampled_means(distances, self.n_resamples, self.rng)
-        )
+        mean = float(distances.mean())
+        error = float(distances.std(ddof=1)) / math.sqrt(self.n) if self.n > 1 else 0.0
+        resampled = resampled_means(distances, self.n_resamples, self.rng)
+        estimate = self._with_ends(mean, skewed_interval(mean, error, resampled, self.n))
         smallest = smallest_energy_p(self.n, self.source.trials, self.target.trials)
         p = energy_test(one, other, self.rng) if smallest < ALPHA else None
         more = {"p": p}

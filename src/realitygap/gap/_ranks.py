@@ -9,7 +9,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from realitygap.stats import CONFIDENCE, spearman
+from realitygap.stats import CONFIDENCE, SMALLEST_N, Ends, spearman
 
 from ._side import Values
 
@@ -18,6 +18,9 @@ SPLITS = 100
 
 _BLOCK = 4_000_000
 """Pairs of controllers that are held at a time."""
+
+_MOST_Z = 6.0
+"""Fisher's z of a correlation that cannot be told from 1."""
 
 Rng = np.random.Generator
 
@@ -82,6 +85,27 @@ def reliability(values: Values, rng: Rng, splits: int = SPLITS) -> Values:
         counts = (~np.isnan(values)).sum(axis=2)
         times = np.asarray((counts / (counts // 2)).mean(axis=1))
     return lengthened(np.nan_to_num(np.mean(between, axis=0)), times)
+
+
+def fisher_interval(ceiling: float, resampled: Values, n: int, confidence: float = CONFIDENCE) -> Ends | None:
+    """Return the interval of a noise ceiling, by t on the scale of Fisher's z; none below 5 controllers.
+
+    Resamples have fewer distinct controllers than the sample, so their ceilings are lower, and so are their
+    percentiles. Their spread on this scale is right.
+
+    Args:
+        ceiling: The noise ceiling, 0 to 1.
+        resampled: (b,) ceilings of resamples.
+        n: Number of controllers.
+        confidence: Probability, between 0 and 1.
+    """
+    if n < SMALLEST_N:
+        return None
+    most = math.tanh(_MOST_Z)
+    error = float(np.arctanh(np.clip(resampled, 0.0, most)).std())
+    reach = float(scipy.special.stdtrit(n - 1, (1 + confidence) / 2)) * error
+    z = math.atanh(min(ceiling, most))
+    return math.tanh(max(z - reach, 0.0)), math.tanh(z + reach)
 
 
 def trials_for_reliability(observed: float, trials: int, wanted: float) -> int | None:
@@ -227,13 +251,18 @@ def rank_violation_interval(
     Raises:
         ValueError: The violation is 0, which has no logarithm.
     """
-    violations = _violations(source[None], target[None], ties)[0]
-    value = float(violations.max(axis=1).mean())
+    return _jackknifed(source[None], target[None], ties, confidence)
+
+
+def _jackknifed(source: Values, target: Values, ties: Ties, confidence: float) -> tuple[float, float]:
+    """Return the interval of the mean violation of s pairs of orders of the same controllers, each (s, c)."""
+    pairs = [_violations(one[None], other[None], ties)[0] for one, other in zip(source, target, strict=True)]
+    value = float(np.mean([violations.max(axis=1).mean() for violations in pairs]))
     if value == 0:
         raise ValueError("The rank violation is 0, expected one above 0.")
-    error = _jackknife_error(_left_out(violations))
-    factor = math.exp(float(scipy.special.stdtrit(len(source) - 1, (1 + confidence) / 2)) * error / value)
-    return value / factor, min(value * factor, float(np.ptp(target)))
+    error = _jackknife_error(np.mean([_left_out(violations) for violations in pairs], axis=0))
+    factor = math.exp(float(scipy.special.stdtrit(target.shape[1] - 1, (1 + confidence) / 2)) * error / value)
+    return value / factor, min(value * factor, float(np.ptp(target, axis=1).max()))
 
 
 def _jackknife_error(left: Values) -> float:
@@ -262,3 +291,22 @@ def rank_violation_floor(target: Values, rng: Rng, splits: int = SPLITS, ties: T
     """
     violations = [mean_maximum_rank_violation(*halves(target, rng), ties) for _ in range(splits)]
     return np.asarray(np.mean(violations, axis=0))
+
+
+def floor_interval(
+    target: Values, rng: Rng, splits: int = SPLITS, ties: Ties = "both"
+) -> tuple[float, float]:
+    """Return the interval of a floor above 0, as `rank_violation_interval` does, over the same halves.
+
+    Args:
+        target: (c, q), q at least 2.
+        rng: Draws the halves.
+        splits: Number of random splits, of which the mean is taken.
+        ties: Counting of pairs that tie in one half only.
+
+    Raises:
+        ValueError: The floor is 0, which has no logarithm.
+    """
+    pairs = [halves(target[None], rng) for _ in range(splits)]
+    one, other = (np.concatenate(side) for side in zip(*pairs, strict=True))
+    return _jackknifed(one, other, ties, CONFIDENCE)

@@ -12,6 +12,8 @@ from importlib.util import find_spec
 from numbers import Real
 from typing import TYPE_CHECKING, Any
 
+from ._caller import as_given
+
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import ArrayLike, NDArray
@@ -19,6 +21,9 @@ if TYPE_CHECKING:
 
 class RealityGapError(Exception):
     """An error in a file, a study, or a machine, with a message for people. The base of all other errors here."""
+
+    def __init__(self, *args: object) -> None:
+        super().__init__(*(as_given(each) if isinstance(each, str) else each for each in args))
 
 
 class StudyError(RealityGapError):
@@ -135,10 +140,20 @@ def _missing(module: str, extra: str, problem: str) -> MissingExtraError:
 def did_you_mean(name: str, known: Iterable[str]) -> str:
     """Return a hint that names the known word nearest to `name`, or lists all; empty if there are none."""
     choices = sorted(known)
-    near = difflib.get_close_matches(name, choices, n=1, cutoff=0.5)
-    if near:
-        return f"Did you mean {near[0]!r}?"
+    folded = {choice.casefold(): choice for choice in choices}
+    word = name.casefold()
+    near = difflib.get_close_matches(word, folded, n=1) or [
+        each for each in folded if each.startswith(word[:3])
+    ]
+    if near and word:
+        return f"Did you mean {folded[near[0]]!r}?"
     return f"Known: {', '.join(choices)}." if choices else ""
+
+
+def meant(came: object, known: Iterable[str]) -> str:
+    """Return a hint after a space that names the known word nearest to a value; empty if none is near."""
+    near = did_you_mean(came, known) if isinstance(came, str) else ""
+    return f" {near}" if near.startswith("Did") else ""
 
 
 def whole_number(name: str, value: object, least: int | None = None, most: int | None = None) -> int:

@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, ValidationErro
 from pydantic.fields import FieldInfo
 from pydantic_core import CoreSchema, PydanticKnownError
 
-from .errors import did_you_mean
+from .errors import did_you_mean, meant
 
 MISSING = "missing, and it has no default."
 _EXPECTED = {
@@ -22,6 +22,7 @@ _EXPECTED = {
     "bool_type": "true or false",
     "bool_parsing": "true or false",
     "string_type": "a text in quotes",
+    "path_type": "the name of a file",
     "list_type": "a list",
     "tuple_type": "a list",
     "dict_type": "a table",
@@ -38,29 +39,29 @@ _LIMITS = {
 
 
 def _refusing(wrong: Literal["float_type", "int_type"]) -> dict[str, Any]:
-    """Return a step before the check of a number that refuses true and false."""
+    """Return a step before the check of a number that refuses true, false, and texts."""
 
-    def refuse_truth(value: Any) -> Any:
-        if isinstance(value, bool):
+    def refuse(value: Any) -> Any:
+        if isinstance(value, bool | str):
             raise PydanticKnownError(wrong)
         return value
 
-    return {"type": "no-info", "function": refuse_truth}
+    return {"type": "no-info", "function": refuse}
 
 
 _REFUSING = {"float": _refusing("float_type"), "int": _refusing("int_type")}
 
 
-def _without_truth_in_numbers(schema: Any) -> Any:
-    """Return a schema that refuses true and false as numbers, which pydantic would take for 1 and 0."""
+def _with_plain_numbers(schema: Any) -> Any:
+    """Return a schema that refuses true, false, and texts as numbers; pydantic would read 1, 0, and their digits."""
     if isinstance(schema, list | tuple):
-        return type(schema)(map(_without_truth_in_numbers, schema))
+        return type(schema)(map(_with_plain_numbers, schema))
     if not isinstance(schema, dict) or schema.get("function") in _REFUSING.values():
         return schema
     step = _REFUSING.get(str(schema.get("type")))
     if step is not None:
         return {"type": "function-before", "function": step, "schema": schema}
-    return {key: _without_truth_in_numbers(part) for key, part in schema.items()}
+    return {key: _with_plain_numbers(part) for key, part in schema.items()}
 
 
 class Settings(BaseModel):
@@ -99,8 +100,8 @@ class Settings(BaseModel):
 
     @classmethod
     def __get_pydantic_core_schema__(cls, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        """Return the schema of pydantic, but refuse true and false as numbers."""
-        strict: CoreSchema = _without_truth_in_numbers(handler(source))
+        """Return the schema of pydantic, but refuse true, false, and texts as numbers."""
+        strict: CoreSchema = _with_plain_numbers(handler(source))
         return strict
 
 
@@ -210,7 +211,7 @@ def explained(problem: Any, model: type[BaseModel] = BaseModel) -> str:
     if kind == "missing":
         return MISSING
     if kind == "literal_error":
-        return f"expected {context['expected']}, got {came}.{_meant(problem['input'], context['expected'])}"
+        return f"expected {context['expected']}, got {came}.{meant(problem['input'], _words(context['expected']))}"
     if kind == "value_error":
         # the value of a whole model is too long to show
         is_table = not problem["loc"] or isinstance(problem["input"], Mapping | BaseModel)
@@ -236,10 +237,6 @@ def explained(problem: Any, model: type[BaseModel] = BaseModel) -> str:
     return f"{text}, got {came}."
 
 
-def _meant(came: object, expected: str) -> str:
-    """Return a hint that names the expected word nearest to a value; empty if none is near."""
-    if not isinstance(came, str):
-        return ""
-    names = [name.strip(" '") for name in expected.replace(" or ", ",").split(",")]
-    near = did_you_mean(came, names)
-    return f" {near}" if near.startswith("Did") else ""
+def _words(expected: str) -> list[str]:
+    """Return the choices that pydantic lists."""
+    return [name.strip(" '") for name in expected.replace(" or ", ",").split(",")]

@@ -41,6 +41,7 @@ SMALLEST = {
 
 WITH = {
     "calibrate": {
+        "what": {"what": "motion"},
         "data": {"robot": None},
         "radius_mm": {"what": "sensors"},
         "step": {"what": "motion"},

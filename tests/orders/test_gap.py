@@ -15,7 +15,7 @@ SMALL = {"sim": "sim", "target": "sim", "n_controllers": 3, "trials": 2}
 
 
 @pytest.mark.parametrize(
-    ("values", "text"), [({"noise": 0.5}, "--noise is 0.5"), ({"trials": 1}, "at least 2 trials")]
+    ("values", "text"), [({"noise": 0.5}, "noise is 0.5"), ({"trials": 1}, "at least 2 trials")]
 )
 def test_why_is_refused_with_settings_that_exclude_it(values, text):
     with pytest.raises(OrderError, match=text) as error:

@@ -89,6 +89,7 @@ def test_killed_work_resumes_with_the_same_result_and_drives_nothing_twice(folde
     ("settings", "text"),
     [
         ({"sim": "jyro"}, "close calibrates sim"),
+        ({"target": "jyro"}, "cannot calibrate to jyro"),
         ({"target": "recorded:trials.sqlite"}, "realitygap calibrate path"),
         ({"target": "scribbler:/dev/rfcomm0"}, "without an operator"),
         ({"budget": 1}, "needs at least 2 trials"),

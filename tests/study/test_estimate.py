@@ -52,7 +52,7 @@ def test_recorded_controllers_from_elsewhere_are_refused(slow):
     estimate_score("sim", slow, results="kept.sqlite", **SMALL)
     with pytest.raises(StudyError, match="does not draw"):
         estimate_score("sim", "recorded:kept.sqlite", **SMALL, seed=2)
-    with pytest.raises(StudyError, match="--trials 2"):
+    with pytest.raises(StudyError, match="Use trials 2"):
         estimate_score("sim", "recorded:kept.sqlite", **SMALL | {"trials": 3})
 
 

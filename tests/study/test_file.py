@@ -302,7 +302,7 @@ def test_advice_can_be_pasted_into_a_shell():
 def test_numpy_s_whole_numbers_are_taken():
     study = load_study("paper", seed=np.int64(4), replicates=np.uint8(7))
     assert study == load_study("paper", seed=4, replicates=7)
-    with pytest.raises(StudyError, match="expected a whole number, got True"):
+    with pytest.raises(StudyError, match="replicates is True, expected a whole number"):
         load_study("paper", replicates=True)
 
 
@@ -368,7 +368,7 @@ def test_seed_and_replicates_can_be_given_beside_the_file():
 
 
 def test_a_wrong_seed_beside_the_file_is_said():
-    with pytest.raises(StudyError, match=r"study.replicates: expected at least 1"):
+    with pytest.raises(StudyError, match=r"^replicates is 0, expected 1 to"):
         load_study("paper", replicates=0)
 
 

@@ -325,7 +325,7 @@ def test_trials_of_a_robot_have_to_be_kept(monkeypatch, tmp_path):
         "open_target",
         lambda spec, *more, **named: real if spec == "robot" else there(spec, *more, **named),
     )
-    with pytest.raises(StudyError, match=r"12 trials on robot would not be saved.*-o FILE"):
+    with pytest.raises(StudyError, match=r"12 trials on robot would not be saved.*results=FILE"):
         gap_between("sim", "robot", n_controllers=6, trials=2, noise=0)
     file = tmp_path / "trials.sqlite"
     found = gap_between("sim", "robot", n_controllers=6, trials=2, noise=0, results=file)
@@ -343,10 +343,10 @@ def test_trials_of_one_controller_tell_no_gap(some, tmp_path):
 
 def test_re_evolved_is_only_what_evolved_there(some):
     with pytest.raises(
-        StudyError, match="random-0 of --reevolved random was evolved nowhere, expected champions"
+        StudyError, match="random-0 of reevolved random was evolved nowhere, expected champions"
     ):
         gap_between("sim", "jyro", n_controllers=3, trials=1, reevolved="random")
-    with pytest.raises(StudyError, match="random-0 of --controllers random was evolved nowhere"):
+    with pytest.raises(StudyError, match="random-0 of controllers random was evolved nowhere"):
         gap_between("sim", "jyro", n_controllers=2, trials=1, reevolved="paper")
     elsewhere = [
         replace(each, kind="champion", selected_score=0.5, fresh_score=0.4, selected_on="jyro")

@@ -14,6 +14,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperCommand, TyperGroup
 
+from realitygap._caller import COMMAND, called_by
 from realitygap._foreign_text import printable
 from realitygap._terminal import echo
 from realitygap._version import __version__
@@ -36,7 +37,8 @@ class _RootGroup(TyperGroup):
 
     def invoke(self, ctx: Any) -> Any:
         try:
-            return super().invoke(ctx)
+            with called_by(COMMAND):
+                return super().invoke(ctx)
         except typer.BadParameter as error:
             if hasattr(error, "param_type") and error.ctx is not None:  # something is missing
                 error.message = _example_of(error.ctx.command)

@@ -7,10 +7,18 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from realitygap._caller import Caller
 from realitygap.errors import StudyError
-from realitygap.orders import Order, OrderError
+from realitygap.orders import ORDERS, Order, OrderError
 
 from ._files import refuse_outside, refuse_platform
+
+
+def form_caller() -> Caller:
+    """Return the caller of forms, in which settings have labels."""
+    fields = [field for order in ORDERS.values() for field in order.fields() if field.face.label]
+    labels = {option: field.face.label for field in fields for option in field.options}
+    return Caller(lambda option: labels.get(option, option), ": ")
 
 
 class FormError(StudyError):

@@ -19,6 +19,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
+from realitygap._caller import called_by
 from realitygap._foreign_text import script_text
 from realitygap.errors import RealityGapError, StudyError, from_extra, whole_number
 from realitygap.settings import shown
@@ -82,6 +83,9 @@ def open_lab(
         if show:
             entry = while_served.enter_context(_entry(addresses[0], root))
             threading.Timer(0.5, _show, (entry, tell)).start()
+        from ._mistakes import form_caller  # it imports all that the lab needs
+
+        while_served.enter_context(called_by(form_caller()))
         try:
             server.run(sockets=[listener])
         finally:

@@ -8,12 +8,14 @@ import sys
 import traceback
 from collections.abc import Callable
 
+from realitygap._caller import called_by
 from realitygap._interrupts import kept_interrupts
 from realitygap.errors import RealityGapError, RobotError
 from realitygap.robot_families import load
 
 from ._channel import Channel
 from ._messages import Failure, Interrupted, Work
+from ._mistakes import form_caller
 
 
 def main() -> int:
@@ -36,7 +38,7 @@ def _work(channel: Channel) -> int:
     try:
         work = channel.begin()
         act: Callable[[Channel, Work], None] = load(f"{__package__}.{work.function}")
-        with kept_interrupts():
+        with kept_interrupts(), called_by(form_caller()):
             act(channel, work)
     except (RealityGapError, OSError, ValueError) as error:
         channel.say(Failure(str(error), isinstance(error, RobotError)))

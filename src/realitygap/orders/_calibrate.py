@@ -8,11 +8,16 @@ from typing import ClassVar, Literal
 
 from pydantic import model_validator
 
+from realitygap.errors import meant
 from realitygap.robot_families import default_family, port_platforms
 
 from ._field import argument, option
 from ._order import Order
 from ._shared import Seed, Witness, arena_option, seed_option
+
+PARTS = ("path", "sensors", "motion", "contact", "all")
+LEVELS = ("track", "cells", "encoders")
+"""Observation levels, each short for all parts from such data."""
 
 
 class CalibrateOrder(Order):
@@ -148,11 +153,17 @@ class CalibrateOrder(Order):
     def _takes_what_is_seen(cls, values: dict[str, object]) -> dict[str, object]:
         """Read an observation level in place of a part as all parts, observed at that level."""
         what = values.get("what")
-        is_level = what in ("cells", "encoders", "track") and values.get("observe") in (None, what)
+        is_level = what in LEVELS and values.get("observe") in (None, what)
         return values | {"what": "all", "observe": what} if is_level else values
 
     def conflicts(self) -> Iterator[tuple[str, str]]:
         """Yield the field and the message for each setting that others exclude."""
+        if self.what not in (*PARTS, *LEVELS):
+            yield (
+                "what",
+                f"expected {', '.join(PARTS)}, or, for all from such data, {', '.join(LEVELS)}, got {self.what!r}."
+                f"{meant(self.what, (*PARTS, *LEVELS))}",
+            )
         if (self.robot is None) == (not self.data):
             yield (
                 "robot",

@@ -50,7 +50,7 @@ class CloseOrder(PairOrder):
         help="Number of trials of the calibration.",
         at_least=1,
         metavar="TRIALS",
-        label="Trials to calibrate",
+        label="Number of trials",
     )
     what: Literal["all", "path", "sensors", "motion", "contact"] = option(
         "all", help="Part of the robot to calibrate.", metavar="WHAT", label="Part of the robot"

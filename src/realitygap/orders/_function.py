@@ -17,6 +17,9 @@ OrderT = TypeVar("OrderT", bound=Order)
 P = ParamSpec("P")
 R = TypeVar("R")
 
+_PLAIN = (str, os.PathLike, int, float, list, tuple, dict, type(None))
+"""Types of values that a field may have, or that its check refuses."""
+
 
 def takes_order(
     model: type[OrderT],
@@ -24,7 +27,7 @@ def takes_order(
     """Let a function whose first parameter is an order also take the fields of that order.
 
     Its signature and docstring get those of the fields. If another parameter of the function has the name of a field,
-    it gets the values that are no text: an arena by name belongs to the order, an `Arena` does not.
+    it gets the values that are objects: an arena by name belongs to the order, an `Arena` does not.
     """
     fields = {field.name: field for field in model.fields()}
 
@@ -40,9 +43,10 @@ def takes_order(
             rest = {
                 name: values.pop(name)
                 for name in own & set(values)
-                if name not in fields or not isinstance(values[name], str | os.PathLike | None)
+                if name not in fields or not isinstance(values[name], _PLAIN)
             }
-            return function(model(**values), **rest)  # type: ignore[call-arg]
+            with model.called_by_function():
+                return function(model(**values), **rest)  # type: ignore[call-arg]
 
         parameters = [_parameter(field) for field in fields.values()]
         parameters += [parameter for parameter in others if parameter.name not in fields]

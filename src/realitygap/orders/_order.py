@@ -7,10 +7,12 @@ import inspect
 import os
 import re
 from collections.abc import Collection, Iterator, Mapping
+from contextlib import AbstractContextManager
 from typing import Any, ClassVar, TypeVar
 
 from pydantic import ConfigDict, model_validator
 
+from realitygap._caller import as_given, called_by_function
 from realitygap._toml import toml_table
 from realitygap._version import __version__
 from realitygap.errors import StudyError
@@ -34,7 +36,7 @@ class OrderError(StudyError, ValueError):
     """
 
     def __init__(self, problems: Mapping[str, str], words: Mapping[str, str] | None = None) -> None:
-        self.problems = dict(problems)
+        self.problems = {name: as_given(text) for name, text in problems.items()}
         words = words or {}
         super().__init__(
             "\n".join(_sentence(words.get(name, name), text) for name, text in self.problems.items())
@@ -45,7 +47,15 @@ def _sentence(name: str, text: str) -> str:
     """Return "--margin is -1, expected more than 0." for the name of a field and "expected more than 0, got -1."."""
     if match := re.fullmatch(r"(expected .*), got (.*)\.", text, re.DOTALL):
         return f"{name} is {match[2]}, {match[1]}."
-    return f"{name}: {text}" if text[:1].islower() else text
+    return f"{name}: {text}" if text[:1].islower() and not text.startswith(name) else text
+
+
+def _with_help(text: str, field: OrderField | None, others: Collection[str]) -> str:
+    """Return a message, with the meaning of a text if the value is none."""
+    if field is None:
+        return text
+    number = f". Their number is n_{field.name}" if f"n_{field.name}" in others else ""
+    return text.replace("a text in quotes", f"a text: {field.help.removesuffix('.')}{number}", 1)
 
 
 class Order(Settings):
@@ -64,14 +74,21 @@ class Order(Settings):
     """Name of the command."""
 
     def __init__(self, **values: Any) -> None:
-        super().__init__(**values)
-        if conflicts := dict(self.conflicts()):
-            raise OrderError(conflicts)
+        with self.called_by_function():
+            super().__init__(**values)
+            if conflicts := dict(self.conflicts()):
+                raise OrderError(conflicts)
+
+    @classmethod
+    def called_by_function(cls) -> AbstractContextManager[None]:
+        """Let messages name settings by the fields, unless a command or a form made the order."""
+        return called_by_function({word: field.name for field in cls.fields() for word in field.options})
 
     @classmethod
     def refusal(cls, found: list[tuple[str, str]]) -> ValueError:
         """Return the error for mistakes, with the place and the message of each."""
-        return OrderError(dict(found))
+        fields = {field.name: field for field in cls.fields()}
+        return OrderError({place: _with_help(text, fields.get(place), fields) for place, text in found})
 
     @model_validator(mode="before")
     @classmethod
@@ -85,6 +102,10 @@ class Order(Settings):
     def by_place(cls, *values: object) -> dict[str, object]:
         """Return the fields for values without names, which a function of the order takes first."""
         places = [field.name for field in cls.fields() if field.face.is_argument]
+        if len(values) > len(places):
+            raise TypeError(
+                f"Got {len(values)} values without a name, expected at most {len(places)}: {places}."
+            )
         return dict(zip(places, values, strict=False))
 
     def conflicts(self) -> Iterator[tuple[str, str]]:

@@ -121,6 +121,10 @@ def _checked(order: CloseOrder) -> CloseOrder:
     """
     if order.sim.partition(":")[0] != "sim":
         raise StudyError(f"close calibrates sim, but the simulator is {order.sim}. Name sim or sim:FILE.")
+    if order.target.partition(":")[0] == "jyro":
+        raise StudyError(
+            "close cannot calibrate to jyro. Name twin:FILE, sim:FILE, or an emulated robot as target."
+        )
     if order.target.partition(":")[0] == "recorded" or (
         order.witness is None and platform_of(order.target).needs_person
     ):

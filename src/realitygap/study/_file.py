@@ -5,7 +5,6 @@ from __future__ import annotations
 import shlex
 from collections.abc import Mapping, Sequence
 from importlib import resources
-from numbers import Integral
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +30,7 @@ from realitygap.world import ArenaSettings
 
 from ._named_files import find_files
 from ._problems import Problems, StudyFileError
-from ._study import ConditionNotes, ReportSection, Study, StudySection, TrialsSection, same_file
+from ._study import ConditionNotes, ReportSection, Study, StudySection, TrialsSection, replaced, same_file
 
 DEFAULT_NEAT = "rosenzweig-remy"
 SECTIONS: dict[str, type[BaseModel]] = {
@@ -111,6 +110,11 @@ def _load_study(study: str | Path, seed: int | None, replicates: int | None) -> 
             f"Unknown study {name!r}. {did_you_mean(name, named_studies())} A file of your own ends in .toml; "
             "`realitygap new-study` writes one."
         )
+    if path.suffix == ".py":
+        raise StudyError(
+            f"{path} is a Python file, expected a study file (.toml). Its task may be 'python:{path}:FUNCTION'. "
+            "`realitygap new-study` writes one."
+        )
     if path.joinpath("study.json").is_file():
         raise StudyError(
             f"{path} is a folder of results, expected a study by name or its file. To look at the results: realitygap "
@@ -146,7 +150,7 @@ def parse_study(text: str, origin: str, *, seed: int | None = None, replicates: 
     _refuse_other_files(data, origin)
     problems = Problems()
     find_files(data, Path(origin).parent, problems)
-    study = _resolve(data, problems, {"seed": _plain(seed), "replicates": _plain(replicates)})
+    study = _resolve(data, problems, replaced(seed, replicates))
     if problems.lines or study is None:
         count = len(problems.lines)
         head = f"{origin} has {count} mistake{'s' if count != 1 else ''}; nothing was run."
@@ -191,12 +195,6 @@ def _is_drawn(condition: Condition) -> bool:
     return condition.on.is_randomized
 
 
-def _plain(number: Any) -> Any:
-    """Return NumPy's whole numbers as Python's. Other values stay, to be checked with the rest."""
-    is_whole = isinstance(number, Integral) and not isinstance(number, bool)
-    return int(number) if is_whole else number
-
-
 def _resolve(data: dict[str, Any], problems: Problems, changes: dict[str, Any]) -> Study | None:
     known = {"study", "report", "trials", "platform", "condition", *SECTIONS}
     for key in data:
@@ -205,7 +203,7 @@ def _resolve(data: dict[str, Any], problems: Problems, changes: dict[str, Any]) 
     if "study" not in data:
         problems.add("study", "missing. Expected a section [study] with at least a name.")
     about_values = problems.table("study", data.get("study", {}))
-    about_values |= {key: value for key, value in changes.items() if value is not None}
+    about_values |= changes
     is_table = isinstance(data.get("study"), dict)
     about = problems.check(StudySection, about_values, "study") if is_table else None
     report = problems.check(ReportSection, problems.table("report", data.get("report", {})), "report")

@@ -12,6 +12,7 @@ from pydantic import AfterValidator, Field, model_validator
 import realitygap
 from realitygap._version import __version__
 from realitygap.drawing import ShownAsCard
+from realitygap.errors import StudyError, whole_number
 from realitygap.runs import NAME_PATTERN, Condition
 from realitygap.settings import Settings
 
@@ -25,6 +26,10 @@ def _printable(text: str) -> str:
 Line = Annotated[str, AfterValidator(_printable)]
 
 
+MOST_SEED = 2**63 - 1
+MOST_REPLICATES = 1_000_000_000
+
+
 class StudySection(Settings):
     """The settings of the whole study."""
 
@@ -35,11 +40,11 @@ class StudySection(Settings):
     )
     title: Line = Field("", max_length=200, description="Title of the report. Default: the name.")
     note: Line = Field("", max_length=500, description="Remark, shown in the summary.")
-    seed: int = Field(1, ge=0, le=2**63 - 1, description="Seed of all random numbers.")
+    seed: int = Field(1, ge=0, le=MOST_SEED, description="Seed of all random numbers.")
     replicates: int = Field(
         100,
         ge=1,
-        le=1_000_000_000,
+        le=MOST_REPLICATES,
         description="Number of runs per condition. Increase it to extend an existing study.",
     )
     pair: bool = Field(
@@ -47,6 +52,23 @@ class StudySection(Settings):
         description="Use the same random numbers for all conditions, if possible. This narrows the intervals of their "
         "differences. false: each condition has its own.",
     )
+
+
+def replaced(seed: int | None = None, replicates: int | None = None) -> dict[str, int]:
+    """Return the values that replace settings of the study, without those that are None.
+
+    Raises:
+        StudyError: One is not a whole number, or out of range.
+    """
+    given = {"seed": (seed, 0, MOST_SEED), "replicates": (replicates, 1, MOST_REPLICATES)}
+    try:
+        return {
+            name: whole_number(f"--{name}", value, least, most)
+            for name, (value, least, most) in given.items()
+            if value is not None
+        }
+    except (TypeError, ValueError) as error:
+        raise StudyError(str(error)) from None
 
 
 class ReportSection(Settings):
@@ -181,8 +203,8 @@ class Study(Settings, ShownAsCard):
         """
         study = self
         if replicates is not None:
-            about = self.about.model_dump() | {"replicates": replicates}
-            study = self.model_copy(update={"about": StudySection(**about)})
+            about = self.about.model_copy(update=replaced(replicates=replicates))
+            study = self.model_copy(update={"about": about})
         return realitygap.study.run_study(study, out, threads=threads, fresh=fresh, cluster=cluster).folder
 
     def description(self) -> dict[str, Any]:

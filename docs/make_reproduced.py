@@ -23,10 +23,11 @@ from paper_audit import audit_paper, spread_of_three
 from written import write_files
 
 from realitygap import ResultsFolder, run_study, write_report
+from realitygap._wording import bracketed
 from realitygap.report import compare_conditions, draw_individuals, draw_paths, save_drawing
 from realitygap.report._comparisons import MARGIN, is_within, paired_values
 from realitygap.report._tally import Tally, read_tally
-from realitygap.stats import Estimate, bca_interval, difference_of_means, holm
+from realitygap.stats import bca_interval, difference_of_means, holm
 
 HERE = Path(__file__).parent
 TABLES = HERE / "data" / "reproduced"
@@ -133,7 +134,7 @@ def comparisons(folder: ResultsFolder) -> str:
             each.other,
             each.n,
             _signed(each.size),
-            _span(each.difference),
+            bracketed(each.difference, signs=True),
             f"{each.p_holm:.2g}" if each.p_holm >= 1e-4 else "< 0.0001",
             each.difference_verdict.partition(":")[0],
             "" if each.is_shown else each.equivalence,
@@ -172,8 +173,17 @@ def neat_sets(tallies: dict[str, Tally]) -> str:
                 within = pair.equivalence_interval()
                 difference = float((pair.one - pair.other).mean())
                 chances.append(pair.p())
-                row = [settings, inputs, f"{level} %", len(pair.one), _signed(difference), _span(interval)]
-                rows.append([*row, _span(within), "yes" if is_within(within) else "not shown"])
+                row = [
+                    settings,
+                    inputs,
+                    f"{level} %",
+                    len(pair.one),
+                    _signed(difference),
+                    bracketed(interval, signs=True),
+                ]
+                rows.append(
+                    [*row, bracketed(within, signs=True), "yes" if is_within(within) else "not shown"]
+                )
     corrected = [f"{p:.2g}" if p >= 1e-4 else "< 0.0001" for p in holm(np.array(chances))]
     lines = [[*row[:6], p, *row[6:]] for row, p in zip(rows, corrected, strict=True)]
     head = [
@@ -190,10 +200,6 @@ def neat_sets(tallies: dict[str, Tally]) -> str:
 
 def _signed(value: float) -> str:
     return f"{value:+.3f}".replace("-", "−")
-
-
-def _span(estimate: Estimate) -> str:
-    return "" if estimate.ends is None else f"{_signed(estimate.low)} to {_signed(estimate.high)}"
 
 
 def _csv(head: list[str], rows: Iterable[list[object]]) -> str:

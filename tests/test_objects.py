@@ -6,6 +6,7 @@ import subprocess
 import sys
 import typing
 from pathlib import Path
+from types import ModuleType
 
 import polars as pl
 import pytest
@@ -97,10 +98,23 @@ def test_replay_shows_the_named_run_or_names_those_that_exist(results):
         results.replay("novelty", run=9)
 
 
-def test_pandas_is_named_if_it_is_missing(results, monkeypatch):
-    monkeypatch.setitem(sys.modules, "pandas", None)
-    with pytest.raises(MissingExtraError, match="pip install pandas"):
+@pytest.mark.parametrize("missing", ["pandas", "pyarrow"])
+def test_pandas_is_named_if_it_is_missing(missing, results, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pandas", ModuleType("pandas"))
+    monkeypatch.setitem(sys.modules, missing, None)
+    with pytest.raises(MissingExtraError, match=f"needs {missing}.*pip install pandas pyarrow"):
         results.to_pandas()
+
+
+def test_pandas_gets_all_rows_from_polars(results, monkeypatch):
+    """The development environment has no pandas. So its modules are empty, and polars passes its frame on."""
+    for module in ("pandas", "pyarrow"):
+        monkeypatch.setitem(sys.modules, module, ModuleType(module))
+    monkeypatch.setattr(pl.DataFrame, "to_pandas", lambda frame: ("pandas", frame))
+    name, frame = results.to_pandas()
+    assert name == "pandas"
+    assert frame.equals(results.to_polars())
+    assert frame.height == results.to_polars().height > 0
 
 
 def test_completion_offers_the_verbs_and_no_internals(results):

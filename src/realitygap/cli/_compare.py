@@ -9,7 +9,6 @@ import typer
 
 import realitygap
 from realitygap._terminal import echo
-from realitygap._wording import counted
 from realitygap.orders import CompareOrder
 
 from ._gap import print_row
@@ -51,8 +50,7 @@ def _print(gap: ScoreGap, common: Collection[str], *, full: bool) -> None:
         for title, words in gap.main_measures:
             echo(f"  {title:23}{words}")
     labels = " and ".join(dict.fromkeys(result.labels))
-    n = counted(result.level.n, "controller")
-    echo(f"{labels}, {n}, {result.trials_in_words}, 95 % intervals")
+    echo(f"{labels}, {result.basis}, 95 % intervals")
     for reason in gap.remarks if full else gap.reasons:
         if reason not in common:
             echo(reason)

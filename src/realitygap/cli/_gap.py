@@ -14,11 +14,11 @@ from realitygap._wording import bracketed, counted, p_equation, reproduces
 from realitygap.orders import CloseOrder, GapOrder, PlanOrder
 
 from ._code import AllowPlatforms
-from ._observer import CameraOfRobots, attending_observer, needs_operator, under_camera
+from ._observer import CameraOfRobots, measuring, needs_operator
 from ._options import Json, ShowPage, print_json
 from ._order import command_of
 from ._progress import TrialsBar, resumable
-from ._results import show_page
+from ._results import print_finding, show_page
 
 if TYPE_CHECKING:
     from realitygap.gap import GapResult, ReplayError, Why
@@ -40,18 +40,8 @@ def gap(
     """Measure the gap, print the result, and write the page."""
     if report is not None:
         realitygap.report.refuse_gap_page(report)
-    with (
-        resumable(order.results, "" if order.results else "To save trials, add -o FILE."),
-        TrialsBar(quiet=as_json) as bar,
-        under_camera(
-            camera,
-            realitygap.world.load_arena(order.arena or "paper"),
-            attending_observer(order.target, order.witness),
-        ) as observer,
-    ):
-        found = realitygap.study.gap_between(
-            order, observer=observer, allow_code=allow_code, tell=bar.show, say=bar.say
-        )
+    with measuring(order, camera, quiet=as_json) as how:
+        found = realitygap.study.gap_between(order, allow_code=allow_code, **how)
     result = found.study.result
     if report is not None:
         realitygap.report.write_gap_report(found, report)
@@ -103,14 +93,9 @@ def close(
 
 def _print(shown: GapResult | ClosedGap, result: GapResult) -> None:
     """Print title, verdict, and main measures; labels, n, and notes of a result."""
-    echo(f"Gap in {result.score}: {shown.title}")
-    echo(shown.verdict)
-    width = max(len(name) for name, _ in shown.main_measures) + 2
-    for name, words in shown.main_measures:
-        echo(f"  {name:{width}}{words}")
-    echo(f"{' and '.join(dict.fromkeys(result.labels))}, {result.basis}, 95 % intervals")
-    for note in result.notes:
-        echo(note)
+    title = f"Gap in {result.score}: {shown.title}"
+    basis = f"{' and '.join(dict.fromkeys(result.labels))}, {result.basis}, 95 % intervals"
+    print_finding(title, shown.verdict, shown.main_measures, basis, *result.notes)
 
 
 def _next(order: GapOrder, report: Path | None) -> str:

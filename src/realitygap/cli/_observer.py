@@ -6,7 +6,7 @@ import contextlib
 import math
 import sys
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -17,8 +17,10 @@ from realitygap.orders import ONLY_ROBOTS
 
 from ._grid_editor import pick_cells
 from ._keys import ask_verdict
+from ._progress import TrialsBar, resumable
 
 if TYPE_CHECKING:
+    from realitygap.orders import EstimateOrder, GapOrder
     from realitygap.records import Observe
     from realitygap.study import Study
     from realitygap.trials import Operator, PortObserver, SheetObserver, TrialPlan, Verdict
@@ -115,6 +117,27 @@ def under_camera(
     number, marks = parse_camera(spec, arena)
     with realitygap.vision.LiveTrack(realitygap.vision.CameraDevice(number), marks) as live:
         yield realitygap.study.CameraObserver(live, arena, observer)
+
+
+@contextlib.contextmanager
+def measuring(
+    order: GapOrder | EstimateOrder, camera: str | None, *, quiet: bool
+) -> Iterator[dict[str, Any]]:
+    """Return the observer of the target, and what shows progress; end at Ctrl-C as `resumable`.
+
+    Raises:
+        StudyError: The camera's options are wrong, or the robot has no operator.
+        VisionError: There is no such camera.
+    """
+    arena = realitygap.world.load_arena(order.arena or "paper")
+    observer = attending_observer(order.target, order.witness)
+    how = "" if order.results else "To save trials, add -o FILE."
+    with (
+        resumable(order.results, how),
+        TrialsBar(quiet=quiet) as bar,
+        under_camera(camera, arena, observer) as seen_by,
+    ):
+        yield {"observer": seen_by, "tell": bar.show, "say": bar.say}
 
 
 @contextlib.contextmanager

@@ -108,19 +108,23 @@ class TrialsBar(ProgressBar):
     """A display of the finished trials on each platform, on standard error. A file gets a line now and then.
 
     Args:
+        unit: Units, in the plural.
         quiet: True to show nothing.
         clock: Clock [s].
     """
 
-    def __init__(self, *, quiet: bool, clock: Callable[[], float] = time.monotonic) -> None:
-        super().__init__("trials", quiet=quiet)
+    def __init__(
+        self, unit: str = "trials", *, quiet: bool, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        super().__init__(unit, quiet=quiet)
+        self._unit = unit
         self._tasks: dict[tuple[str, int], TaskID] = {}
         self._clock, self._printed = clock, clock()
 
     def show(self, name: str, done: int, total: int) -> None:
         """Show the number of finished trials."""
         if not self._console.is_terminal:
-            self.say(f"{name}: {done:,} of {total:,} trials")
+            self.say(f"{name}: {done:,} of {total:,} {self._unit}")
             return
         if not self._progress.live.is_started:
             self._progress.start()

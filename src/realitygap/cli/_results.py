@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 import webbrowser
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -72,6 +73,17 @@ def digest(folder: Folder) -> None:
     echo(results.digest())
     if results.missing_note is not None:
         echo(f"realitygap: note: {results.missing_note}", err=True)
+
+
+def print_finding(title: str, verdict: str, rows: Sequence[tuple[str, str]], *about: str) -> None:
+    """Print a title, a verdict, named numbers in words, and lines about them."""
+    echo(title)
+    echo(verdict)
+    width = max(len(name) for name, _ in rows) + 2
+    for name, words in rows:
+        echo(f"  {name:{width}}{words}")
+    for line in about:
+        echo(line)
 
 
 def show_page(path: Path) -> None:

@@ -14,11 +14,11 @@ from ._code import AllowPlatforms
 from ._observer import attending_observer
 from ._options import Json, ShowPage, print_json
 from ._order import command_of
-from ._progress import resumable
+from ._progress import TrialsBar, resumable
 from ._results import show_page
 
 if TYPE_CHECKING:
-    from realitygap.study import ClosingProgress, ClosingSummary, TransferResult
+    from realitygap.study import ClosingSummary, TransferResult
     from realitygap.trials import PortObserver
 
 
@@ -105,19 +105,10 @@ def closing(
     open_page: ShowPage = False,
 ) -> None:
     """Run the study, or what is missing of it, print its goals, and write its page."""
-    told = [0.0, -1]
-
-    def tell(progress: ClosingProgress) -> None:
-        # a line each minute, or where much is done
-        if progress.n_done != told[1] and (progress.seconds - told[0] >= 60 or told[1] < 0):
-            told[:] = [progress.seconds, progress.n_done]
-            echo(
-                f"{progress.n_done} of {progress.n_units} parts are done, after {progress.seconds / 60:.0f} minutes.",
-                err=True,
-            )
-
-    with resumable("Finished parts are saved."):
-        summary = realitygap.study.closing_the_gap(order, tell=tell)
+    with resumable("Finished parts are saved."), TrialsBar("parts", quiet=as_json) as bar:
+        summary = realitygap.study.closing_the_gap(
+            order, tell=lambda progress: bar.show("done", progress.n_done, progress.n_units)
+        )
     folder = order.folder
     page = realitygap.report.write_closing_page(summary, folder / "report.html")
     if as_json:

@@ -218,7 +218,7 @@ class GapResult(ShownAsCard):
     @property
     def basis(self) -> str:
         """The numbers of controllers and of trials, in words."""
-        return f"{counted(self.level.n, 'controller')}, {trials_each(self.trials)}"
+        return f"{counted(self.level.n, 'controller')}, {self.trials_in_words}"
 
     @property
     def _names(self) -> tuple[str, str]:

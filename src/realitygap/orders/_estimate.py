@@ -2,23 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import ClassVar, Literal
+from typing import ClassVar
 
 from ._field import option
-from ._shared import (
-    PairOrder,
-    Processes,
-    Seed,
-    Witness,
-    arena_option,
-    noise_option,
-    saved_trials_option,
-    seed_option,
-)
+from ._shared import MeasureOrder
 
 
-class EstimateOrder(PairOrder):
+class EstimateOrder(MeasureOrder):
     """Estimate a robot's mean score, assisted by simulation.
 
     A few controllers run on the target. These and many others like them run in the simulator. The estimate is the
@@ -63,15 +53,3 @@ class EstimateOrder(PairOrder):
         help="Estimate the mean of these controllers. Otherwise, that of all controllers like them.",
         label="These controllers only",
     )
-    observe: Literal["readings", "cells", "encoders", "track"] | None = option(
-        None,
-        help="Data recorded on the target.",
-        default_is="what the task needs",
-        label="Observation level",
-    )
-    arena: str | None = arena_option(None, default_is="that of the controllers")
-    noise: float | None = noise_option()
-    results: Path | None = saved_trials_option()
-    processes: Processes = None
-    witness: Witness = None
-    seed: Seed = seed_option()

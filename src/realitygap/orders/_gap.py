@@ -3,29 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from pathlib import Path
 from typing import ClassVar, Literal
 
 from ._field import option
-from ._shared import (
-    PairOrder,
-    Processes,
-    Seed,
-    Witness,
-    arena_option,
-    margin_option,
-    noise_option,
-    saved_trials_option,
-    seed_option,
-)
+from ._shared import MeasureOrder, margin_option
 
 
-class GapOrder(PairOrder):
+class GapOrder(MeasureOrder):
     """Measure the gap between a simulator and a target.
 
     Runs the same controllers on both platforms. Reports level, RMS gap without the noise of trials, ranking, behavior,
     and equivalence at a margin, with 95 % intervals. If there are too few trials for a measure, the report says how
-    many you need.
+    many you need. With --observe track, it also measures replays.
 
     Example: realitygap gap sim jyro --n-controllers 10 --trials 5
 
@@ -43,14 +32,6 @@ class GapOrder(PairOrder):
     command: ClassVar[str] = "gap"
 
     margin: float | None = margin_option()
-    observe: Literal["readings", "cells", "encoders", "track"] | None = option(
-        None,
-        help="Data recorded on the target. track also measures replays.",
-        default_is="what the task needs",
-        label="Observation level",
-    )
-    arena: str | None = arena_option(None, default_is="that of the controllers")
-    noise: float | None = noise_option()
     randomize: Literal["no", "posterior"] = option(
         "no",
         help="posterior: sample the robot of each trial from the calibration SIM. no: use its estimate.",
@@ -68,10 +49,6 @@ class GapOrder(PairOrder):
         help="Report how much of the gap each part of the model explains. SIM must be a calibration.",
         label="Explain the gap",
     )
-    results: Path | None = saved_trials_option()
-    processes: Processes = None
-    witness: Witness = None
-    seed: Seed = seed_option()
 
     def conflicts(self) -> Iterator[tuple[str, str]]:
         """Yield the field and the message for each setting that others exclude."""

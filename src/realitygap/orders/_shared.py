@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from pathlib import Path
+from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator
 from pydantic_core import PydanticKnownError
@@ -102,29 +103,6 @@ def margin_option() -> Any:
     )
 
 
-def noise_option() -> Any:
-    """Return the field of the noise of simulators."""
-    return option(
-        None,
-        help="Noise level a of the paper, on simulators.",
-        default_is="0.1 on jyro, 0 on others",
-        at_least=0,
-        at_most=10,
-        label="Noise",
-    )
-
-
-def saved_trials_option() -> Any:
-    """Return the field of the file with the target's trials."""
-    return option(
-        None,
-        help="File to save the target's trials in (.sqlite). Run the command again to resume.",
-        metavar="FILE",
-        names=("-o", "--out"),
-        is_output=True,
-    )
-
-
 class PairOrder(Order):
     """The fields of every order that runs the same controllers on two platforms."""
 
@@ -153,3 +131,33 @@ class PairOrder(Order):
         at_most=4096,
         label="Trials per controller",
     )
+
+
+class MeasureOrder(PairOrder):
+    """The fields of every order that measures with any target, and saves its trials in a file."""
+
+    observe: Literal["readings", "cells", "encoders", "track"] | None = option(
+        None,
+        help="Data recorded on the target.",
+        default_is="what the task needs",
+        label="Observation level",
+    )
+    arena: str | None = arena_option(None, default_is="that of the controllers")
+    noise: float | None = option(
+        None,
+        help="Noise level a of the paper, on simulators.",
+        default_is="0.1 on jyro, 0 on others",
+        at_least=0,
+        at_most=10,
+        label="Noise",
+    )
+    results: Path | None = option(
+        None,
+        help="File to save the target's trials in (.sqlite). Run the command again to resume.",
+        metavar="FILE",
+        names=("-o", "--out"),
+        is_output=True,
+    )
+    processes: Processes = None
+    witness: Witness = None
+    seed: Seed = seed_option()

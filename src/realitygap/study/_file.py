@@ -150,7 +150,7 @@ def parse_study(text: str, origin: str, *, seed: int | None = None, replicates: 
     _refuse_other_files(data, origin)
     problems = Problems()
     find_files(data, Path(origin).parent, problems)
-    study = _resolve(data, problems, replaced(seed, replicates))
+    study = _resolve(data, problems, replaced(seed=seed, replicates=replicates))
     if problems.lines or study is None:
         count = len(problems.lines)
         head = f"{origin} has {count} mistake{'s' if count != 1 else ''}; nothing was run."

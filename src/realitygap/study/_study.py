@@ -26,10 +26,6 @@ def _printable(text: str) -> str:
 Line = Annotated[str, AfterValidator(_printable)]
 
 
-MOST_SEED = 2**63 - 1
-MOST_REPLICATES = 1_000_000_000
-
-
 class StudySection(Settings):
     """The settings of the whole study."""
 
@@ -40,11 +36,11 @@ class StudySection(Settings):
     )
     title: Line = Field("", max_length=200, description="Title of the report. Default: the name.")
     note: Line = Field("", max_length=500, description="Remark, shown in the summary.")
-    seed: int = Field(1, ge=0, le=MOST_SEED, description="Seed of all random numbers.")
+    seed: int = Field(1, ge=0, le=2**63 - 1, description="Seed of all random numbers.")
     replicates: int = Field(
         100,
         ge=1,
-        le=MOST_REPLICATES,
+        le=1_000_000_000,
         description="Number of runs per condition. Increase it to extend an existing study.",
     )
     pair: bool = Field(
@@ -54,17 +50,17 @@ class StudySection(Settings):
     )
 
 
-def replaced(seed: int | None = None, replicates: int | None = None) -> dict[str, int]:
-    """Return the values that replace settings of the study, without those that are None.
+def replaced(**given: int | None) -> dict[str, int]:
+    """Return the seed and the replicates that replace those of the study, without those that are None.
 
     Raises:
         StudyError: One is not a whole number, or out of range.
     """
-    given = {"seed": (seed, 0, MOST_SEED), "replicates": (replicates, 1, MOST_REPLICATES)}
+    ranges = {"seed": (0, 2**63 - 1), "replicates": (1, 1_000_000_000)}
     try:
         return {
-            name: whole_number(f"--{name}", value, least, most)
-            for name, (value, least, most) in given.items()
+            name: whole_number(f"--{name}", value, *ranges[name])
+            for name, value in given.items()
             if value is not None
         }
     except (TypeError, ValueError) as error:

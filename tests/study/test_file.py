@@ -182,6 +182,9 @@ def test_all_mistakes_are_said_at_once_each_with_its_place():
         ("noise = -0.1", "condition[1] 'a'.noise", "expected at least 0"),
         ('platform = "tank"', "condition[1] 'a'.platform", "got 'tank'"),
         ('platform = "twin"', "condition[1] 'a'", "expected twin:FILE"),
+        ('platform = "sim:no.toml"', "condition[1] 'a'.platform", "There is no robot file no.toml."),
+        ('platform = "sim:thymyo"', "condition[1] 'a'.platform", "Did you mean 'thymio'?"),
+        ('platform = "twin:no.toml"', "condition[1] 'a'", "the twin's file 'no.toml' cannot be read"),
         ('baseline = "b"', "condition 'a'.baseline", "there is no condition 'b'"),
         ("published = [0.1, 2]", "condition[1] 'a'.published[2]", "expected at most 1.0, got 2."),
         ('published = ["x"]', "condition[1] 'a'.published[1]", "expected a number, got 'x'."),
@@ -222,6 +225,22 @@ def test_a_file_that_is_no_study_is_refused(text, message):
     with pytest.raises(StudyError, match=r"mine\.toml") as caught:
         parse_study(text, "mine.toml")
     assert message in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        'platform = "sim:no.toml"',
+        'platform = "twin:no.toml"',
+        'platform = "sim:thymio"',  # which has no number light.0.gain
+        'platform = "sim"\ntask.kind = "goal"\nsim.robot = "no.toml"',
+    ],
+)
+def test_condition_with_a_mistake_is_never_left_out(change):
+    """A condition with a missing robot file vanished, and the rest of the study ran."""
+    text = MINIMAL + f'[[condition]]\nname = "b"\n{change}\n[[condition]]\nname = "c"\nplatform = "sim"\n'
+    lines = mistakes(text + '[platform.sim.set]\n"light.0.gain" = 1.1\n')
+    assert any(line.startswith("condition[2] 'b'") for line in lines), lines
 
 
 def test_numbers_of_robot_and_arena_are_wrong_at_once():

@@ -24,7 +24,7 @@ from realitygap.platforms import (
     study_platforms,
 )
 from realitygap.runs import Condition
-from realitygap.settings import MISSING
+from realitygap.settings import MISSING, mistakes
 from realitygap.tasks import ControllerSettings, CoverageTask, task_model
 from realitygap.world import ArenaSettings
 
@@ -365,11 +365,14 @@ def _condition(
     try:
         condition = Condition.model_validate({**own, "seed": about.seed, "pair": about.pair, **merged})
     except ValidationError as error:
-        for problem in error.errors():
-            if problem["type"] == "missing":
-                problems.add(".".join((place, *map(str, problem["loc"]))), MISSING)
-            if not problem["loc"]:  # what is wrong within a section was noted there
-                problems.add(place, str(problem["msg"]).removeprefix("Value error, "))
+        rest = f"{platform}.{platform_class(platform).rest_setting}"
+        for name, text in mistakes(error, Condition, merged):
+            section = name.partition(".")[0]
+            shared = tuple(above + section + end for above in ("", "platform.") for end in ".:")
+            if name == rest and ":" in str(own.get("platform")):
+                problems.add(f"{place}.platform", text)
+            elif text == MISSING or not any(line.startswith(shared) for line in problems.lines):
+                problems.add(f"{place}.{name}".rstrip("."), text)  # otherwise it was noted there
         if any(problem["loc"][:1] == (platform,) for problem in error.errors()):
             _check_arena_numbers(platform, merged, place, problems)
         return None, notes

@@ -75,6 +75,10 @@ _FOCUSED = """() => {
   window.lastFocused = it;
   if (last && last.isConnected && !(last.compareDocumentPosition(it) & Node.DOCUMENT_POSITION_FOLLOWING))
     return `out of order: ${it.outerHTML.slice(0, 200)}`;
+  const bars = ".lab-header, .lab-steps-bar, .lab-requests, .lab-actions, .lab-stop-bar";
+  const box = it.getBoundingClientRect(), middle = (box.left + box.right) / 2;
+  const isCovered = (y) => document.elementFromPoint(middle, y)?.closest(bars) && !it.closest(bars);
+  if ([box.top + 3, box.bottom - 3].some(isCovered)) return `focus behind a bar: ${it.outerHTML.slice(0, 200)}`;
   const border = it.closest(".q-field") && getComputedStyle(it.closest(".q-field__control"), "::after").borderTopWidth;
   return style.outlineStyle !== "none" || border === "2px" ? "" : `no visible focus: ${it.outerHTML.slice(0, 200)}`;
 }"""
@@ -174,9 +178,9 @@ def states(page: Any) -> list[str]:
     return found
 
 
-def keyboard(page: Any) -> list[str]:
-    """Return the controls that Tab reaches out of order, without a visible focus, or not at all."""
-    page.set_viewport_size({"width": DESKTOP[0], "height": DESKTOP[1]})
+def keyboard(page: Any, size: tuple[int, int] = DESKTOP) -> list[str]:
+    """Return the controls that Tab reaches out of order, without a visible focus, behind a bar, or not at all."""
+    page.set_viewport_size({"width": size[0], "height": size[1]})
     page.emulate_media(reduced_motion="reduce")  # a border has its width at once
     settle(page)
     found: list[str] = []

@@ -11,7 +11,7 @@ from realitygap.families.scribbler.emulator import Emulator
 from realitygap.study import parse_study, run_study
 
 from .conftest import enter, open_advanced, open_fold
-from .page_checks import faults, keyboard, states, watch_states
+from .page_checks import SIZES, faults, keyboard, states, watch_states
 from .robot_study import await_trial, begin_sitting, make_study
 from .sheets import drive_sheet, photo_of
 
@@ -48,6 +48,8 @@ def test_pages_without_a_study_are_accessible(lab, look):
         page.get_by_text(text).first.wait_for()
         assert faults(page, lab.root) == [], path
         assert keyboard(page) == [], path
+        if path == "new":  # the page with a bar at its lower edge
+            assert keyboard(page, SIZES["zoom of 200 %"]) == []
 
 
 def test_a_gap_with_a_mistake_while_it_is_measured_and_its_result(lab, look):

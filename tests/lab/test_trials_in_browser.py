@@ -100,7 +100,7 @@ def test_only_the_current_step_is_open_and_its_action_is_in_view(lab, visit, siz
     await_trial(page, 1)
     check("Place", "Start trial", [])
     page.get_by_role("button", name="Start trial").click()
-    check("Drive", "Abort trial", [])
+    check("Drive", "Stop robot" if size == PHONE else "Abort trial", [])
     start_trial(page, 2)
     page.get_by_text("is full").wait_for()
     check("Score", "Save score", ["Score"])
@@ -223,11 +223,15 @@ def test_robot_changes_hands_when_its_operator_agrees_and_everyone_can_stop_it(l
     await_trial(page, 1)
     other = visit(PAGE)
     other.get_by_text("anna is operating the robot. You are watching.").wait_for()
-    assert other.get_by_role("button", name="Start trial").is_disabled()
+    assert other.get_by_role("button", name="Start trial").count() == 0
+    open_fold(page, "All trials")
+    page.set_viewport_size({"width": PHONE[0], "height": 400})
     for answer in ("Keep", "Hand over"):
+        page.evaluate("scrollTo(0, document.body.scrollHeight)")
         other.get_by_role("button", name="Request control").click()
         other.get_by_text("You requested control.").wait_for()
         page.get_by_text("requests control of the robot.").wait_for()
+        assert covered(page.get_by_role("button", name=answer, exact=True)) == []
         page.get_by_role("button", name=answer, exact=True).click()
         if answer == "Keep":
             other.get_by_text("anna keeps the robot.").wait_for()

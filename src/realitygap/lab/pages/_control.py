@@ -132,7 +132,7 @@ def show_request(lab: Lab, visitor: Visitor) -> None:
     def show(request: RobotRequest | None) -> None:
         if request is None or request.state == "kept" or request.operator.key != visitor.key:
             return
-        with ui.row().classes("lab-row lab-question").props('role="alert"'):
+        with ui.row().classes("lab-row lab-question lab-request").props('role="alert"'):
             ui.label(f"{request.visitor.who or 'Another visitor'} requests control of the robot.")
             for text, yes in (("Hand over", True), ("Keep", False)):
                 button = ui.button(text, on_click=lambda yes=yes: _answer(lab, visitor, yes=yes))

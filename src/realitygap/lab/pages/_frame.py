@@ -71,7 +71,7 @@ def framed(
                     ui.label("›").props('aria-hidden="true"')
                 ui.label(title)
         ui.label(title).props('role="heading" aria-level="1"').classes("lab-title")
-        asked = ui.element("div")
+        asked = ui.element("div").classes("lab-requests")
         yield
     visitor = visitor_of(ui.context.client.request)
     # After the content: once a page has a timer, it is sent as far as it is done.

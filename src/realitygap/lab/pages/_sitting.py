@@ -109,10 +109,12 @@ class _Shown:
         self._button("Close generation")
 
     def _button(self, text: str, choice: messages.Choice = "", *, is_main: bool = True) -> None:
-        """Show a button that answers the question."""
+        """Show a button that answers the question, if this visitor may."""
+        if not self._may:
+            return
         ui.button(text, on_click=lambda: self._answer(choice)).props(
             ("unelevated" if is_main else "outline") + " no-caps"
-        ).classes("lab-primary" if is_main else "").set_enabled(self._may)
+        ).classes("lab-primary" if is_main else "")
 
     def _answer(self, choice: messages.Choice = "", trial: int | None = None) -> None:
         if not self._job.answer(messages.Answer(self._number, choice, trial)):
@@ -154,9 +156,9 @@ class Driving:
             self._silence = Silence()
             self._grid = CellGrid(arena, ink=card["pen"], name="Position of the robot").classes("lab-sketch")
             self._cells = ui.label("").classes("lab-value")
-            ui.button("Abort trial", on_click=self._job.stop_robot, color="negative").props(
+            ui.button("Abort trial", on_click=self._job.stop_robot, color=None).classes("lab-pad-stop").props(
                 "unelevated no-caps"
-            ).classes("lab-primary")
+            )
         ui.timer(LIVE_S, self._look)
 
     def _look(self) -> None:

@@ -85,6 +85,7 @@ PRINTED_BY = {
     "study/_code.py": ("gap", "plan"),
     "study/_file.py": ("drive", "gap", "run"),
     "study/_gap/between.py": ("gap",),
+    "study/_estimate_table.py": ("estimate",),
     "study/_gap/estimate.py": ("estimate",),
     "study/_gap/study.py": ("gap",),
     "study/_order.py": ("run",),

@@ -50,7 +50,7 @@ WITH = {
     },
     "close": {},
     "closing-the-gap": {"budgets": {"budgets": "0,20"}},
-    "estimate": {},
+    "estimate": {"range": {"range": "0:100"}, "minus": {"of": "A"}},
     "compare": {"range": {"range": "0:100"}},
     "gap": {},
     "plan": {"margin": {"effect": None}, "correlation": {"effect": None, "correlation": 0.9}},

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import realitygap
-from realitygap._wording import counted
 from realitygap.orders import EstimateOrder
 
 from ._code import AllowPlatforms
@@ -21,14 +20,13 @@ def estimate(
     as_json: Json = False,
 ) -> None:
     """Estimate, and print both intervals."""
-    with measuring(order, camera, quiet=as_json) as how:
-        found = realitygap.study.estimate_score(order, allow_code=allow_code, **how)
+    if order.is_of_table:
+        found = realitygap.study.estimate_score(order)
+    else:
+        with measuring(order, camera, quiet=as_json) as how:
+            found = realitygap.study.estimate_score(order, allow_code=allow_code, **how)
     if as_json:
         print_json(found.to_dict() | {"order": order.record()})
         return
-    sides = (
-        f"{side.label}: {counted(side.n, 'controller')} with {counted(side.trials, 'trial')} each"
-        for side in (found.target, found.source)
-    )
-    basis = f"{'; '.join(sides)}; {100 * found.assisted.estimate.level:g} % intervals"
+    basis = f"{found.basis}; {100 * found.assisted.real_only.level:g} % intervals"
     print_finding(found.title, found.verdict, found.rows, basis, *found.notes)

@@ -5,7 +5,7 @@ A command, a function, a form of the lab, the message to a worker, and the recor
 
 from ._calibrate import CalibrateOrder
 from ._close import CloseOrder
-from ._compare import CompareOrder
+from ._compare import CompareOrder, range_ends
 from ._estimate import EstimateOrder
 from ._field import Limits, OrderField
 from ._function import takes_order, with_fields
@@ -34,6 +34,7 @@ __all__ = [
     "Question",
     "TransferOrder",
     "TryOrder",
+    "range_ends",
     "read_order",
     "takes_order",
     "with_fields",

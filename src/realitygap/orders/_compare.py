@@ -102,13 +102,13 @@ class CompareOrder(Order):
     @property
     def ends(self) -> tuple[float, float]:
         """Minimum and maximum of the scores."""
-        return _ends(self.range)
+        return range_ends(self.range)
 
     def conflicts(self) -> Iterator[tuple[str, str]]:
         """Yield the field and the message for each setting that cannot be, or that others exclude."""
         if not self.table:
             yield "table", "expected at least one table, got none."
-        low, high = _ends(self.range)
+        low, high = range_ends(self.range)
         if not low < high:
             yield (
                 "range",
@@ -118,8 +118,8 @@ class CompareOrder(Order):
             yield "real", f"expected another platform than --sim, got {self.real}."
 
 
-def _ends(text: str) -> tuple[float, float]:
-    """Return both ends of a range; nan if the text is none."""
+def range_ends(text: str) -> tuple[float, float]:
+    """Return both ends of a range; nan if the text has none."""
     parts = re.split(r"[:,\s]+", text.strip())
     try:
         low, high = (float(part) for part in parts)

@@ -66,9 +66,9 @@ def option(
     return Field(default, description=help, ge=at_least, gt=above, le=at_most, json_schema_extra=more)
 
 
-def argument(metavar: str, *, help: str, label: str = "", refers: Refers = "") -> Any:
-    """Return a field that a command takes without the name of an option, and that has to be given."""
-    return option(help=help, metavar=metavar, label=label, refers=refers, is_argument=True)
+def argument(metavar: str, *, help: str, label: str = "", refers: Refers = "", default: object = ...) -> Any:
+    """Return a field that a command takes without the name of an option, and that has to be given without a default."""
+    return option(default, help=help, metavar=metavar, label=label, refers=refers, is_argument=True)
 
 
 @dataclass(frozen=True)

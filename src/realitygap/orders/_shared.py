@@ -15,6 +15,7 @@ from ._order import Order
 
 ONLY_ROBOTS = "Only for robots"
 ONLY_TWINS = "Only for twins"
+ONLY_TABLES = "Only for tables of scores"
 
 _MOST_SEED = 2**63 - 1
 """Integers of kernels and of TOML have 64 bits. No help text shows this limit, because it has 19 digits."""

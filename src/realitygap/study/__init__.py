@@ -22,7 +22,7 @@ from ._controllers import sample_controllers
 from ._duration import estimate_seconds
 from ._file import DEFAULT_NEAT, SECTIONS, load_study, named_studies, parse_study, platform_sections
 from ._gap.between import GapBetween, gap_between
-from ._gap.estimate import EstimatedScore, estimate_score
+from ._gap.estimate import estimate_score
 from ._gap.plan import GapPlan, plan_gap, recorded_spreads
 from ._gap.study import MOST_CONTROLLERS, GapStudy, ShownTrials
 from ._kept_target import StoppedByPerson

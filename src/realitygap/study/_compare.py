@@ -58,7 +58,7 @@ def compare_scores(order: CompareOrder) -> ComparedScores:
         if order.task not in tasks:
             raise TableError(f"There is no task {order.task!r}. {did_you_mean(order.task, tasks - {''})}")
         rows = [row for row in rows if row.task == order.task]
-    sim, real = _platforms(rows, order)
+    sim, real = platforms_in(rows, order.sim, order.real)
     how = Comparison(
         sim,
         real,
@@ -84,8 +84,15 @@ def _read(table: str, order: CompareOrder) -> list[ScoreRow]:
     )
 
 
-def _platforms(rows: Sequence[ScoreRow], order: CompareOrder) -> tuple[str, str]:
+def platforms_in(
+    rows: Sequence[ScoreRow], sim: str | None, real: str | None, words: tuple[str, str] = ("--sim", "--real")
+) -> tuple[str, str]:
     """Return the platform that predicts and the one that is predicted.
+
+    Args:
+        rows: Rows of the table.
+        sim, real: Their names; None for the names `sim` and `real`, or the other one of two.
+        words: Options that name them.
 
     Raises:
         TableError: The table does not have them, or it is open which ones they are.
@@ -96,10 +103,10 @@ def _platforms(rows: Sequence[ScoreRow], order: CompareOrder) -> tuple[str, str]
             f"All scores are of the platform {names[0]}, expected two. Add those of the other one, in this table or in "
             "another: NAME=FILE"
         )
-    chosen = {"sim": order.sim, "real": order.real}
-    for option, name in chosen.items():
+    chosen = {"sim": sim, "real": real}
+    for word, name in zip(words, chosen.values(), strict=True):
         if name is not None and name not in names:
-            raise TableError(f"There is no platform {name!r} (--{option}). {did_you_mean(name, names)}")
+            raise TableError(f"There is no platform {name!r} ({word}). {did_you_mean(name, names)}")
     for option, other, default in (("sim", "real", _SIM), ("real", "sim", _REAL)):
         if chosen[option] is None and default in names and chosen[other] != default:
             chosen[option] = default
@@ -109,7 +116,7 @@ def _platforms(rows: Sequence[ScoreRow], order: CompareOrder) -> tuple[str, str]
     sim, real = chosen["sim"], chosen["real"]
     if sim is None or real is None:
         raise TableError(
-            f"The platforms are {', '.join(names)}. Name the one that predicts (--sim) and the one that is predicted "
-            "(--real)."
+            f"The platforms are {', '.join(names)}. Name the one that predicts ({words[0]}) and the one that is "
+            f"predicted ({words[1]})."
         )
     return sim, real

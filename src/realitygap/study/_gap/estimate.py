@@ -3,104 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-from realitygap._wording import counted, number, platform_in_words, with_interval, worth_verdict
+from realitygap._wording import counted, platform_in_words
 from realitygap.errors import StudyError
 from realitygap.gap import GapSide
 from realitygap.orders import EstimateOrder, takes_order
 from realitygap.platforms import RecordedPlatform, RecordedTarget, open_target, split_spec
-from realitygap.stats import FEW_UNITS, Assisted, assisted_mean, least_correlation
+from realitygap.stats import assisted_mean
 from realitygap.tasks import Task
 from realitygap.trials import PortObserver, Pulse, Target
-from realitygap.world import Arena, Calibration
+from realitygap.world import Arena
 
 from .._code import task_named
 from .._controllers import Controller, recorded_controllers, sample_controllers, task_of
+from .._estimate_table import estimate_in_table
+from .._estimated import EstimatedScore
 from .._targets import check_task, open_trials, refuse_too_little
 from .between import Say, arena_of, noise_on
 from .study import STEPS, TARGET_FROM, Tell, carry_out, plans_of, refuse_inputs, side_of
 from .why import calibration_of
-
-
-@dataclass(frozen=True)
-class EstimatedScore:
-    """A mean score on a target, assisted by a simulator.
-
-    Attributes:
-        assisted: The estimate, and the one from the target alone.
-        source: All controllers in simulation; the first ones are those of `target`.
-        target: Driven controllers on the target.
-        score: Score of trials, with its unit.
-        order: The order, from which it can be estimated again.
-    """
-
-    assisted: Assisted
-    source: GapSide
-    target: GapSide
-    score: str
-    order: EstimateOrder
-
-    def __repr__(self) -> str:
-        return f"{type(self).__name__}({self.assisted.estimate}, target alone {self.assisted.real_only})"
-
-    @property
-    def title(self) -> str:
-        """The estimated mean in words."""
-        sim, target = (platform_in_words(side.name, side.label) for side in (self.source, self.target))
-        whose = f"of these {self.source.n} controllers " if self.order.fleet else ""
-        return f"Mean {self.score} {whose}on {target}, assisted by {sim}"
-
-    @property
-    def rows(self) -> list[tuple[str, str]]:
-        """Name and value of each result, in words."""
-        assisted = self.assisted
-        estimate = with_interval(assisted.estimate)
-        correlation = f"{number(assisted.correlation)} (helps above {least_correlation(self.target.n):.2f})"
-        rows = [("estimate", f"{estimate}  {assisted.estimate.refused}".rstrip())]
-        rows.append(("target alone", with_interval(assisted.real_only)))
-        if assisted.width_ratio is not None:
-            rows.append(("width of interval", f"{assisted.width_ratio:.2f} of that of the target alone"))
-        return rows if self.target.n < 3 else [*rows, ("correlation", correlation)]
-
-    @property
-    def verdict(self) -> str:
-        """The worth of the simulation, as a sentence."""
-        if self.assisted.worth is None:
-            return "Use the estimate from the target alone."
-        return worth_verdict(self.assisted.worth, "controller", helps=self.assisted.helps)
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """Limits of the intervals, each a sentence."""
-        if self.assisted.estimate.ends is None or self.target.n >= FEW_UNITS:
-            return ()
-        return (
-            f"With fewer than {FEW_UNITS} controllers on the target, intervals of skewed scores miss more often than "
-            "5 of 100 times.",
-        )
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the estimates, what they rest on, and the verdict, as in the output of `--json`."""
-        assisted = self.assisted
-        return {
-            "estimate": assisted.estimate.to_dict(),
-            "target_alone": assisted.real_only.to_dict(),
-            "width_ratio": assisted.width_ratio,
-            "worth": assisted.worth,
-            "correlation": assisted.correlation,
-            "helps": assisted.helps,
-            "verdict": self.verdict,
-            "notes": list(self.notes),
-            "score": self.score,
-            "source": self.source.name,
-            "target": self.target.name,
-            "labels": [self.source.label, self.target.label],
-            "controllers": [self.source.n, self.target.n],
-            "trials": [self.source.trials, self.target.trials],
-        }
 
 
 @takes_order(EstimateOrder)
@@ -126,7 +48,9 @@ def estimate_score(
         StudyError: A platform, study or number that cannot be, or a calibration from the very trials of the target.
         RealityGapError: The robot failed, or files cannot be read or written.
     """
-    _refuse_own_calibration(order, calibration_of(order.sim))
+    if not order.target:
+        return estimate_in_table(order)
+    _refuse_own_calibration(order.sim, order.target)
     controllers, n = _drawn(order, allow_code=allow_code)
     if say is not None:
         say(f"Driving {n} of {len(controllers)} controllers: {order.controllers}.")
@@ -164,18 +88,25 @@ def estimate_score(
         within=task.score_range,
         noun="controllers",
     )
-    return EstimatedScore(assisted, simulated, real, task.score_name, order)
+    names = [platform_in_words(side.name, side.label) for side in (simulated, real)]
+    whose = f"of these {counted(simulated.n, 'controller')} " if order.fleet else ""
+    basis = "; ".join(
+        f"{side.label}: {counted(side.n, 'controller')} with {counted(side.trials, 'trial')} each"
+        for side in (real, simulated)
+    )
+    title = f"Mean {task.score_name} {whose}on {names[1]}, assisted by {names[0]}"
+    return EstimatedScore(assisted, title, "controller", real.means, means, basis, task.score_name, order)
 
 
-def _refuse_own_calibration(order: EstimateOrder, calibration: Calibration | None) -> None:
+def _refuse_own_calibration(sim: str, target: str) -> None:
     """Refuse a simulator that was fitted to the very trials of the target: its scores would depend on theirs."""
-    name, file = split_spec(order.target)
+    calibration, (name, file) = calibration_of(sim), split_spec(target)
     if calibration is None or name != RecordedPlatform.name:
         return
     used = [calibration.target.partition(":")[2], *map(str, calibration.order.get("data", ()))]
     if any(each and Path(each).resolve() == Path(file).resolve() for each in used):
         raise StudyError(
-            f"{order.sim} was fitted to the trials in {file}, so the estimate would use them twice. Expected a "
+            f"{sim} was fitted to the trials in {file}, so the estimate would use them twice. Expected a "
             "calibration from other trials: record new ones, or calibrate with a part of them."
         )
 

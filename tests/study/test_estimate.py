@@ -129,7 +129,7 @@ def test_a_table_gives_the_mean_of_controllers_as_arrays_do():
         ([("A", "sim", "", 1, 0.5), ("A", "real", "", 1, 0.5)], {"of": "A"}, "no blocks"),
         ([("A", "sim", 1, 1, 0.5), ("A", "real", 1, 1, 0.5)], {"of": "C"}, "no controller 'C'"),
         ([("A", "sim", 1, 1, 0.5), ("B", "real", 1, 1, 0.5)], {}, "on real only"),
-        ([("A", "sim", 1, 1, 50), ("A", "real", 1, 1, 0.5)], {}, "--range"),
+        ([("A", "sim", 1, 1, 50), ("A", "real", 1, 1, 0.5)], {}, "expected 0 to 1"),
         ([("A", "sim", 1, 1, 0.5)], {}, "expected two"),
     ],
 )

@@ -378,7 +378,7 @@ def _by_block(rows: Sequence[ScoreRow], how: Comparison) -> dict[str, float]:
     if twice is not None and how.is_binary:
         first = rows[0]
         raise TableError(
-            f"{first.controller} has {len(found[twice])} trials in block {twice} on {first.platform}, expected one "
-            "success or failure for each pair. Compare without pairs: --unpaired"
+            f"{first.controller} was tried {len(found[twice])} times in block {twice} on {first.platform}, expected "
+            "one success or failure for each pair. Compare without pairs: --unpaired"
         )
     return {block: float(np.mean(scores)) for block, scores in found.items()}

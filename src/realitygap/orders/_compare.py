@@ -12,7 +12,7 @@ from pydantic import BeforeValidator
 
 from ._field import argument, option
 from ._order import Order
-from ._shared import Seed, seed_option
+from ._shared import Seed, controller_option, score_option, seed_option
 
 Label = Literal["SIM", "TWIN", "EMULATED", "REAL"]
 
@@ -68,9 +68,7 @@ class CompareOrder(Order):
     task: str | None = option(
         None, help="Task to compare.", default_is="all tasks, each apart", metavar="NAME"
     )
-    score: str | None = option(
-        None, help="Column with the scores.", default_is="score, or success", metavar="COLUMN"
-    )
+    score: str | None = score_option()
     range: str = option(
         UNIT_RANGE, help="Range of the scores, such as 0:100 for percent, or 0:inf.", metavar="LOW:HIGH"
     )
@@ -89,12 +87,7 @@ class CompareOrder(Order):
         "both",
         help="Pairs that tie on one platform only: both, violated for both controllers; simpler, as its code counts.",
     )
-    controller: str | None = option(
-        None,
-        help="Name of the only controller, if the table has no column for it.",
-        default_is="a column",
-        metavar="NAME",
-    )
+    controller: str | None = controller_option()
     sim_label: Label = option("SIM", help="Label of the platform that predicts.")
     real_label: Label = option("REAL", help="Label of the platform that is predicted.")
     seed: Seed = seed_option()

@@ -9,7 +9,7 @@ from realitygap.robot_families import port_platforms
 
 from ._compare import UNIT_RANGE, range_ends
 from ._field import argument, option
-from ._shared import ONLY_TABLES, MeasureOrder
+from ._shared import ONLY_TABLES, MeasureOrder, controller_option, score_option
 
 
 class EstimateOrder(MeasureOrder):
@@ -92,6 +92,8 @@ class EstimateOrder(MeasureOrder):
     real_name: str | None = option(
         None, help="Platform that is estimated.", default_is="real", metavar="PLATFORM", panel=ONLY_TABLES
     )
+    score: str | None = score_option(panel=ONLY_TABLES)
+    controller: str | None = controller_option(panel=ONLY_TABLES)
     range: str = option(
         UNIT_RANGE,
         help="Range of the scores, such as 0:100 for percent.",
@@ -120,4 +122,4 @@ class EstimateOrder(MeasureOrder):
                 f"expected LOW:HIGH, such as 0:100, with the lower number first, got {self.range!r}.",
             )
         if self.minus is not None and self.of is None:
-            yield "minus", "expected --of with it: the difference is the one minus the other."
+            yield "minus", "expected a controller in --of, from which to subtract it, got none."

@@ -104,6 +104,28 @@ def margin_option() -> Any:
     )
 
 
+def score_option(**face: str) -> Any:
+    """Return the field of the column with the scores of a table."""
+    return option(
+        None,
+        help="Column with the scores.",
+        default_is="score, or success",
+        metavar="COLUMN",
+        **face,  # type: ignore[arg-type]  # mypy takes them for limits
+    )
+
+
+def controller_option(**face: str) -> Any:
+    """Return the field of the only controller of a table."""
+    return option(
+        None,
+        help="Name of the only controller, if the table has no column for it.",
+        default_is="a column",
+        metavar="NAME",
+        **face,  # type: ignore[arg-type]
+    )
+
+
 class PairOrder(Order):
     """The fields of every order that runs the same controllers on two platforms."""
 

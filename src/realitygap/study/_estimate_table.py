@@ -29,7 +29,8 @@ def estimate_in_table(order: EstimateOrder) -> EstimatedScore:
     Raises:
         TableError: The table cannot be read, or has no such units.
     """
-    rows = _of_task(read_scores(Path(order.sim)), order.task)
+    table = read_scores(Path(order.sim), controller=order.controller or "", score=order.score or "")
+    rows = _of_task(table, order.task)
     sim, real = platforms_in(rows, order.sim_name, order.real_name, ("--sim-name", "--real-name"))
     within = range_ends(order.range)
     for row in rows:

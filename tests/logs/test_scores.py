@@ -54,8 +54,8 @@ def test_a_block_makes_a_row_a_trial(tmp_path):
 
 REFUSED = {
     "no platform": ("policy,score\na,0.5\n", "no column platform. If all rows are of one"),
-    "no controller": ("platform,score\nsim,0.5\n", "--controller NAME"),
-    "no score": ("policy,platform,value\na,sim,0.5\n", "--score COLUMN"),
+    "no controller": ("platform,score\nsim,0.5\n", "controller=NAME"),
+    "no score": ("policy,platform,value\na,sim,0.5\n", "score=COLUMN"),
     "percent": ("policy,platform,score\na,sim,85%\n", "line 2: score is '85%'.* Percent is not guessed"),
     "a comma": ("policy;platform;score\na;sim;0,5\n", "score is '0,5'"),
     "nan": ("policy,platform,score\na,sim,nan\n", "score is 'nan'"),

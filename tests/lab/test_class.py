@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import asyncio
 import json
+import re
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 from pydantic import ValidationError
 
@@ -17,6 +20,8 @@ from realitygap.lab import _class
 from realitygap.lab._class import GONE_S, MOST_PAGES, MOST_STUDENTS, MOST_WORDS, Classroom, Student, Word
 from realitygap.lab._class_results import FILE, LONGEST_NAME, clean_name
 from realitygap.lab._hand import DEAD_MAN_S
+from realitygap.lab.pages._class import _Board, _Class
+from realitygap.playback import MovingTrial
 
 
 class Class:
@@ -203,6 +208,69 @@ def test_names_have_no_characters_that_control_a_page():
 def test_equal_names_get_a_number_and_an_empty_one_is_none(course):
     assert [course.join("Ada", key).name for key in "abc"] == ["Ada", "Ada 2", "Ada 3"]
     assert course.join("  ", "d").robot is None
+
+
+def test_equal_names_stay_different_after_a_restart(course, again):
+    long = "x" * LONGEST_NAME
+    for key in "abc":
+        course.join(long, key)
+    course.room.start_round()
+    course.pass_time(0.1)
+    later = again()
+    names = [long, f"{long} 2", f"{long} 3"]
+    assert [drive.name for drive in later.room.drives()] == names
+    assert later.join(long, "d").name == f"{long} 4"  # the others have not come back yet
+    assert [later.room.enter(key)[0].name for key in "abc"] == names
+    later.room.reset()
+    newest = again()
+    newest.room.reset()
+    assert newest.join(long, "e").name == long
+    assert newest.room.enter("a")[0].name == f"{long} 2"
+
+
+def test_page_of_an_interrupted_drive_states_it_and_compares_no_lost_path(course, again):
+    ada = course.join("Ada")
+    course.room.start_round()
+    course.drive(0.5, ada=(ada, 1.0, 0.0))
+    later = again().room  # as after a crash: the path is saved at the end only
+    student, _ = later.enter("Ada")
+    page = _Class(None, later)
+    assert page._state(student)["phase"] == "cut"
+    assert later.seconds_left(student) == 0.0
+    assert later.n_cells(student) == course.room.n_cells(ada)
+    page.evolved = evolved = SimpleNamespace(cells=np.array([1]), trial=None)
+    later.shows_evolution = True
+    evolved.trial = MovingTrial.of_rows(
+        "Evolution",
+        "SIM",
+        later.arena,
+        page._shape,
+        0.1,
+        np.zeros((1, 3)),
+        np.zeros((1, 3)),
+        np.zeros(1, np.bool_),
+    )
+    assert [trial["title"] for trial in page._stage(student, compares=True)["trials"]] == ["Evolution"]
+    assert page._state(student)["evolution"] == "1 cell"
+
+
+def test_board_ranks_equal_results_alike_and_keeps_its_clock_when_a_student_is_late(course):
+    ada, eve = course.join("Ada"), course.join("Eve")
+    board = _Board(_Class(None, course.room))
+    course.room.start_round()
+    course.drive(1.0, ada=(ada, 1.0, 0.0))
+    late = course.join("Late")
+    assert board._heading() == "Round 1: 1 s left"
+    course.pass_time(0.1)
+    assert re.findall(r"<span>(\d+)\.</span><span>(\w+)<", board._list()) == [
+        ("1", "Ada"),
+        ("2", "Eve"),
+        ("2", "Late"),
+    ]
+    assert [board._page._state(student)["place"] for student in (ada, eve, late)] == [1, 2, 2]
+    course.pass_time(1.0)
+    assert board._heading() == "Round 1: 1 student still driving, 1 s left"
+    assert board._page._state(ada)["phase"] == "over"
 
 
 def test_removed_name_leaves_the_board_and_may_be_replaced(course, again):

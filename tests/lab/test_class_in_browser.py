@@ -47,6 +47,9 @@ def student(visitors: Any, lab: RunningLab) -> Iterator[Any]:
 
 def test_student_joins_drives_a_round_and_is_on_the_board(lab, student, visit):
     board = visit("class/board", DESKTOP)
+    student.fill("#who", "  ")
+    student.get_by_role("button", name="Join").click()
+    expect(student.get_by_role("alert")).to_have_text("Enter a name, then press Join.")
     student.fill("#who", NAME)
     student.get_by_role("button", name="Join").click()
     expect(student.locator("#name")).to_have_text(NAME)

@@ -127,7 +127,8 @@ class Classroom:
             if len(self.students) >= MOST_STUDENTS:
                 raise StudyError(f"The class is full: it has {MOST_STUDENTS} students.")
             student = self.students[digest] = Student(digest)
-            student.name = self._names.get(digest, "")  # after a restart of the lab
+            if name := self._names.get(digest):  # after a restart of the lab
+                student.name = self._free(name, student)
         if len(student.pages) >= MOST_PAGES:
             raise StudyError("This page is open too often. Close the other ones.")
         if student.name and student.robot is None:
@@ -163,12 +164,17 @@ class Classroom:
         name = clean_name(name)
         if not name or student.name:
             return
-        taken = {other.name for other in self.students.values()}
-        names = (name, *(f"{name} {k}" for k in range(2, MOST_STUDENTS + 2)))
-        student.name = next(each for each in names if each not in taken)
+        student.name = self._free(name, student)
         self._switch_on(student)
         if self.phase == "round":
             self._begin(student)
+
+    def _free(self, name: str, student: Student) -> str:
+        """Return a name, with a number if another student has it or it is on the board."""
+        taken = {other.name for other in self.students.values() if other is not student}
+        taken |= {drive.name for drive in self.drives() if drive.student != student.key}
+        names = (name, *(f"{name} {k}" for k in range(2, len(taken) + 2)))
+        return next(each for each in names if each not in taken)
 
     def _switch_on(self, student: Student) -> None:
         student.robot = ClassRobot(int(student.key[:6], 16), self._clock())
@@ -187,7 +193,11 @@ class Classroom:
     def seconds_left(self, student: Student) -> float:
         """Return the rest of a student's drive [s]."""
         drive = self.drive_of(student)
-        return self.round_s if drive is None else max(0.0, self.round_s - drive.seconds)
+        return self.round_s if drive is None else self.rest_of(drive)
+
+    def rest_of(self, drive: Drive) -> float:
+        """Return the rest of a drive [s]; 0 after its end, also if the end of the lab interrupted it."""
+        return 0.0 if drive.is_over else max(0.0, self.round_s - drive.seconds)
 
     # rounds
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from realitygap._wording import counted
 from realitygap.platforms import emulated_robot, retry_genomes, trace_genome
 from realitygap.playback import MovingTrial, in_motion
 from realitygap.report import choose_trial, read_tally
@@ -80,7 +81,9 @@ def evolved_controller(folder: Path) -> Evolved:
     typical = int(np.argsort(cells, kind="stable")[N_TRIALS // 2])
     key = NoiseKey(0, repeat=1 + typical)
     driven = trace_genome(sim, arena, genome, noise=noise, noise_key=key)
-    trial = in_motion(driven, arena, sim, title=f"Evolution, {cells[typical]} cells", label="SIM")
+    trial = in_motion(
+        driven, arena, sim, title=f"Evolution, {counted(int(cells[typical]), 'cell')}", label="SIM"
+    )
 
     robot, _ = open_robot(condition, f"{emulated_robot(default_family().name)}&speed=off")
     with robot:

@@ -16,7 +16,8 @@ from realitygap.robots import Label
 
 FILE = "class.jsonl"
 LONGEST_NAME = 20
-"""Largest length of a student's name [letters]."""
+"""Largest length of a name that a student enters [letters]."""
+_LONGEST_SAVED = LONGEST_NAME + 4  # with the number of a name that several students chose
 _LONGEST_LINE = 1_000_000
 
 
@@ -39,7 +40,7 @@ class Drive(BaseModel):
 
     round: int = Field(ge=1)
     student: str = Field(max_length=64)
-    name: str = Field(max_length=LONGEST_NAME + 4)
+    name: str = Field(max_length=_LONGEST_SAVED)
     label: Label = "EMULATED"
     cells: list[int] = Field(default=[], max_length=100_000)
     seconds: float = 0.0
@@ -50,9 +51,9 @@ class Drive(BaseModel):
     is_removed: bool = False
 
 
-def clean_name(text: str) -> str:
+def clean_name(text: str, longest: int = LONGEST_NAME) -> str:
     """Return a name as pages show it: short, in one line, without characters that control a page."""
-    return " ".join(page_text(text).split())[:LONGEST_NAME].strip()
+    return " ".join(page_text(text).split())[:longest].strip()
 
 
 def read_drives(root: Path) -> list[Drive]:
@@ -63,7 +64,8 @@ def read_drives(root: Path) -> list[Drive]:
     for line in path.read_bytes().splitlines() if path.exists() else ():
         with contextlib.suppress(ValueError):
             drive = Drive.model_validate(parse_json(line, most=_LONGEST_LINE))
-            drives[drive.round, drive.student] = drive.model_copy(update={"name": clean_name(drive.name)})
+            name = clean_name(drive.name, _LONGEST_SAVED)
+            drives[drive.round, drive.student] = drive.model_copy(update={"name": name})
     return list(drives.values())
 
 

@@ -163,14 +163,17 @@ class _Class:
     def _state(self, student: Student) -> dict[str, Any]:
         room, drive, board = self.room, self.room.drive_of(student), self.room.drives()
         evolved = self.evolved if room.shows_evolution else None
+        phase: str = "practice" if drive is None else room.phase
+        if drive is not None and drive.is_over:  # others may be driving
+            phase = "over" if drive.seconds >= room.round_s else "cut"
         return {
             "kind": "class",
-            "phase": room.phase if drive is not None else "practice",
+            "phase": phase,
             "name": student.name,
-            "place": next((place for place, each in enumerate(board, 1) if each is drive), 0),
+            "place": 0 if drive is None else 1 + sum(len(each.cells) > len(drive.cells) for each in board),
             "n": len(board),
             "may_drive": drive is None or not drive.is_over,
-            "evolution": "" if evolved is None else f"{np.median(evolved.cells):.0f} cells",
+            "evolution": "" if evolved is None else counted(int(np.median(evolved.cells)), "cell"),
             "compares": evolved is not None and drive is not None and drive.is_over,
         }
 
@@ -180,11 +183,14 @@ class _Class:
         path = drive.path if compares and drive and drive.path else [list(self.room.arena.start)]
         poses, rays = np.array(path), np.full((len(path), len(self._shape.mounts)), np.nan)
         stalled = np.zeros(len(path), np.bool_)
-        title = f"You, {len(drive.cells)} cells" if drive else ""
+        title = f"You, {counted(len(drive.cells), 'cell')}" if drive else ""
         own = MovingTrial.of_rows(
             title, "EMULATED", self.room.arena, self._shape, PERIOD_S, poses, rays, stalled
         )
-        trials = [own, self.evolved.trial] if compares and self.evolved else [own]
+        if compares and self.evolved:
+            trials = [own, self.evolved.trial] if drive and drive.path else [self.evolved.trial]
+        else:
+            trials = [own]
         return {"scene": pack_scene(self.room.arena, ""), "trials": pack_trials(trials), "live": not compares}
 
 
@@ -262,6 +268,8 @@ class _Board:
             ui.label(self._problem).classes("lab-problem").props('role="alert"')
         elif self._page.evolved is None:
             hint("Evolution is running. Its result is ready in about ten seconds.")
+        elif room.phase != "over":
+            hint("The result of evolution is ready. You can show it after a round.")
 
     def _toggle(self) -> None:
         self._room.shows_evolution = not self._room.shows_evolution
@@ -289,11 +297,15 @@ class _Board:
 
     def _heading(self) -> str:
         room = self._room
-        left = max((room.seconds_left(s) for s in room.students.values() if room.drive_of(s)), default=0.0)
+        drives = room.drives()
+        rests = [room.rest_of(drive) for drive in drives if not drive.is_over]
+        left = f"{math.ceil(min(rests, default=0.0))} s left"  # of those who began first
+        if 0 < len(rests) < len(drives):
+            left = f"{counted(len(rests), 'student')} still driving, {left}"
         number = f"Round {room.round}"
         words = {
             "practice": "Practice",
-            "round": f"{number}: {math.ceil(left)} s left",
+            "round": f"{number}: {left}",
             "over": f"{number}: results",
         }
         return words[room.phase]
@@ -301,14 +313,16 @@ class _Board:
     def _list(self) -> str:
         """Return the rows as one piece of HTML, because an element for each part would keep the server busy."""
         n_cells = self._room.arena.grid.n_cells
-        rows = [
-            f'<li class="{"class-evolved" if row.note else ""}"><span>{place}.</span>'
+        rows = self._rows()
+        counts = [row.cells for row in rows]  # best first; equal results have the same place
+        items = [
+            f'<li class="{"class-evolved" if row.note else ""}"><span>{1 + counts.index(row.cells)}.</span>'
             f"<span>{html.escape(row.name)}</span>"
             f'<span><i class="class-bar" style="width:{100 * row.cells / n_cells:.1f}%"></i>{row.note}</span>'
             f'<b>{row.cells}</b><span class="lab-badge lab-label-{row.label.lower()}">{row.label}</span></li>'
-            for place, row in enumerate(self._rows(), 1)
+            for row in rows
         ]
-        return f'<ol class="class-rows">{"".join(rows)}</ol>'
+        return f'<ol class="class-rows">{"".join(items)}</ol>'
 
 
 def _code(address: str) -> str:

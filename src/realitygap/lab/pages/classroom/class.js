@@ -42,13 +42,17 @@ find("stop").addEventListener("click", stop);
 addEventListener("keydown", ({ key }) => key === "Escape" && stop());
 find("join").addEventListener("submit", (event) => {
   event.preventDefault();
-  send("join", { name: find("who").value });
+  const name = find("who").value.trim();
+  find("problem").textContent = name ? "" : "Enter a name, then press Join.";
+  if (name) send("join", { name });
+  else find("who").focus();
 });
 
 const WORDS = {
   practice: "Practice. The lecturer starts the round.",
   round: "Cover as many cells as you can.",
   over: "Time is up.",
+  cut: "The lab was restarted during your drive. Your cells until then count.",
 };
 function takeClass(news) {
   const { phase, name, place, n, evolution, scene, trials, live } = news;
@@ -63,6 +67,8 @@ function takeClass(news) {
 function takeNow({ left, cells, n_cells, stops, begins, ...now }) {
   find("clock").textContent = left;
   find("cells").textContent = n_cells;
+  find("seconds").textContent = left === 1 ? "second" : "seconds";
+  find("unit").textContent = n_cells === 1 ? "cell" : "cells";
   pad.stops = stops;
   if (begins) heard["msg:custom"]({ kind: "begin" });
   if (values.live) heard["msg:custom"]({ kind: "now", rays: [], cells, step: 0, time: 0, ...now });

@@ -188,7 +188,7 @@ def test_shared_blocks_take_out_only_the_noise_that_they_leave():
     rows = [*rows_of(sides[0], "sim", range(10)), *rows_of(shuffled, "real", range(9, -1, -1))]
     how = replace(HOW, score_range=(-1.0, 2.0))
     (paired,), (unpaired,) = (compare_scores(rows, replace(how, uses_blocks=uses)) for uses in (True, False))
-    assert paired.is_paired
+    assert paired.result.paired
     assert paired.result.rms.value == pytest.approx(0.03, abs=0.005)
     assert unpaired.result.rms.value < 0.02  # the starts count as noise of each side
 

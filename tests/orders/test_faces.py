@@ -67,7 +67,7 @@ ONLY_IN_THE_COMMAND = {
     "close": {"allow_code", "as_json", "open_page"},
     "closing-the-gap": {"as_json", "open_page"},
     "estimate": {"camera", "allow_code", "as_json"},
-    "compare": {"full", "as_json"},
+    "compare": {"report", "full", "as_json"},
     "gap": {"camera", "report", "full", "allow_code", "as_json"},
     "plan": {"allow_code", "as_json"},
     "transfer": {"allow_code", "as_json"},

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 import realitygap
 from realitygap._terminal import echo
+from realitygap._wording import number, p_equation, with_interval
 from realitygap.orders import CompareOrder
 
 from ._gap import print_row
@@ -19,22 +21,48 @@ if TYPE_CHECKING:
     from realitygap.gap import ScoreGap
 
 
+LEAST_WITH_INTERVALS = 5
+"""With fewer controllers, each controller is printed."""
+
+
 @command_of(CompareOrder)
 def compare(
     order: CompareOrder,
+    report: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Page to write, with figures and tables (.html).")
+    ] = None,
     full: Annotated[bool, typer.Option("--full", help="Print all measures.")] = False,
     as_json: Json = False,
 ) -> None:
     """Measure the gap of a table, and print it."""
+    if report is not None:
+        realitygap.report.refuse_gap_page(report)
     compared = realitygap.study.compare_scores(order)
+    if report is not None:
+        realitygap.report.write_compared_scores(compared, report)
+        echo(f"Written: {report}", err=True)
     if as_json:
-        print_json(compared.to_dict() | {"order": order.record()})
+        print_json(compared.to_dict() | {"order": order.record(), "report": report})
         return
     common = [] if full else compared.common_reasons
     for gap in compared.gaps:
         _print(gap, common, full=full)
     for reason in common:
         echo(reason)
+
+
+def _print_controllers(gap: ScoreGap) -> None:
+    """Print the mean of each controller on both platforms, and the difference."""
+    names = [controller.name for controller in gap.controllers]
+    width = max(map(len, names))
+    echo(f"  {'':{width}}  {gap.source.in_words[:12]:>12}  {gap.target.in_words[:12]:>12}  difference")
+    rows = zip(names, gap.source.means, gap.target.means, gap.differences, strict=True)
+    for name, sim, real, difference in rows:
+        p = difference.more.get("p")
+        more = "" if p is None else f"  {p_equation(p)}"
+        echo(
+            f"  {name:{width}}  {number(sim):>12}  {number(real):>12}  {with_interval(difference, signs=True)}{more}"
+        )
 
 
 def _print(gap: ScoreGap, common: Collection[str], *, full: bool) -> None:
@@ -49,6 +77,8 @@ def _print(gap: ScoreGap, common: Collection[str], *, full: bool) -> None:
     else:
         for title, words in gap.main_measures:
             echo(f"  {title:23}{words}")
+    if full or result.level.n < LEAST_WITH_INTERVALS:
+        _print_controllers(gap)
     labels = " and ".join(dict.fromkeys(result.labels))
     echo(f"{labels}, {result.basis}, 95 % intervals")
     for reason in gap.remarks if full else gap.reasons:

@@ -6,7 +6,7 @@
 from ._behavior import CoverageMaps, coverage_maps
 from ._card import gap_card, pairs_picture
 from ._change import GapChange, measure_change
-from ._level import rms_interval, square_differences
+from ._level import difference_ends, rms_interval, square_differences
 from ._measure import measure_gap
 from ._ranks import (
     Ties,
@@ -42,6 +42,7 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     # level
     "square_differences",
     "rms_interval",
+    "difference_ends",
     # order
     "mean_maximum_rank_violation",
     "rank_violation_interval",

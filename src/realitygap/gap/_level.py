@@ -7,9 +7,9 @@ import math
 import numpy as np
 import scipy
 
-from realitygap.stats import CONFIDENCE, Ends, percentile_interval
+from realitygap.stats import CONFIDENCE, Ends, percentile_interval, range_of_differences, t_interval
 
-from ._side import Values, trial_means, trial_noise
+from ._side import GapSide, Values, trial_means, trial_noise
 
 LEAST_RATIO = 1.5
 """Minimum of the mean square in standard errors for the upper end, because a logarithm has no scale near 0."""
@@ -45,6 +45,27 @@ def square_differences(source: Values, target: Values, *, paired: bool = False) 
     difference = trial_means(target) - trial_means(source)
     noise = trial_noise(target - source) if paired else trial_noise(source) + trial_noise(target)
     return np.asarray(difference**2 - noise)
+
+
+def difference_ends(source: GapSide, target: GapSide, *, paired: bool = False) -> tuple[Values, Values]:
+    """Return both ends of the interval of each controller's difference, (c,); the difference itself for single trials.
+
+    No end leaves the range of differences. For pairs, it is the interval by t of their differences.
+
+    Args:
+        source, target: Trials of the same controllers.
+        paired: True if trial k of a controller had the same conditions on both sides.
+
+    Source: Zou & Donner (2008), Statistics in Medicine 27(10), 1693-1702, for independent trials.
+    """
+    differences = target.means - source.means
+    if paired and source.values.shape[1] > 1:
+        errors = np.sqrt(trial_noise(target.values - source.values))
+        within = range_of_differences(source.score_range)
+        return t_interval(differences, errors, np.maximum(source.counts - 1, 1), within)
+    (low, high), (low_there, high_there) = source.intervals(), target.intervals()
+    lower = differences - np.hypot(target.means - low_there, high - source.means)
+    return lower, differences + np.hypot(high_there - target.means, source.means - low)
 
 
 def rms_of(squares: Values) -> Values:

@@ -133,6 +133,7 @@ def measure_gap(
         misspecified=misspecified,
         most_trials=(int(source.counts.max()), int(target.counts.max())),
         words=(source.in_words, target.in_words),
+        paired=paired,
     )
 
 

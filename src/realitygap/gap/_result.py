@@ -161,6 +161,7 @@ class GapResult(ShownAsCard):
         notes: Notes on the result.
         score: Score of trials, with its unit, such as `distance along walls [m]`.
         most_trials: Largest number of trials of a controller on both.
+        paired: True if trial k of a controller had the same conditions on both.
         words: Both platforms in words. Default: derived from their names.
     """
 
@@ -189,6 +190,7 @@ class GapResult(ShownAsCard):
     score: str = COVERAGE
     most_trials: tuple[int, int] = (0, 0)
     words: tuple[str, str] = ("", "")
+    paired: bool = False
 
     def __repr__(self) -> str:
         n = f"n={self.rms.n}×{self.trials[1]}"

@@ -11,8 +11,9 @@ import numpy as np
 from realitygap._wording import counted, gap_equivalence, joined, rank_violation, ties_in_words, with_interval
 from realitygap.errors import TableError
 from realitygap.logs import ScoreRow
-from realitygap.stats import Range
+from realitygap.stats import Estimate, Range
 
+from ._level import difference_ends
 from ._measure import LEAST_ORDERED, SEED, measure_gap
 from ._ranks import Ties, WorstPair, worst_pair
 from ._result import GapResult
@@ -50,7 +51,7 @@ class ScoreGap:
         controllers: Row k of both sides is controller k.
         worst_pair: Pair of controllers with the largest rank violation; None if no pair is violated, or without order.
         left_out: Controllers of one platform only, which were left out.
-        is_paired: True if trial k of a controller had the same conditions on both platforms.
+        differences: Difference of each controller, target minus simulator, with its interval if trials are known.
         ties: Counting of pairs that tie on one platform only.
     """
 
@@ -61,7 +62,7 @@ class ScoreGap:
     controllers: tuple[ScoredController, ...]
     worst_pair: WorstPair | None
     left_out: tuple[str, ...]
-    is_paired: bool
+    differences: tuple[Estimate, ...]
     ties: Ties = "both"
 
     @property
@@ -123,16 +124,17 @@ class ScoreGap:
             better, worse, violation = self.worst_pair
             names = (self.controllers[better].name, self.controllers[worse].name)
             worst = {"better": names[0], "worse": names[1], "violation": violation}
-        means = zip(self.controllers, self.source.means, self.target.means, strict=True)
+        rows = zip(self.controllers, self.source.means, self.target.means, self.differences, strict=True)
         return (
             {"task": self.task}
             | self.result.to_dict()
             | {
                 "worst_pair": worst,
-                "paired": self.is_paired,
+                "paired": self.result.paired,
                 "left_out": list(self.left_out),
                 "controllers": [
-                    {"name": each.name, "sim": float(sim), "real": float(real)} for each, sim, real in means
+                    {"name": each.name, "sim": float(sim), "real": float(real), "difference": apart.to_dict()}
+                    for each, sim, real, apart in rows
                 ],
             }
         )
@@ -268,8 +270,20 @@ def _of_task(task: str, rows: Sequence[ScoreRow], how: Comparison) -> ScoreGap:
     worst = None if result.mmrv.value is None else worst_pair(source.means, target.means, how.ties)
     controllers = tuple(map(ScoredController, shared))
     result = replace(result, score=how.score, notes=tuple(notes))
-    return ScoreGap(
-        task, result, source, target, controllers, worst, tuple(left_out), pairs is not None, how.ties
+    differences = _differences(source, target, paired=pairs is not None)
+    return ScoreGap(task, result, source, target, controllers, worst, tuple(left_out), differences, how.ties)
+
+
+def _differences(source: GapSide, target: GapSide, *, paired: bool) -> tuple[Estimate, ...]:
+    """Return the difference of each controller, with an interval if it has several trials on both sides."""
+    counts = np.minimum(source.counts, target.counts).tolist()
+    values = (target.means - source.means).tolist()
+    if source.are_means or target.are_means:
+        return tuple(Estimate(value, None, None, 0, "means without trials") for value in values)
+    ends = np.column_stack(difference_ends(source, target, paired=paired)).tolist()
+    return tuple(
+        Estimate(value, *each, n, method="t") if n > 1 else Estimate.of_few(value, n, 2, "trials")
+        for value, each, n in zip(values, ends, counts, strict=True)
     )
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from realitygap._wording import platform_in_words
+from realitygap._wording import counted_range, platform_in_words
 from realitygap.errors import finite_numbers
 from realitygap.stats import CONFIDENCE, Range, t_interval
 
@@ -131,6 +131,15 @@ class GapSide:
     def trials(self) -> int:
         """Trials of each; the fewest, if the numbers differ."""
         return int(self.counts.min())
+
+    @property
+    def trials_in_words(self) -> str:
+        """The number of trials of each controller, such as `10 trials each`."""
+        return (
+            "means without trials"
+            if self.are_means
+            else f"{counted_range(self.counts.tolist(), 'trial')} each"
+        )
 
     @property
     def means(self) -> Values:

@@ -41,7 +41,7 @@ class CompareOrder(Order):
 
     Example: realitygap compare scores.csv
 
-    Example: realitygap compare scores.csv --sim mujoco --real arm --margin 0.05
+    Example: realitygap compare scores.csv --sim mujoco --real arm --margin 0.05 --report gap.html
 
     Example: realitygap compare sim=libero.jsonl real=fieldtrial.csv
 

@@ -21,6 +21,7 @@ from realitygap.report._closing import (
     write_closing_page,
 )
 from realitygap.report._closing_figures import draw_closing
+from realitygap.report._compare_page import write_compared_scores
 from realitygap.report._comparisons import compare_conditions
 from realitygap.report._distance_audit import DistanceAudit, audit_distance, distance_notes
 from realitygap.report._distance_figure import draw_distance, save_distance
@@ -109,6 +110,7 @@ __all__ = [
     "why_table",
     "write_closed_gap",
     "write_closing_page",
+    "write_compared_scores",
     "write_gap_report",
     "write_movie",
     "write_report",

@@ -8,9 +8,9 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from realitygap._wording import p_equation, platform_in_words
+from realitygap._wording import counted, p_equation
 from realitygap.drawing import Ink
-from realitygap.gap import GapSide, Why
+from realitygap.gap import GapSide, ScoreGap, Why, difference_ends
 from realitygap.report.charts.arena import draw_arena, draw_shares
 from realitygap.report.charts.house import Drawing, draw_wide, shorten
 from realitygap.report.charts.lines import Dash, draw_band, draw_dots, draw_line, head, mark_key
@@ -23,7 +23,11 @@ from realitygap.study import GapStudy
 _MOST_ACROSS = 4.95
 """Maximum width of a scatter with its label [in]."""
 
-_KINDS = (("random", Ink.PUBLISHED, "s", "random networks"), ("champion", Ink.OURS, "o", "champions"))
+_KINDS = (
+    ("random", Ink.PUBLISHED, "s", "random networks"),
+    ("champion", Ink.OURS, "o", "champions"),
+    ("table", Ink.OURS, "o", "controllers"),
+)
 """Kinds of controllers: color, mark, and name of each."""
 
 _DASHED: Dash = (0, (5, 1.5))
@@ -32,19 +36,22 @@ _DASHED: Dash = (0, (5, 1.5))
 # quality on both sides
 
 
-def draw_gap_pairs(gap: GapStudy, before: GapStudy | None = None) -> Drawing:
+def draw_gap_pairs(
+    gap: GapStudy | ScoreGap, before: GapStudy | None = None, name: str = "gap-pairs"
+) -> Drawing:
     """Draw the mean quality of each controller on both sides, with intervals and the line of no gap.
 
     Args:
         gap: The gap.
         before: The gap before a calibration, whose controllers are hollow marks.
+        name: First part of the ids in the drawing.
     """
     source, target = gap.source, gap.target
     score, names = gap.result.score, _names(source, target)
-    trials = " and ".join(str(n) for n in dict.fromkeys((source.trials, target.trials)))
+    crosses = "" if source.are_means and target.are_means else " Crosses are 95 % intervals of each mean."
     caption = (
-        f"Mean {score} on {names[0]} and on {names[1]}: {source.n} controllers, {trials} trials each. Crosses are 95 % "
-        "intervals of each mean. On the line there is no gap."
+        f"Mean {score} on {names[0]} and on {names[1]}: {counted(source.n, 'controller')}, {_trials(source, target)}."
+        f"{crosses} On the line there is no gap."
     ) + ("" if before is None else " Gray: the same controllers before the calibration.")
     alt = f"Scatter of {source.n} controllers: {score} on {names[0]} against {score} on {names[1]}."
     rows = {
@@ -64,16 +71,16 @@ def draw_gap_pairs(gap: GapStudy, before: GapStudy | None = None) -> Drawing:
         axes = sheet.panels["pairs"]
         axes.set_gid("pairs")
         sides = [source, target] if before is None else [source, target, before.source]
-        draw_equality(axes, *_ends(sides, *gap.task.score_range))
+        draw_equality(axes, *_ends(sides, *source.score_range))
         if before is not None:
             draw_dots(axes, before.source.means, target.means, 3.4, color=Ink.RUN, alpha=0.6)
         across, up = (np.column_stack(side.intervals()) for side in (source, target))
         handles = []
-        for kind, color, marker, name in _KINDS:
+        for kind, color, marker, plural in _KINDS:
             k = rows[kind]
             if len(k):
                 draw_crosses(axes, source.means[k], target.means[k], (across[k], up[k]), color, marker)
-                handles.append(mark_key(f"{name}, n = {len(k)}", marker, 4.2, color=color))
+                handles.append(mark_key(f"{plural}, n = {len(k)}", marker, 4.2, color=color))
         if before is not None:
             handles.append(mark_key("before the calibration", "o", 3.4, color=Ink.RUN))
         axes.set_xlabel(f"{score} on {shorten(names[0], 34)}", labelpad=3)
@@ -89,13 +96,19 @@ def draw_gap_pairs(gap: GapStudy, before: GapStudy | None = None) -> Drawing:
         for k in rows.values()
         if len(k)
     )
-    return draw_wide(draw, "gap-pairs", caption, alt, marks=(Panel("pairs", series, (decimals, decimals)),))
+    return draw_wide(draw, name, caption, alt, marks=(Panel("pairs", series, (decimals, decimals)),))
 
 
 def _names(source: GapSide, target: GapSide) -> tuple[str, str]:
     """Return both platforms in words, with their labels."""
-    one, other = (f"{platform_in_words(side.name, side.label)} ({side.label})" for side in (source, target))
+    one, other = (f"{side.in_words} ({side.label})" for side in (source, target))
     return one, other
+
+
+def _trials(source: GapSide, target: GapSide) -> str:
+    """Return the number of trials on both sides in words, once if it is the same."""
+    one, other = source.trials_in_words, target.trials_in_words
+    return one if one == other else f"{one} on {source.in_words} and {other} on {target.in_words}"
 
 
 def _ends(of: Sequence[GapSide], low: float, high: float) -> tuple[float, float]:
@@ -112,19 +125,25 @@ def _ends(of: Sequence[GapSide], low: float, high: float) -> tuple[float, float]
 # differences in order
 
 
-def draw_gap_differences(gap: GapStudy) -> Drawing:
-    """The difference of means of each controller in order, with intervals, the level, and the margin."""
+def draw_gap_differences(gap: GapStudy | ScoreGap, name: str = "gap-differences") -> Drawing:
+    """The difference of means of each controller in order, with intervals, the level, and the margin.
+
+    Args:
+        gap: The gap.
+        name: First part of the ids in the drawing.
+    """
     source, target, level = gap.source, gap.target, gap.result.level
     score = gap.result.score
     differences = target.means - source.means
-    lower, upper = _ends_of_differences(source, target)
+    lower, upper = _ends_of_differences(gap)
+    has_ends = bool((upper > lower).any())
     order = np.argsort(differences)
     margin = gap.result.equivalence.more.get("margin")
     band = f" The gray band is the margin of equivalence, ±{margin:g}." if margin else ""
     caption = (
         f"{score[0].upper()}{score[1:]} on {target.name} ({target.label}) minus that on {source.name} ({source.label}) "
-        f"of each of {source.n} controllers in order, {target.trials} and {source.trials} trials each, with intervals "
-        f"of 95 % for each by itself. Blue: the level, {level}.{band}"
+        f"of each of {source.n} controllers in order, {_trials(source, target)}"
+        f"{', with intervals of 95 % for each by itself' if has_ends else ''}. Blue: the level, {level}.{band}"
     )
     span = f"{differences.min():.2f} to {differences.max():.2f}"
     alt = f"Differences of {source.n} controllers from {span}; mean {level}."
@@ -157,20 +176,18 @@ def draw_gap_differences(gap: GapStudy) -> Drawing:
     )
     series = Series("{label}", np.column_stack([np.arange(source.n), differences[order]]), labels=labels)
     panel = Panel("differences", (series,), (0, decimals))
-    return draw_wide(draw, "gap-differences", caption, alt, marks=(panel,))
+    return draw_wide(draw, name, caption, alt, marks=(panel,))
 
 
 def _ends_of_differences(
-    source: GapSide, target: GapSide
+    gap: GapStudy | ScoreGap,
 ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-    """Return both ends of the interval of each difference, (c,), from those of both means.
-
-    Source: Zou & Donner (2008), Statistics in Medicine 27(10), 1693-1702. No end leaves the range of differences.
-    """
-    (low, high), (low_there, high_there) = source.intervals(), target.intervals()
-    differences = target.means - source.means
-    lower = differences - np.hypot(target.means - low_there, high - source.means)
-    return lower, differences + np.hypot(high_there - target.means, source.means - low)
+    """Return both ends of the interval of each difference, (c,); the difference itself if there is none."""
+    if not isinstance(gap, ScoreGap):
+        return difference_ends(gap.source, gap.target)
+    ends = [each.ends or (float(each), float(each)) for each in gap.differences]
+    lower, upper = np.array(ends).T
+    return lower, upper
 
 
 # visited cells

@@ -143,7 +143,9 @@ def _content(gap: GapBetween, closed: ClosedGap | None = None) -> dict[str, Any]
         "pairs": pairs,
         "facts": _facts(gap),
         "measures": [
-            _measures_table(name, caption, [_row(of, each.name, each.title, each.meaning) for each in SHOWN])
+            measures_table(
+                name, caption, [measure_row(of, each.name, each.title, each.meaning) for each in SHOWN]
+            )
             for name, caption, of in (
                 ("before", "Measures before the calibration.", None if before is None else before.result),
                 (
@@ -154,8 +156,8 @@ def _content(gap: GapBetween, closed: ClosedGap | None = None) -> dict[str, Any]
             )
             if of is not None
         ],
-        "apart": _measures_table(
-            "apart", "Re-evolved gap, and luck of selection.", [_row(result, *each) for each in _APART]
+        "apart": measures_table(
+            "apart", "Re-evolved gap, and luck of selection.", [measure_row(result, *each) for each in _APART]
         ),
         "advice": None if why is None else why.advice,
         "figures": figures,
@@ -238,7 +240,8 @@ def _facts(gap: GapBetween) -> list[tuple[str, str]]:
     return facts + [("Note", note) for note in result.notes]
 
 
-def _row(result: GapResult, name: str, title: str, meaning: str) -> Row:
+def measure_row(result: GapResult, name: str, title: str, meaning: str) -> Row:
+    """Return the row of a measure: its value, interval, n, p, and meaning, with the reason if one is missing."""
     estimate: Estimate = getattr(result, name)
     p = estimate.more.get("p")
     explained = meaning.format(score=result.score)
@@ -252,7 +255,8 @@ def _row(result: GapResult, name: str, title: str, meaning: str) -> Row:
     )
 
 
-def _measures_table(name: str, caption: str, rows: Sequence[Row]) -> TableOnPage:
+def measures_table(name: str, caption: str, rows: Sequence[Row]) -> TableOnPage:
+    """Return a table of measures."""
     columns = (
         *(Column("Measure"), Column("estimate", kind="median"), Column("interval"), Column("n"), Column("p")),
         Column("meaning", kind="text prose", head_kind="text"),

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import realitygap
 from realitygap._limits import is_file
 from realitygap.errors import TableError, did_you_mean
 from realitygap.gap import Comparison, ScoreGap
@@ -33,6 +34,21 @@ class ComparedScores:
     def title(self) -> str:
         """Both platforms in words."""
         return self.gaps[0].result.title
+
+    @property
+    def verdict(self) -> str:
+        """The finding of each task, as sentences."""
+        return " ".join(
+            f"{gap.task}: {gap.result.verdict}" if gap.task else gap.result.verdict for gap in self.gaps
+        )
+
+    def plot(self) -> realitygap.report.Drawing:
+        """Draw the mean score of each controller of the first task on both platforms. On the line there is no gap."""
+        return realitygap.report.draw_gap_pairs(self.gaps[0])
+
+    def report(self, path: str | Path = "gap.html") -> Path:
+        """Write the page and return its path, as `realitygap.report.write_compared_scores`."""
+        return realitygap.report.write_compared_scores(self, path)
 
     @property
     def common_reasons(self) -> list[str]:

@@ -484,6 +484,19 @@ def rank_violation(better: str, worse: str, violation: float, sim: str, target: 
     return f"{better} is {violation:.3f} better than {worse} on {target}, and not on {sim}"
 
 
+def methods_of_successes(*, paired: bool) -> str:
+    """Return the methods behind the intervals and p of successes, as a sentence."""
+    tests = (
+        "differences Tango's, and p is of McNemar's exact test"
+        if paired
+        else "differences Newcombe's, and p is of Boschloo's exact test"
+    )
+    return (
+        f"Intervals are of each controller alone. Shares have Clopper and Pearson's, {tests}, corrected for all "
+        "controllers by Holm's method."
+    )
+
+
 def ties_in_words(n: int, ties: str) -> str:
     """Return how pairs of controllers that tie on one platform only count, as a sentence; empty if there are none."""
     if n == 0:

@@ -10,6 +10,14 @@ from realitygap.errors import TableError
 from realitygap.gap import Comparison, GapSide, compare_scores, mean_maximum_rank_violation, measure_gap
 from realitygap.gap._ranks import ties_on_one_side
 from realitygap.logs import ScoreRow, read_scores
+from realitygap.stats import (
+    boschloo_p,
+    exact_share_interval,
+    holm,
+    mcnemar_p,
+    paired_success_difference,
+    success_difference,
+)
 
 SIMPLER = Path(__file__).parent.parent / "data" / "simpler" / "scores.csv"
 """Scores in `simpler_env/utils/metrics.py` of simpler-env/SimplerEnv, commit 4ab7178; Li et al. (2024)."""
@@ -277,3 +285,67 @@ def test_blocks_of_one_platform_only_are_refused_with_both_ways_out():
     (gap,) = compare_scores(rows, replace(HOW, shared=True))
     assert gap.result.trials == (2, 2)
     assert compare_scores(rows, replace(HOW, uses_blocks=False))[0].result.trials == (3, 3)
+
+
+# successes
+
+BINARY = replace(HOW, is_binary=True, score="success")
+
+
+def successes(counts, platform):
+    return rows_of({name: [1] * k + [0] * (n - k) for name, (k, n) in counts.items()}, platform)
+
+
+SIM_COUNTS = {"a": (17, 20), "b": (3, 30), "c": (10, 10), "d": (0, 12), "e": (5, 9)}
+REAL_COUNTS = {"a": (14, 20), "b": (9, 30), "c": (9, 10), "d": (6, 12), "e": (4, 9)}
+
+
+def test_successes_have_exact_intervals_and_corrected_p():
+    (gap,) = compare_scores([*successes(SIM_COUNTS, "sim"), *successes(REAL_COUNTS, "real")], BINARY)
+    assert [each.ends for each in gap.source.estimates] == [
+        exact_share_interval(*count).ends for count in SIM_COUNTS.values()
+    ]
+    counts = [(*SIM_COUNTS[name], *REAL_COUNTS[name]) for name in SIM_COUNTS]
+    assert [each.ends for each in gap.differences] == [success_difference(*each).ends for each in counts]
+    p = holm(np.array([boschloo_p(*each) for each in counts]))
+    assert [each.more["p"] for each in gap.differences] == pytest.approx(p)
+    assert "Boschloo" in gap.remarks[-1]
+
+
+def test_means_of_n_successes_are_the_same_as_their_trials():
+    rows = [
+        ScoreRow("", name, platform, "", "", "", round(k / n, 3), n, 3)
+        for platform, counts in (("sim", SIM_COUNTS), ("real", REAL_COUNTS))
+        for name, (k, n) in counts.items()
+    ]
+    trials = [*successes(SIM_COUNTS, "sim"), *successes(REAL_COUNTS, "real")]
+    found, expected = (compare_scores(each, BINARY)[0] for each in (rows, trials))
+    assert found.to_dict() == expected.to_dict()
+    k, n = SIM_COUNTS["a"]
+    assert found.source.noise[0] == pytest.approx(k / n * (1 - k / n) / (n - 1))
+    (means,) = compare_scores(rows, HOW)  # continuous scores have a noise that n does not tell
+    assert means.result.rms.value is None
+
+
+def test_pairs_of_successes_have_the_tests_of_pairs():
+    sim = {name: [1, 1, 0, 0, 1, 0] for name in "abc"}
+    real = {name: [1, 0, 0, 0, 0, 1] for name in "abc"}
+    (gap,) = compare_scores([*rows_of(sim, "sim", range(6)), *rows_of(real, "real", range(6))], BINARY)
+    assert gap.differences[0].ends == paired_success_difference(1, 2, 6).ends
+    assert gap.differences[0].more["p"] == min(1, 3 * mcnemar_p(1, 2))
+    assert "McNemar" in gap.remarks[-1]
+
+
+def test_successes_without_the_option_get_a_hint():
+    (gap,) = compare_scores([*successes(SIM_COUNTS, "sim"), *successes(REAL_COUNTS, "real")], HOW)
+    assert "add --binary" in gap.remarks[-1]
+    assert all("p" not in each.more for each in gap.differences)
+
+
+def test_what_is_no_success_is_refused():
+    rows = rows_of({name: [0.5, 1.0] for name in "abc"}, "sim") + rows_of({n: [1, 0] for n in "abc"}, "real")
+    assert "expected 0 or 1 with --binary" in refusal(rows, BINARY)
+    few = [ScoreRow("line 2", "a", "sim", "", "", "", 0.857, 75, 3)]
+    others = [ScoreRow("", n, p, "", "", "", 0.0, 75, 3) for p in ("sim", "real") for n in "bcd"]
+    match = refusal([*few, ScoreRow("", "a", "real", "", "", "", 0.0, 75, 3), *others], BINARY)
+    assert "0.857 of 75 trials is no whole number of successes. The nearest share is 0.8533" in match

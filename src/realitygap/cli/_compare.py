@@ -10,7 +10,7 @@ import typer
 
 import realitygap
 from realitygap._terminal import echo
-from realitygap._wording import number, p_equation, with_interval
+from realitygap._wording import p_equation, with_interval
 from realitygap.orders import CompareOrder
 
 from ._gap import print_row
@@ -55,14 +55,13 @@ def _print_controllers(gap: ScoreGap) -> None:
     """Print the mean of each controller on both platforms, and the difference."""
     names = [controller.name for controller in gap.controllers]
     width = max(map(len, names))
-    echo(f"  {'':{width}}  {gap.source.in_words[:12]:>12}  {gap.target.in_words[:12]:>12}  difference")
-    rows = zip(names, gap.source.means, gap.target.means, gap.differences, strict=True)
+    echo(f"  {'':{width}}  {gap.source.in_words[:20]:20}  {gap.target.in_words[:20]:20}  difference")
+    rows = zip(names, gap.source.estimates, gap.target.estimates, gap.differences, strict=True)
     for name, sim, real, difference in rows:
         p = difference.more.get("p")
         more = "" if p is None else f"  {p_equation(p)}"
-        echo(
-            f"  {name:{width}}  {number(sim):>12}  {number(real):>12}  {with_interval(difference, signs=True)}{more}"
-        )
+        means = f"{with_interval(sim):20}  {with_interval(real):20}"
+        echo(f"  {name:{width}}  {means}  {with_interval(difference, signs=True)}{more}")
 
 
 def _print(gap: ScoreGap, common: Collection[str], *, full: bool) -> None:
@@ -77,7 +76,7 @@ def _print(gap: ScoreGap, common: Collection[str], *, full: bool) -> None:
     else:
         for title, words in gap.main_measures:
             echo(f"  {title:23}{words}")
-    if full or result.level.n < LEAST_WITH_INTERVALS:
+    if full or gap.source.is_binary or result.level.n < LEAST_WITH_INTERVALS:
         _print_controllers(gap)
     labels = " and ".join(dict.fromkeys(result.labels))
     echo(f"{labels}, {result.basis}, 95 % intervals")

@@ -248,6 +248,8 @@ class _Work:
 
     def _few(self) -> str:
         """Return the reason why these controllers support no claim about their order."""
+        if self.n == 1:
+            return f"One controller has no order. At least {SMALLEST_N} are needed."
         return (
             f"With {counted(self.n, 'controller')}, an order is too likely by chance (a perfect one in 1 of "
             f"{math.factorial(self.n)}). At least {SMALLEST_N} are needed."

@@ -8,16 +8,33 @@ from typing import Any
 
 import numpy as np
 
-from realitygap._wording import counted, gap_equivalence, joined, rank_violation, ties_in_words, with_interval
+from realitygap._wording import (
+    counted,
+    gap_equivalence,
+    joined,
+    methods_of_successes,
+    rank_violation,
+    ties_in_words,
+    with_interval,
+)
 from realitygap.errors import TableError
 from realitygap.logs import ScoreRow
-from realitygap.stats import Estimate, Range
+from realitygap.stats import (
+    MOST_CELLS,
+    Estimate,
+    Range,
+    boschloo_p,
+    holm,
+    mcnemar_p,
+    paired_success_difference,
+    success_difference,
+)
 
 from ._level import difference_ends
 from ._measure import LEAST_ORDERED, SEED, measure_gap
 from ._ranks import Ties, WorstPair, worst_pair
 from ._result import GapResult
-from ._side import GapSide
+from ._side import GapSide, Values
 
 _MOST_NAMED = 12
 """Names in a message."""
@@ -74,15 +91,19 @@ class ScoreGap:
             if result.rms.value is None
             else ("RMS gap", with_interval(result.rms))
         )
-        ceiling = with_interval(result.noise_ceiling)
         rows = [
             ("level", with_interval(result.level)),
             rms,
-            ("rank correlation", with_interval(result.srcc)),
-            ("noise ceiling", "" if result.noise_ceiling.value is None else ceiling),
-            ("linear correlation", with_interval(result.pearson)),
-            ("rank violation (MMRV)", with_interval(result.mmrv)),
-            ("mean violation", with_interval(result.mean_violation)),
+            *(
+                (name, "" if estimate.value is None else with_interval(estimate))
+                for name, estimate in (
+                    ("rank correlation", result.srcc),
+                    ("noise ceiling", result.noise_ceiling),
+                    ("linear correlation", result.pearson),
+                    ("rank violation (MMRV)", result.mmrv),
+                    ("mean violation", result.mean_violation),
+                )
+            ),
             ("worst pair", self._worst_in_words),
             ("equivalence", gap_equivalence(result.equivalence)),
         ]
@@ -105,7 +126,14 @@ class ScoreGap:
     def remarks(self) -> list[str]:
         """Remarks on ties, and notes."""
         ties = ties_in_words(int(self.result.mmrv.more.get("ties") or 0), self.ties)
-        return [*([ties] if ties else []), *self.result.notes]
+        found = [ties, *self.result.notes]
+        if self.source.is_binary and not self.source.are_means and not self.target.are_means:
+            found.append(methods_of_successes(paired=self.result.paired))
+        elif all(np.isin(_given(side), (0, 1)).all() for side in (self.source, self.target)):
+            found.append(
+                "All scores are 0 or 1. For exact intervals and tests of each controller, add --binary."
+            )
+        return [text for text in found if text]
 
     @property
     def reasons(self) -> list[str]:
@@ -124,7 +152,8 @@ class ScoreGap:
             better, worse, violation = self.worst_pair
             names = (self.controllers[better].name, self.controllers[worse].name)
             worst = {"better": names[0], "worse": names[1], "violation": violation}
-        rows = zip(self.controllers, self.source.means, self.target.means, self.differences, strict=True)
+        estimates = (self.source.estimates, self.target.estimates, self.differences)
+        rows = zip(self.controllers, *estimates, strict=True)
         return (
             {"task": self.task}
             | self.result.to_dict()
@@ -133,7 +162,12 @@ class ScoreGap:
                 "paired": self.result.paired,
                 "left_out": list(self.left_out),
                 "controllers": [
-                    {"name": each.name, "sim": float(sim), "real": float(real), "difference": apart.to_dict()}
+                    {
+                        "name": each.name,
+                        "sim": sim.to_dict(),
+                        "real": real.to_dict(),
+                        "difference": apart.to_dict(),
+                    }
                     for each, sim, real, apart in rows
                 ],
             }
@@ -280,10 +314,38 @@ def _differences(source: GapSide, target: GapSide, *, paired: bool) -> tuple[Est
     values = (target.means - source.means).tolist()
     if source.are_means or target.are_means:
         return tuple(Estimate(value, None, None, 0, "means without trials") for value in values)
+    if source.is_binary:
+        return _differences_of_successes(source, target, paired=paired)
     ends = np.column_stack(difference_ends(source, target, paired=paired)).tolist()
     return tuple(
-        Estimate(value, *each, n, method="t") if n > 1 else Estimate.of_few(value, n, 2, "trials")
+        Estimate(value, each[0], each[1], n, method="t") if n > 1 else Estimate.of_few(value, n, 2, "trials")
         for value, each, n in zip(values, ends, counts, strict=True)
+    )
+
+
+def _given(side: GapSide) -> Values:
+    """Return the scores of all trials, (n,)."""
+    return side.values[~np.isnan(side.values)]
+
+
+def _differences_of_successes(source: GapSide, target: GapSide, *, paired: bool) -> tuple[Estimate, ...]:
+    """Return the difference in successes of each controller, with p of the exact test, corrected over controllers."""
+    found: list[tuple[Estimate, float | None]] = []
+    for sim, real in zip(source.values, target.values, strict=True):
+        if paired:
+            gained, lost = int(np.nansum(real > sim)), int(np.nansum(sim > real))
+            n = int((~np.isnan(sim)).sum())
+            found.append((paired_success_difference(gained, lost, n), mcnemar_p(gained, lost)))
+            continue
+        counts = [
+            number for side in (sim, real) for number in (int(np.nansum(side)), int((~np.isnan(side)).sum()))
+        ]
+        is_feasible = (counts[1] + 1) * (counts[3] + 1) <= MOST_CELLS
+        found.append((success_difference(*counts), boschloo_p(*counts) if is_feasible else None))
+    known = [p for _, p in found if p is not None]
+    corrected = iter(holm(np.array(known)).tolist())
+    return tuple(
+        replace(difference, more={"p": None if p is None else next(corrected)}) for difference, p in found
     )
 
 
@@ -351,7 +413,7 @@ def _side(
             "controllers have trials. Give trials of all, or the mean of all."
         )
     side = GapSide.of_trials(platform, label, list(scores.values()), how.score_range, title=platform)
-    return replace(side, are_means=bool(means))
+    return replace(side, are_means=bool(means), is_binary=how.is_binary)
 
 
 # blocks

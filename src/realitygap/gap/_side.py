@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from realitygap._wording import counted_range, platform_in_words
 from realitygap.errors import finite_numbers
-from realitygap.stats import CONFIDENCE, Range, t_interval
+from realitygap.stats import CONFIDENCE, Estimate, Method, Range, exact_share_interval, t_interval
 
 Values = NDArray[np.float64]
 
@@ -30,6 +30,7 @@ class GapSide:
             end within it.
         n_trials: Number of trials of each controller, if the numbers differ.
         are_means: True if the values are means of unknown trials, (c, 1). Their noise is unknown.
+        is_binary: True if the values are successes (1) and failures (0). Intervals of means are then those of shares.
         title: Name in sentences. Default: derived from the name.
     """
 
@@ -41,6 +42,7 @@ class GapSide:
     score_range: Range = (-np.inf, np.inf)
     n_trials: tuple[int, ...] = ()
     are_means: bool = False
+    is_binary: bool = False
     title: str = ""
 
     @classmethod
@@ -147,9 +149,35 @@ class GapSide:
         return trial_means(self.values)
 
     def intervals(self, confidence: float = CONFIDENCE) -> tuple[Values, Values]:
-        """Return both ends of the interval of each controller's mean by t, (c,); the means if there is one trial."""
+        """Return both ends of the interval of each controller's mean, (c,); the means if there is one trial.
+
+        The interval is by t; for successes, that of Clopper and Pearson.
+        """
+        if self.is_binary and not self.are_means:
+            counts = np.column_stack([np.rint(self.means * self.counts), self.counts]).astype(int).tolist()
+            ends = [exact_share_interval(k, n, confidence).ends for k, n in counts]
+            low, high = np.array(ends, float).T
+            return low, high
         freedom = np.maximum(self.counts - 1, 1)
         return t_interval(self.means, np.sqrt(self.noise), freedom, self.score_range, confidence)
+
+    @property
+    def estimates(self) -> list[Estimate]:
+        """Return the mean of each controller, with its interval if it has several trials; n is their number."""
+        if self.are_means:
+            return [Estimate(mean, None, None, 0, "mean without trials") for mean in self.means.tolist()]
+        method: Method = "Clopper-Pearson" if self.is_binary else "t"
+        return [
+            Estimate(mean, low, high, n, method=method)
+            if n > 1 or self.is_binary
+            else Estimate.of_few(mean, n, 2, "trials")
+            for mean, low, high, n in zip(
+                self.means.tolist(),
+                *map(np.ndarray.tolist, self.intervals()),
+                self.counts.tolist(),
+                strict=True,
+            )
+        ]
 
     @property
     def noise(self) -> Values:

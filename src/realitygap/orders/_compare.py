@@ -43,7 +43,7 @@ class CompareOrder(Order):
 
     Example: realitygap compare scores.csv --sim mujoco --real arm --margin 0.05 --report gap.html
 
-    Example: realitygap compare sim=libero.jsonl real=fieldtrial.csv
+    Example: realitygap compare sim=libero.jsonl real=fieldtrial.csv --binary
 
     In Python: realitygap.compare_scores("scores.csv", sim="mujoco", real="arm")
     """

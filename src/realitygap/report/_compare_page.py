@@ -9,8 +9,8 @@ from typing import Any
 from markupsafe import Markup
 
 from realitygap._version import __version__
-from realitygap._wording import bracketed, counted, number, p_in_words, signed
-from realitygap.gap import SHOWN, GapSide, ScoreGap
+from realitygap._wording import bracketed, counted, number, p_in_words, signed, with_interval
+from realitygap.gap import SHOWN, ScoreGap
 from realitygap.records import write_whole
 from realitygap.report._gap_figures import draw_gap_differences, draw_gap_pairs
 from realitygap.report._gap_page import measure_row, measures_table, refuse_gap_page
@@ -114,12 +114,13 @@ def _controllers_table(gap: ScoreGap, k: int) -> TableOnPage:
     sides = (gap.source, gap.target)
     has_p = any("p" in each.more for each in gap.differences)
     rows: list[Row] = []
-    for row, (controller, difference) in enumerate(zip(gap.controllers, gap.differences, strict=True)):
+    estimates = (gap.source.estimates, gap.target.estimates, gap.differences)
+    for controller, sim, real, difference in zip(gap.controllers, *estimates, strict=True):
         p = difference.more.get("p")
         rows.append(
             (
                 controller.name,
-                *(cell for side in sides for cell in (_mean(side, row), _n(side, row))),
+                *(cell for mean in (sim, real) for cell in (with_interval(mean), str(mean.n or "–"))),
                 f"{signed(float(difference))} {bracketed(difference, signs=True)}".rstrip(),
                 *([""] if has_p and p is None else [p_in_words(p)] if p is not None else []),
             )
@@ -133,14 +134,6 @@ def _controllers_table(gap: ScoreGap, k: int) -> TableOnPage:
     has_ends = any(each.ends is not None for each in gap.differences)
     caption = f"Mean {gap.result.score} of each controller, and the difference{' with its 95 % interval' * has_ends}."
     return TableOnPage(f"controllers-{k}", caption, columns, (Part(rows),), kind="numbers")
-
-
-def _mean(side: GapSide, row: int) -> str:
-    return number(float(side.means[row]))
-
-
-def _n(side: GapSide, row: int) -> str:
-    return "–" if side.are_means else str(side.counts[row])
 
 
 def _facts(compared: ComparedScores) -> list[tuple[str, str]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -33,6 +34,16 @@ _KINDS = (
 _DASHED: Dash = (0, (5, 1.5))
 
 
+class _Controller(Protocol):
+    """A controller of any gap."""
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def kind(self) -> str: ...
+
+
 # quality on both sides
 
 
@@ -54,8 +65,9 @@ def draw_gap_pairs(
         f"{crosses} On the line there is no gap."
     ) + ("" if before is None else " Gray: the same controllers before the calibration.")
     alt = f"Scatter of {source.n} controllers: {score} on {names[0]} against {score} on {names[1]}."
+    controllers: Sequence[_Controller] = gap.controllers
     rows = {
-        kind: np.array([k for k, each in enumerate(gap.controllers) if each.kind == kind], int)
+        kind: np.array([k for k, each in enumerate(controllers) if each.kind == kind], int)
         for kind, *_ in _KINDS
     }
 

@@ -83,6 +83,13 @@ from ._shares import (
     newcombe_interval,
     share_interval,
 )
+from ._successes import (
+    MOST_CELLS,
+    boschloo_p,
+    mcnemar_p,
+    paired_success_difference,
+    success_difference,
+)
 
 __all__ = [  # noqa: RUF022 - grouped by subject
     # a number with its interval
@@ -116,6 +123,12 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     "effect_of_a12",
     "a12_of_effect",
     "USUAL_EFFECTS",
+    # successes on two sides
+    "success_difference",
+    "paired_success_difference",
+    "boschloo_p",
+    "mcnemar_p",
+    "MOST_CELLS",
     # correlation
     "pearson",
     "rank_correlation",

@@ -17,7 +17,7 @@ CONFIDENCE = 0.95
 """Level of all intervals except those of equivalence, which have 90 % because its test has two sides of 5 %."""
 
 Method = Literal[
-    "", "BCa", "Clopper-Pearson", "Fisher z", "Newcombe", "Wilson", "betting", "percentiles", "ranks",
+    "", "BCa", "Clopper-Pearson", "Fisher z", "Newcombe", "Tango", "Wilson", "betting", "percentiles", "ranks",
     "regression", "sign-symmetric", "t",
 ]  # fmt: skip
 """How an interval is made: `BCa` and `percentiles`, bootstraps; `ranks`, two observed values; `betting` and

@@ -27,15 +27,15 @@ def share_interval(count: float, n: int) -> Estimate:
     return Estimate(share, max(0.0, center - reach), min(1.0, center + reach), n, method="Wilson")
 
 
-def exact_share_interval(count: int, n: int) -> Estimate:
+def exact_share_interval(count: int, n: int, confidence: float = CONFIDENCE) -> Estimate:
     """Return a share of n with the interval that covers the truth at least as often as it claims.
 
     Source: Clopper & Pearson (1934), Biometrika 26(4), 404-413.
     """
-    beyond = (1 - CONFIDENCE) / 2
+    beyond = (1 - confidence) / 2
     low = float(scipy.special.betaincinv(count, n - count + 1, beyond)) if count > 0 else 0.0
     high = float(scipy.special.betaincinv(count + 1, n - count, 1 - beyond)) if count < n else 1.0
-    return Estimate(count / n, low, high, n, method="Clopper-Pearson")
+    return Estimate(count / n, low, high, n, level=confidence, method="Clopper-Pearson")
 
 
 def a12(one: Values, other: Values) -> float:

@@ -54,6 +54,8 @@ def test_json_has_all_numbers_and_the_order(table, tmp_path):
 def test_python_gives_the_same_from_the_fields(table):
     compared = realitygap.compare_scores(str(table), sim="mujoco", real="arm")
     assert compared.gaps[0].result.level.value == pytest.approx(0.1)
+    assert repr(compared).startswith("ComparedScores(mujoco → arm: level 0.100 [")
+    assert repr(realitygap.compare_scores(SIMPLER)) == "ComparedScores(sim → real, 9 tasks)"
     assert realitygap.compare_scores([table], sim="mujoco").gaps[0].result.target == "arm"
 
 
@@ -66,6 +68,24 @@ def test_platforms_of_whole_files_are_named_before_them(table, tmp_path):
         halves.append(half)
     text = printed("compare", f"sim={halves[0]}", f"real={halves[1]}")
     assert text.startswith("Gap in score: sim against real\n")
+
+
+def test_successes_print_each_controller_with_its_test(tmp_path):
+    lines = ["policy,platform,success,n"]
+    lines += [
+        f"p{k},{name},{(k + shift) / 20},20" for k in (2, 9, 15) for name, shift in (("sim", 4), ("real", 0))
+    ]
+    path = tmp_path / "rates.csv"
+    path.write_text("\n".join(lines))
+    text = printed("compare", path, "--binary")
+    assert text.startswith("Gap in success: sim against real")
+    assert text.count("  p = ") == 3
+    assert "Boschloo" in text
+    assert "p = " not in printed("compare", path, "--score", "success")
+
+
+def test_without_tasks_the_option_is_refused(table):
+    assert "The table has no tasks" in refused("compare", table, "--sim", "mujoco", "--task", "pick")
 
 
 REFUSED = {

@@ -268,6 +268,13 @@ def test_tasks_are_compared_apart_even_with_different_controllers():
     ]
 
 
+def test_a_platform_without_tasks_has_the_only_task_of_the_other():
+    rows = [replace(row, task="pick") if row.platform == "sim" else row for row in means(sim=SIX, real=SIX)]
+    assert [gap.task for gap in compare_scores(rows, HOW)] == ["pick"]
+    rows.append(replace(rows[0], task="push"))
+    assert "The scores of real have no task, and those of sim have 2. Choose one: --task" in refusal(rows)
+
+
 def test_trials_and_means_of_one_platform_are_refused_together():
     sim, real = ragged(5, np.random.default_rng(7))
     rows = [*rows_of(sim, "sim"), *rows_of(real, "real")]

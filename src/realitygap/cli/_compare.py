@@ -44,9 +44,11 @@ def compare(
     if as_json:
         print_json(compared.to_dict() | {"order": order.record(), "report": report})
         return
-    common = [] if full else compared.common_reasons
+    common = [] if full or len(compared.gaps) == 1 else compared.common_reasons
     for gap in compared.gaps:
         _print(gap, common, full=full)
+        if len(compared.gaps) > 1:
+            echo("")
     for reason in common:
         echo(reason)
 
@@ -83,5 +85,3 @@ def _print(gap: ScoreGap, common: Collection[str], *, full: bool) -> None:
     for reason in gap.remarks if full else gap.reasons:
         if reason not in common:
             echo(reason)
-    if gap.task:
-        echo("")

@@ -14,6 +14,7 @@ import typer
 import realitygap
 from realitygap._limits import MOST_TABLE_BYTES, read_file
 from realitygap._terminal import echo
+from realitygap._wording import counted
 from realitygap.errors import LedgerError, StudyError, did_you_mean
 
 from ._export import write_trials
@@ -99,6 +100,30 @@ def trials(
             rich_help_panel="Only for advise",
         ),
     ] = None,
+    format: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FORMAT",
+            help="fieldtrial: a table that `fieldtrial import` reads (.csv). [default: by the ending of NAME]",
+            rich_help_panel="Only for export",
+        ),
+    ] = None,
+    success_from: Annotated[
+        float | None,
+        typer.Option(
+            metavar="SCORE",
+            help="Score from which a trial is a success, for fieldtrial.",
+            rich_help_panel="Only for export",
+        ),
+    ] = None,
+    task: Annotated[
+        str | None,
+        typer.Option(
+            metavar="KIND",
+            help="Task that scores the trials for fieldtrial. [default: coverage]",
+            rich_help_panel="Only for export",
+        ),
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """List, show, score, annotate, and export trials.
@@ -131,6 +156,8 @@ def trials(
 
     Example: realitygap trials export results/paper-robot -o trials.parquet
 
+    Example: realitygap trials export gap.sqlite --format fieldtrial --success-from 0.3 -o trials.csv
+
     Example: realitygap trials agreement results/paper-robot
 
     Example: realitygap trials advise pairs.sqlite --margin 0.05
@@ -151,6 +178,7 @@ def trials(
         raise StudyError(f"--json is only for {', '.join(_PRINTING)}, not for {what}. Leave it out.")
     if out is not None and what != "export":
         raise StudyError(f"--out is only for export, not for {what}. Leave it out.")
+    _check_format(what, format, success_from, task)
     if what != "advise" and (margin is not None or null is not None):
         raise StudyError(f"--margin and --null are only for advise, not for {what}. Leave them out.")
     if what == "advise":
@@ -162,6 +190,8 @@ def trials(
             _list(opened, as_json=as_json)
         elif what == "show":
             _show(opened, _number(opened, _needed(trial, "The number of a trial")), as_json=as_json)
+        elif what == "export" and format is not None:
+            _export_fieldtrial(opened, source, out, trial, success_from, task)
         elif what == "export":
             write_trials(source, out, () if trial is None else [_number(opened, trial)])
         elif what == "agreement":
@@ -180,6 +210,43 @@ def trials(
             number = _number(opened, _needed(trial, "The number of a trial"))
             opened.void(number, _needed(text, "--text"))
             echo(f"Trial {number} is void; it will be driven again.")
+
+
+def _check_format(what: str, format: str | None, success_from: float | None, task: str | None) -> None:
+    """Raise an error if options of the format fieldtrial are used without it, or it lacks one."""
+    if format is None and (success_from is not None or task is not None):
+        raise StudyError("--success-from and --task go with --format fieldtrial. Add it, or leave them out.")
+    if format is None:
+        return
+    if what != "export":
+        raise StudyError(f"--format is only for export, not for {what}. Leave it out.")
+    if format != "fieldtrial":
+        raise StudyError(f"There is no format {format!r}. {did_you_mean(format, ['fieldtrial'])}")
+    if success_from is None or not math.isfinite(success_from):
+        raise StudyError(
+            "fieldtrial has successes and no scores. Give the score from which a trial is a success: --success-from 0.3"
+        )
+
+
+def _export_fieldtrial(
+    opened: Ledger,
+    source: Path,
+    out: Path | None,
+    trial: str | None,
+    success_from: float | None,
+    task: str | None,
+) -> None:
+    if trial is not None:
+        raise StudyError("--format fieldtrial exports all scored trials. Leave the trial out.")
+    if out is None or out.suffix != ".csv":
+        raise StudyError("Name the output with -o: a file that ends in .csv.")
+    if hidden := _hidden(opened):
+        raise StudyError(
+            f"The conditions of {len(hidden)} trials are blind until their generation is closed. Export them then."
+        )
+    scorer = None if task is None else realitygap.study.task_named(task)
+    n = realitygap.study.write_fieldtrial(source, out, success_from or 0.0, scorer)
+    echo(f"Written: {out} ({counted(n, 'trial')})")
 
 
 _LONGEST_NUMBER = 19

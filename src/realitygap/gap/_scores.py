@@ -219,6 +219,7 @@ def compare_scores(rows: Iterable[ScoreRow], how: Comparison) -> list[ScoreGap]:
     """
     chosen = [row for row in rows if row.platform in (how.sim, how.real)]
     _check(chosen, how)
+    chosen = _with_common_task(chosen, how)
     tasks = list(dict.fromkeys(row.task for row in chosen))
     return [_of_task(task, [row for row in chosen if row.task == task], how) for task in tasks]
 
@@ -256,6 +257,25 @@ def _check(rows: Sequence[ScoreRow], how: Comparison) -> None:
                 "Number trials in a column trial, name tasks in a column task, or remove one row."
             )
         seen[key] = row
+
+
+def _with_common_task(rows: list[ScoreRow], how: Comparison) -> list[ScoreRow]:
+    """Return the rows with the task of the other platform for a platform without tasks.
+
+    Raises:
+        TableError: The other platform has several tasks.
+    """
+    tasks = {name: {row.task for row in rows if row.platform == name} for name in (how.sim, how.real)}
+    for name, other in ((how.sim, how.real), (how.real, how.sim)):
+        if tasks[name] == {""} and tasks[other] != {""}:
+            if len(tasks[other]) > 1:
+                raise TableError(
+                    f"The scores of {name} have no task, and those of {other} have {len(tasks[other])}. Choose one: "
+                    "--task NAME"
+                )
+            (task,) = tasks[other]
+            return [replace(row, task=task) for row in rows]
+    return rows
 
 
 def _check_successes(rows: Sequence[ScoreRow]) -> None:

@@ -57,7 +57,7 @@ def _content(compared: ComparedScores) -> dict[str, Any]:
     common = () if is_single else compared.common_reasons
     tasks = [_task(gap, k, common) for k, gap in enumerate(compared.gaps, 1)]
     number_figures(figure for task in tasks for figure in (task["pairs"], task["differences"]))
-    n = f", {counted(first.level.n, 'controller')}, {first.trials_in_words}"
+    n = f", {first.basis}"
     content = {
         "version": __version__,
         "title": f"The gap: {compared.title}",

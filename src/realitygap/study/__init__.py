@@ -20,6 +20,7 @@ from ._code import AllowCode, check_files, python_tasks, task_named
 from ._compare import ComparedScores, compare_scores
 from ._controllers import sample_controllers
 from ._duration import estimate_seconds
+from ._fieldtrial import write_fieldtrial
 from ._file import DEFAULT_NEAT, SECTIONS, load_study, named_studies, parse_study, platform_sections
 from ._gap.between import GapBetween, gap_between
 from ._gap.estimate import estimate_score
@@ -144,5 +145,6 @@ __all__ = [
     "try_on",
     "try_pairs",
     "with_ruled_end",
+    "write_fieldtrial",
     "write_trials",
 ]

@@ -30,6 +30,13 @@ class ComparedScores:
     gaps: tuple[ScoreGap, ...]
     order: CompareOrder
 
+    def __repr__(self) -> str:
+        first = self.gaps[0].result
+        tasks = (
+            f", {len(self.gaps)} tasks" if len(self.gaps) > 1 else f": level {first.level}, n={first.level.n}"
+        )
+        return f"{type(self).__name__}({first.source} → {first.target}{tasks})"
+
     @property
     def title(self) -> str:
         """Both platforms in words."""
@@ -72,8 +79,9 @@ def compare_scores(order: CompareOrder) -> ComparedScores:
     if order.task is not None:
         tasks = {row.task for row in rows}
         if order.task not in tasks:
-            raise TableError(f"There is no task {order.task!r}. {did_you_mean(order.task, tasks - {''})}")
-        rows = [row for row in rows if row.task == order.task]
+            known = did_you_mean(order.task, tasks - {""}) or "The table has no tasks: leave --task out."
+            raise TableError(f"There is no task {order.task!r}. {known}")
+        rows = [row for row in rows if row.task in (order.task, "")]
     sim, real = platforms_in(rows, order.sim, order.real)
     how = Comparison(
         sim,

@@ -127,9 +127,11 @@ class ScoreGap:
         """Remarks on ties, and notes."""
         ties = ties_in_words(int(self.result.mmrv.more.get("ties") or 0), self.ties)
         found = [ties, *self.result.notes]
-        if self.source.is_binary and not self.source.are_means and not self.target.are_means:
+        sides = (self.source, self.target)
+        has_trials = not any(side.are_means for side in sides)
+        if has_trials and self.source.is_binary:
             found.append(methods_of_successes(paired=self.result.paired))
-        elif all(np.isin(_given(side), (0, 1)).all() for side in (self.source, self.target)):
+        elif has_trials and all(np.isin(_given(side), (0, 1)).all() for side in sides):
             found.append(
                 "All scores are 0 or 1. For exact intervals and tests of each controller, add --binary."
             )

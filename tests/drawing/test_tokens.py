@@ -5,9 +5,11 @@ from __future__ import annotations
 import re
 import xml.etree.ElementTree as ET
 from importlib import resources
+from pathlib import Path
 
 import pytest
 
+import realitygap
 from realitygap.drawing import Ink, Line, Picture, themed_file
 
 SHEET = resources.files("realitygap.drawing").joinpath("tokens.css").read_text("utf-8")
@@ -30,13 +32,36 @@ def test_sheet_has_the_colors_of_figures():
     assert {name: LIGHT[f"ink-{name}"] for name in Ink.names()} == Ink.names()
 
 
+LABELS = {"SIM": "muted"} | {name: f"ink-{name.lower()}" for name in ("TWIN", "EMULATED", "REAL")}
+
+
+def test_a_label_has_one_color_in_players_and_on_all_pages():
+    for label, color in LABELS.items():
+        assert LIGHT[color] == getattr(Ink, label, Ink.MUTED)
+    package = Path(realitygap.__file__).parent
+    for sheet in (
+        "report/templates/report.css",
+        "lab/pages/static/lab.css",
+        "drawing/cards/card.css",
+        "playback/player.css",
+    ):
+        rules = (package / sheet).read_text("utf-8")
+        for label, color in LABELS.items():
+            assert re.search(
+                rf"-{label.lower()}\b[^{{]*{{ (color|background): var\(--{color}\); }}", rules
+            ), (
+                sheet,
+                label,
+            )
+
+
 def test_both_themes_have_the_same_colors():
     assert set(LIGHT) == set(DARK)
 
 
 @pytest.mark.parametrize("colors", [LIGHT, DARK], ids=["light", "dark"])
 def test_words_can_be_read_on_their_grounds(colors):
-    for ink in ("text", "muted", "accent", "danger", "ok", "warn", "violet"):
+    for ink in ("text", "muted", "accent", "danger", "ok", "warn", *LABELS.values()):
         for ground in ("ground", "card"):
             assert contrast(colors[ink], colors[ground]) >= 4.5, (ink, ground)
 

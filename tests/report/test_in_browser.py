@@ -26,6 +26,9 @@ PATIENCE_MS = 60_000
 """Other tests may have the processors."""
 DESKTOP, PHONE = (1280, 900), (390, 844)
 MARGIN = 0.012 * 42 * 25.4
+UNITS = _replay.UNITS
+NEAR_MM, NEAR_DEG = 1000 * UNITS["length"] / 2 + 0.11, np.degrees(UNITS["angle"]) / 2 + 0.05
+"""Half a unit of the page, and of a digit in its figure."""
 """Of the paper's arena in the player [mm]."""
 EVIL = "</script><img src=x onerror=alert(1)>\"'&,/@%"
 
@@ -92,14 +95,14 @@ def numbers(page) -> list[list[float | str]]:
 
 
 def check_numbers(shown: list[float | str], trajectory: Trajectory, step: int) -> None:
-    """The numbers of a row of the table are those of the trial, within half a unit of what is shown."""
+    """The numbers of a row of the table are those of the trial, within half a unit of the page."""
     lengths = [*shown[:2], *shown[3:6]]
     exact = [*trajectory.poses[step, :2], *trajectory.readings[step]]
-    assert np.abs(np.subtract(lengths, exact)).max() <= 0.5e-4 + 1e-9
-    assert abs(shown[2] - trajectory.poses[step, 2]) <= 0.5e-3 + 1e-9
+    assert np.abs(np.subtract(lengths, exact)).max() <= UNITS["length"] / 2 + 1e-9
+    assert abs(shown[2] - trajectory.poses[step, 2]) <= UNITS["angle"] / 2 + 1e-9
     if step < len(trajectory.commands):
         answers = [trajectory.inputs[step, 0], *trajectory.commands[step]]
-        assert np.abs(np.subtract(shown[6:9], answers)).max() <= 0.5e-3 + 1e-9
+        assert np.abs(np.subtract(shown[6:9], answers)).max() <= UNITS["output"] / 2 + 1e-9
     else:
         assert shown[6:9] == ["–"] * 3
         assert shown[10:] == [round(trajectory.coverage_line, 3), round(trajectory.coverage_ends, 3)]
@@ -306,12 +309,12 @@ def test_robot_stands_where_its_numbers_say(show, trials):
     width, height = page.evaluate(f"() => [{arena}.viewBox.baseVal.width, {arena}.viewBox.baseVal.height]")
     assert (width, height) == pytest.approx((42 * 25.4 + 2 * MARGIN, 24 * 25.4 + 2 * MARGIN), abs=0.2)
     found = [float(number) for number in re.findall(r"-?\d+\.\d+", robot_at(page))]
-    assert found[:2] == pytest.approx([1000 * x + MARGIN, height - MARGIN - 1000 * y], abs=0.2)
-    assert found[2] == pytest.approx(-np.degrees(heading), abs=0.05)
+    assert found[:2] == pytest.approx([1000 * x + MARGIN, height - MARGIN - 1000 * y], abs=NEAR_MM)
+    assert found[2] == pytest.approx(-np.degrees(heading), abs=NEAR_DEG)
     corners = page.locator("#replay-figure .rg-robot .rg-body").get_attribute("points")
     assert corners == "90.0,-80.0 90.0,80.0 -90.0,80.0 -90.0,-80.0", "0.18 x 0.16 m, in mm"
     ends = [float(ray.get_attribute("x2")) for ray in page.locator("#replay-figure .rg-robot .rg-ray").all()]
-    assert ends == pytest.approx(90 + 1000 * trajectory.readings[9], abs=0.11)
+    assert ends == pytest.approx(90 + 1000 * trajectory.readings[9], abs=NEAR_MM)
 
 
 @pytest.mark.slow
@@ -626,10 +629,10 @@ def test_reduced_motion_goes_from_step_to_step(show, trials):
     page.locator("#replay-play").click()
     poses = page.evaluate("() => [...window.seen]")
     assert poses
-    steps = {(round(1000 * x + MARGIN, 0), round(-np.degrees(heading))) for x, _, heading in trajectory.poses}
+    steps = [(1000 * x + MARGIN, -np.degrees(heading)) for x, _, heading in trajectory.poses]
     for pose in poses:
         x, _, turn = (float(number) for number in re.findall(r"-?\d+\.\d+", pose))
-        assert any(abs(x - at) <= 0.7 and abs(turn - angle) <= 0.7 for at, angle in steps)
+        assert any(abs(x - at) <= NEAR_MM and abs(turn - angle) <= NEAR_DEG for at, angle in steps)
 
 
 @pytest.mark.slow
@@ -699,5 +702,5 @@ def test_all_robots_of_a_trial_are_replayed(show, tmp_path) -> None:
     ]
     for k, robot in enumerate(trial.robots):
         moved = np.subtract(robot.poses[-1, :2], trial.poses[-1, :2]) * [1000, -1000]
-        assert np.subtract(places[k], places[0]) == pytest.approx(moved, abs=0.2)
+        assert np.subtract(places[k], places[0]) == pytest.approx(moved, abs=2 * NEAR_MM)
     assert numbers(page)[0][10:] == [round(trial.coverage_line, 3), round(trial.coverage_ends, 3)]

@@ -11,7 +11,8 @@ from importlib import resources
 class Ink:
     """The colors of all figures: apart in lightness, and for color-blind eyes (after Okabe & Ito, 2008).
 
-    The eight pens are never told apart by color alone: each has a pattern of dashes and a number as well.
+    The eight pens are never told apart by color alone: each has a pattern of dashes and a number as well. The label of
+    trials has the color of its name; SIM is MUTED.
     """
 
     TEXT = "#1c1f24"
@@ -33,6 +34,9 @@ class Ink:
     PEN5 = "#a67a00"
     PEN6 = "#3d9bd6"
     PEN7 = "#7a1f4d"
+    TWIN = "#6a3d9a"
+    EMULATED = "#8a4b00"
+    REAL = "#1e6b34"
 
     @classmethod
     def names(cls) -> dict[str, str]:

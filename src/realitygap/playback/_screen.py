@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 
 A = TypeVar("A", bound="Artist")
 
-LABEL_COLORS = {"SIM": Ink.OURS, "TWIN": Ink.PEN3, "EMULATED": Ink.PEN5, "REAL": Ink.REACH}
 LETTERS = "ABCDEFGH"
 """Letters of the pens, as on the page of a report."""
 
@@ -191,7 +190,7 @@ class Screen:
                 va="center_baseline",
                 bbox={
                     "boxstyle": "round,pad=0.32",
-                    "facecolor": LABEL_COLORS.get(label, Ink.MUTED),
+                    "facecolor": getattr(Ink, label, Ink.MUTED),
                     "edgecolor": "none",
                 },
             )

@@ -237,6 +237,8 @@ def draw_distance(pairs: Sequence[tuple[str, Side, Side]]) -> Drawing:
             axes.set_ylabel("apart [m]", labelpad=3)
             if title:
                 head(axes, title)
+        _, one, other = pairs[-1]
+        sheet.key(_keys((one if len(pairs) == 1 else replace(one, name="simulator"), other)))
         return sheet
 
     marks = tuple(
@@ -397,6 +399,8 @@ def _keys(sides: tuple[Side, ...]) -> list[Artist]:
         ]
     alone = [
         line_key(f"{shorten(side.name, 16)}, noise alone", color=color, linestyle=dashes, linewidth=1.0)
-        for side, color, dashes in zip(sides, _COLORS, _DASHES, strict=False)
+        for side, color, dashes in zip(
+            [side for side in sides if len(side.trials) > 1], _COLORS, _DASHES, strict=False
+        )
     ]
     return [*curves, area_key("10th to 90th percentile", Ink.BAND, 0.55), *alone]

@@ -95,7 +95,8 @@ def draw_gap_pairs(
                 handles.append(mark_key(f"{plural}, n = {len(k)}", marker, 4.2, color=color))
         if before is not None:
             handles.append(mark_key("before the calibration", "o", 3.4, color=Ink.RUN))
-        axes.set_xlabel(f"{score} on {shorten(names[0], 34)}", labelpad=3)
+        gray = "" if before is None else f"; gray: on {shorten(_names(before.source, target)[0], 20)}"
+        axes.set_xlabel(f"{score} on {shorten(names[0], 34)}{gray}", labelpad=3)
         axes.set_ylabel(f"{score} on {shorten(names[1], 34)}", labelpad=3)
         axes.legend(handles=handles, loc="upper left", frameon=False, fontsize=7.5, handlelength=1.0)
         return sheet

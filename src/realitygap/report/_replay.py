@@ -2,12 +2,13 @@
 
 Every number is rounded to a whole multiple of its unit in `UNITS`, so that what the page shows is within half a
 unit of what was computed. A trial is one run of bytes: columns of differences from one step to the next, each
-difference as a zigzag number of 7 bits a byte, so that a column that stands still costs a byte a step.
+difference as a zigzag number of 7 bits a byte. The bytes of all trials are compressed together (RFC 1951).
 """
 
 from __future__ import annotations
 
 import base64
+import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
@@ -27,14 +28,14 @@ from realitygap.report.charts.arena import arena_extent
 from realitygap.runs import Condition, replay
 from realitygap.trials import Trajectory
 
-UNITS = {"length": 1e-4, "angle": 1e-3, "output": 1e-3}
+UNITS = {"length": 1e-3, "angle": 5e-3, "output": 5e-3}
 """Units to which numbers are rounded: positions and readings [m], headings [rad], inputs and outputs of networks."""
 
 N_PENS = 4
 """Trials shown at once: of more, bodies and rays cover one another."""
 
 MOST_STEPS = 115_000
-"""Steps embedded in a page, of all trials together: some 18 bytes each. The best trial of each run of the paper's study
+"""Steps embedded in a page, of all trials together: some 8 bytes each. The best trial of each run of the paper's study
 fits."""
 
 
@@ -118,14 +119,15 @@ def content(tally: Tally, lead: str) -> ReplayOnPage:
     """
     candidates = tally.with_runs
     room = MOST_STEPS // max(len(candidates), 1)
-    runs = [_pack_run(tally, condition, room) for condition in candidates]
+    trials = bytearray()
+    runs = [_pack_run(tally, condition, room, trials) for condition in candidates]
     with_trials = [run for run in runs if run.data is not None]
     packed = [run.data for run in with_trials]
     first = next((k for k, run in enumerate(with_trials) if run.name == lead), 0)
     player = resources.files("realitygap.playback")
     module = player.joinpath("player.js").read_text("utf-8").replace("export default { render };", "")
     # no module: those run last, after the script that looks for tables wider than the page
-    script = f'"use strict";\n(() => {{\n{module}{template_text("replay.js")}}})();\n'
+    script = f'"use strict";\n(async () => {{\n{module}{template_text("replay.js")}}})();\n'
     return ReplayOnPage(
         css=Markup(player.joinpath("player.css").read_text("utf-8") + template_text("replay.css")),
         script=Markup(script),
@@ -136,6 +138,7 @@ def content(tally: Tally, lead: str) -> ReplayOnPage:
                 "pens": [pack_pen(pen) for pen in range(N_PENS)],
                 "measure": tally.measure,
                 "lead": first,
+                "bytes": base64.b64encode(zlib.compress(trials, 9, -zlib.MAX_WBITS)).decode(),
                 "conditions": packed,
             }
         ),
@@ -197,7 +200,8 @@ def _picture(condition: Condition, trajectory: Trajectory, text: str) -> Markup:
 # one run
 
 
-def _pack_run(tally: Tally, described: DescribedCondition, room: int) -> _Run:
+def _pack_run(tally: Tally, described: DescribedCondition, room: int, packed: bytearray) -> _Run:
+    """Return a run; the bytes of its trials are appended to those of all."""
     name = described["name"]
     replicate = tally.typical_replicate(name)
     rows = tally.rows_of(name, replicate)
@@ -208,9 +212,11 @@ def _pack_run(tally: Tally, described: DescribedCondition, room: int) -> _Run:
             return _Run(name, replicate, None, 0, rows.height, note)
         n_fitting = room // (condition.on.steps + 1) // condition.arena.robots
         chosen = _choose(rows, n_fitting, tally.score_column(name))
-        trials = [_pack_row(condition, row) for row in chosen.iter_rows(named=True)]
+        trials = [_pack_row(condition, row, packed) for row in chosen.iter_rows(named=True)]
         bests = _bests(tally, name, replicate, n_fitting - len(trials))
-        others = [[int(row["replicate"]), *_pack_row(condition, row)] for row in bests.iter_rows(named=True)]
+        others = [
+            [int(row["replicate"]), *_pack_row(condition, row, packed)] for row in bests.iter_rows(named=True)
+        ]
     except (RealityGapError, ValueError):
         note = (
             "its trials cannot be recomputed by this version of realitygap; use the one that ran the study."
@@ -279,25 +285,27 @@ def _sensor_names(lefts: Sequence[float]) -> list[str]:
     return [f"sensor {k}" for k in range(len(lefts))]
 
 
-def _pack_row(condition: Condition, row: Mapping[str, Any]) -> list[Any]:
-    """Return the trial as the page's script takes it.
+def _pack_row(condition: Condition, row: Mapping[str, Any], packed: bytearray) -> list[Any]:
+    """Return the trial as the page's script takes it, and append its bytes.
 
     That is the generation, the individual, the numbers of cells along the line and at the ends of steps, the duration
-    of a step, the bytes of the first robot, and those of each other one.
+    of a step, the place of the first robot's bytes, and that of each other one.
     """
     trajectory = replay(condition, row)
     grid = condition.arena.arena().grid
     visits = first_visits(np.stack([robot.poses for robot in trajectory.robots]), grid)
     cells, _, end_steps = visits
-    first, *others = (base64.b64encode(pack_trial(robot, *visits)).decode() for robot in trajectory.robots)
+    places = []
+    for robot in trajectory.robots:
+        places.append(len(packed))
+        packed += pack_trial(robot, *visits)
     return [
         int(row["generation"]),
         int(row["individual"]),
         len(cells),
         len(end_steps),
         trajectory.step_s,
-        first,
-        *others,
+        *places,
     ]
 
 

@@ -2,6 +2,9 @@
 
 const byId = (id) => document.getElementById(`replay-${id}`);
 const data = JSON.parse(byId("data").textContent);
+const packed = new Blob([Uint8Array.from(atob(data.bytes), (letter) => letter.charCodeAt(0))]);
+const unpacked = packed.stream().pipeThrough(new DecompressionStream("deflate-raw"));
+const bytes = new Uint8Array(await new Response(unpacked).arrayBuffer()); // of all trials
 const { length: LENGTH, angle: ANGLE, output: OUTPUT } = data.units;
 const LETTERS = data.pens.map(({ letter }) => letter);
 
@@ -13,10 +16,10 @@ const conditions = data.conditions.map((packed) => {
   if (!scenes.has(key)) scenes.set(key, packed.scene);
   const condition = { ...packed, scene: scenes.get(key), nCells: arena.grid.columns * arena.grid.rows };
   const { outlines, mounts, reach, steps: n } = packed;
-  const read = (run, [generation, individual, line, ends, stepS, bytes, ...others]) => {
+  const read = (run, [generation, individual, line, ends, stepS, place, ...others]) => {
     const shared = { condition, run, generation, individual, line, ends, step_s: stepS, n, outlines, mounts, reach, parts: 1, placed: true };
     const link = [packed.name, run, generation, individual].map(encodeURIComponent).join("/");
-    return { ...shared, bytes, link, others: others.map((other) => ({ ...shared, bytes: other })) };
+    return { ...shared, place, link, others: others.map((other) => ({ ...shared, place: other })) };
   };
   condition.trials = packed.trials.map((trial) => read(packed.run, trial));
   condition.bests = [condition.trials[packed.best], ...packed.bests.map(([run, ...trial]) => read(run, trial))]; // of each run
@@ -31,14 +34,13 @@ const pathOf = (trial) => `${runOf(trial)}/${trial.generation}/${trial.individua
 // columns of differences, each a zigzag number of 7 bits a byte
 function unpack(trial) {
   if (trial.poses) return trial;
-  const text = atob(trial.bytes);
-  let at = 0;
+  let at = trial.place;
   const column = (n, unit = 1) => {
     let sum = 0;
     return Array.from({ length: n }, () => {
       let number = 0, shift = 0, byte;
       do {
-        byte = text.charCodeAt(at++);
+        byte = bytes[at++];
         number |= (byte & 127) << shift;
         shift += 7;
       } while (byte > 127);
@@ -145,7 +147,7 @@ function drawTable() {
 }
 
 function numbersOf(trial, step, nSensors) {
-  const [x, y, heading] = trial.poses[step], meters = (length) => (length === undefined ? "" : length.toFixed(4));
+  const [x, y, heading] = trial.poses[step], meters = (length) => (length === undefined ? "" : length.toFixed(3));
   return [
     meters(x), meters(y), heading.toFixed(3), ...Array.from({ length: nSensors }, (_, k) => meters(trial.rays[step][k])),
     ...trial.answers.map((column) => (step < trial.n ? column[step].toFixed(3) : "–")), trial.stalled[step] ? "yes" : "no",

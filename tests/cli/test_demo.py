@@ -18,10 +18,10 @@ def test_demo_runs_the_commands_that_it_prints_and_names_its_results(tmp_path):
     assert done.returncode == 0, done.stderr
     lines = re.findall(r"^\$ realitygap (.*)$", done.stdout, re.MULTILINE)
     names = [shlex.split(line)[0] for line in lines]
-    assert names == ["run", "report", "export", "show", "try", "gap"]
+    assert names == ["run", "report", "export", "show", "try", "gap", "close"]
     assert re.search(r"EMULATED\): 3 trials, mean coverage 0\.\d+ of 72 cells", done.stdout)
     named = done.stdout.partition("The results of this tour are in tour:")[2]
-    for name in ("paper/report.html", "champion.gif", "gap.html"):
+    for name in ("paper/report.html", "champion.gif", "gap.html", "closed/report.html"):
         assert name in named
         assert (tmp_path / "tour" / name).stat().st_size > 1000
     tried = realitygap(*shlex.split(lines[4]), cwd=tmp_path)  # as a user types it

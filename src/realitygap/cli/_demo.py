@@ -19,6 +19,11 @@ from ._results import show_page
 
 _FAMILY = default_family()
 _ROBOT = f"{_FAMILY.named(_FAMILY.emulated)}&speed=off"
+_WORN = f'base = "{_FAMILY.robot}"\n\n[drive]\ngain_left = 0.7\ngain_right = 0.75\n'
+"""File of a robot with worn motors."""
+
+_MEASURED = ("--n-controllers", "10", "--trials", "3", "--observe", "track")
+_CALIBRATED = ("--what", "path", "--budget", "10", "--n-controllers", "20", "--trials", "5")
 
 
 def demo(
@@ -29,14 +34,15 @@ def demo(
     open_page: Annotated[
         bool,
         typer.Option(
-            "--open", help="When done, show the reports of the study and of the gap in the browser."
+            "--open", help="When done, show the reports of the study and of the closed gap in the browser."
         ),
     ] = False,
 ) -> None:
     """Take a two-minute tour with an emulated robot.
 
     The tour runs a small study, writes its report, drives a controller on an emulated robot, and measures the gap
-    between a simulator and that robot. It prints each command before it runs it. Ctrl-C ends the tour.
+    between a simulator and that robot. It closes the gap to a simulated robot with worn motors. It prints each command
+    before it runs it. Ctrl-C ends the tour.
 
     Example: realitygap demo --open
 
@@ -61,11 +67,12 @@ def demo(
         "  paper/report.html   report of the study: figures, tables, and trials to play\n"
         "  champion.gif        film of the controller in simulation\n"
         "  gap.html            the gap: one controller in motion in both worlds, and all scores\n"
+        "  closed/report.html  the same before and after the calibration to a robot with worn motors\n"
         f"Next, change the paper's study: {launcher()} new-study my-study.toml --from paper"
     )
     if open_page:
         show_page(folder / "paper" / "report.html")
-        show_page(folder / "gap.html")
+        show_page(folder / "closed" / "report.html")
 
 
 def _made(folder: Path | None) -> Path:
@@ -84,7 +91,9 @@ def _made(folder: Path | None) -> Path:
 
 def _steps(folder: Path) -> list[tuple[str, list[list[str]]]]:
     """Return the purpose of each step of the tour, and the words of its commands."""
-    study, champion, film = (str(folder / name) for name in ("paper", "champion.json", "champion.gif"))
+    names = ("paper", "champion.json", "champion.gif", "gap.html", "worn.toml", "closed")
+    study, champion, film, gap, worn, closed = (str(folder / name) for name in names)
+    Path(worn).write_text(_WORN, "utf-8")
     return [
         (
             "Evolve controllers in simulation. The paper's study has 9 conditions, here with 20 runs each.",
@@ -101,12 +110,11 @@ def _steps(folder: Path) -> list[tuple[str, list[list[str]]]]:
         ),
         (
             "Measure the gap between a simulator and the emulated robot.",
-            [
-                [
-                    *("gap", "sim", _ROBOT, "--n-controllers", "10", "--trials", "3", "--observe", "track"),
-                    *("--report", str(folder / "gap.html")),
-                ]
-            ],
+            [["gap", "sim", _ROBOT, *_MEASURED, "--report", gap]],
+        ),
+        (
+            "Close the gap to a simulated robot with worn motors: calibrate, and measure again.",
+            [["close", "sim", f"sim:{worn}", *_CALIBRATED, "-o", closed]],
         ),
     ]
 

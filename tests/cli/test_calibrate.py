@@ -250,7 +250,7 @@ def test_numbers_are_read_as_on_a_ruler(text, value):
         (("sensors", "--robot", "sim"), "No file for the calibration. Name one"),
         (("sensors", "--robot", "sim", "-o", "x.txt"), "does not end in .toml"),
         (("sensors", "--robot", "sim", "-o", "no/x.toml"), "There is no folder no"),
-        (("sensor", "--robot", "sim", "-o", "x.toml"), "Cannot calibrate 'sensor'. Did you mean 'sensors'?"),
+        (("sensor", "--robot", "sim", "-o", "x.toml"), "got 'sensor'. Did you mean 'sensors'?"),
         (("sensors", "--robot", "sym", "-o", "x.toml"), "'sym' is no platform"),
         (("path", "--robot", "sim", "--budget", "1", "-o", "x.toml"), "needs at least 2 trials"),
         (("path", "--robot", "sim", "--figure", "x.svg", "-o", "x.toml"), "--figure draws the readings"),

@@ -84,10 +84,7 @@ def drive(
     realitygap.study.check_has_robot(resolved)
     path = out or Path("results") / resolved.about.name
     operator = choose_operator(port, witness, answers, path, quiet=as_json)
-    with (
-        resumable("Scored trials are saved."),
-        operated_under_camera(camera, resolved, operator) as looking,
-    ):
+    with resumable("Scored trials are saved."), operated_under_camera(camera, resolved, operator) as looking:
         result = realitygap.study.drive_study(
             resolved, port, path, operator=looking, allow_code=code_permission(allow_code)
         )

@@ -64,10 +64,7 @@ def gap(
 
 @command_of(CloseOrder)
 def close(
-    order: CloseOrder,
-    allow_code: AllowPlatforms = False,
-    as_json: Json = False,
-    open_page: ShowPage = False,
+    order: CloseOrder, allow_code: AllowPlatforms = False, as_json: Json = False, open_page: ShowPage = False
 ) -> None:
     """Measure, calibrate, measure again, print both gaps, and write the page."""
     folder = order.folder
@@ -150,11 +147,7 @@ def _print_why(why: Why) -> None:
 
 
 @command_of(PlanOrder)
-def plan(
-    order: PlanOrder,
-    allow_code: AllowPlatforms = False,
-    as_json: Json = False,
-) -> None:
+def plan(order: PlanOrder, allow_code: AllowPlatforms = False, as_json: Json = False) -> None:
     """Plan, and print the table."""
     found = realitygap.study.plan_gap(order, allow_code=allow_code)
     if as_json:

@@ -23,11 +23,7 @@ if TYPE_CHECKING:
 
 
 @command_of(TryOrder)
-def try_genome(
-    order: TryOrder,
-    allow_code: AllowPlatforms = False,
-    as_json: Json = False,
-) -> None:
+def try_genome(order: TryOrder, allow_code: AllowPlatforms = False, as_json: Json = False) -> None:
     """Drive the trials, and print the coverage, or what is shown of two controllers."""
     observer = attending_observer(order.on, order.witness)
     if order.against is not None:
@@ -61,11 +57,7 @@ def _try_pairs(order: TryOrder, observer: PortObserver | None, *, as_json: bool)
 
 
 @command_of(TransferOrder)
-def transfer(
-    order: TransferOrder,
-    allow_code: AllowPlatforms = False,
-    as_json: Json = False,
-) -> None:
+def transfer(order: TransferOrder, allow_code: AllowPlatforms = False, as_json: Json = False) -> None:
     """Run the transfer, and print the result."""
     with resumable("All trials are saved."):
         result = realitygap.study.run_transfer(
@@ -99,11 +91,7 @@ def _print(result: TransferResult) -> None:
 
 
 @command_of(ClosingOrder)
-def closing(
-    order: ClosingOrder,
-    as_json: Json = False,
-    open_page: ShowPage = False,
-) -> None:
+def closing(order: ClosingOrder, as_json: Json = False, open_page: ShowPage = False) -> None:
     """Run the study, or what is missing of it, print its goals, and write its page."""
     with resumable("Finished parts are saved."), TrialsBar("parts", quiet=as_json) as bar:
         summary = realitygap.study.closing_the_gap(

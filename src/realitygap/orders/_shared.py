@@ -160,10 +160,7 @@ class MeasureOrder(PairOrder):
     """The fields of every order that measures with any target, and saves its trials in a file."""
 
     observe: Literal["readings", "cells", "encoders", "track"] | None = option(
-        None,
-        help="Data recorded on the target.",
-        default_is="what the task needs",
-        label="Observation level",
+        None, help="Data recorded on the target.", default_is="what the task needs", label="Observation level"
     )
     arena: str | None = arena_option(None, default_is="that of the controllers")
     noise: float | None = option(

@@ -138,9 +138,7 @@ class TransferOrder(Order):
 
     study: str = argument("STUDY", help="Study by name or file. See --condition.", refers="file")
     to: str = option(
-        help=f"Target: sim:FILE, twin:FILE, {port_platforms()}, ...",
-        metavar="PLATFORM",
-        refers="platform",
+        help=f"Target: sim:FILE, twin:FILE, {port_platforms()}, ...", metavar="PLATFORM", refers="platform"
     )
     budget: tuple[Annotated[int, Field(ge=0, le=4999)], ...] = option(
         (), help="Trials that each strategy may spend on the target. Repeatable.", default_is="20"

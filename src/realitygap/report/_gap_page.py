@@ -230,10 +230,7 @@ def _facts(gap: GapBetween) -> list[tuple[str, str]]:
         ),
         ("Arena", study.arena.name),
         ("Score", result.score),
-        (
-            "Observed",
-            _OBSERVED[study.observe],
-        ),
+        ("Observed", _OBSERVED[study.observe]),
     ]
     if result.misspecified is not None:
         facts.append(("Model", reproduces(result.misspecified)))

@@ -578,6 +578,20 @@ def look_verdict(
     return f"Stop: {better} is better than {worse}{since}."
 
 
+def looks_summary(shown: Sequence[tuple[str, str, SequentialVerdict]], n: int) -> str:
+    """Return which of n comparisons have a result, as a sentence.
+
+    Args:
+        shown: First, second, and verdict of each comparison with a result.
+        n: Number of comparisons.
+    """
+    if not shown:
+        return f"None of {counted(n, 'comparison')} has a result yet."
+    words = {"higher": "better than", "lower": "worse than", "equivalent": "equivalent to"}
+    results = [f"{first} is {words[verdict]} {second}" for first, second, verdict in shown]
+    return f"{len(shown)} of {counted(n, 'comparison')}: {'; '.join(results)}."
+
+
 def pairs_forecast(forecast: Forecast | None, n: int, unit: str, fewest: int, maximum: int | None) -> str:
     """Return how many more pairs a comparison may need, as a sentence that calls it a forecast.
 

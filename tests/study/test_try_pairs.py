@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -10,12 +11,25 @@ import pytest
 
 from realitygap.errors import RecordError, StudyError
 from realitygap.evolution import NeatSettings, Population
-from realitygap.records import Ledger
+from realitygap.lab._counts import Counts
+from realitygap.lab._saved import SavedFile
+from realitygap.records import Ledger, ResultsFolder
 from realitygap.stats import SequentialTest
-from realitygap.study import advise, advise_on, try_genome, try_pairs
-from realitygap.study._paired import Blocks, strategy_differences
+from realitygap.study import (
+    advise,
+    advise_on,
+    gap_between,
+    plan_gap,
+    run_transfer,
+    try_genome,
+    try_pairs,
+)
+from realitygap.study._advise import strategy_differences
+from realitygap.study._gap.plan import Spreads
+from realitygap.study._paired import Blocks
 
 from ..cli.invoked import answered
+from .physical import drive, small_study
 
 
 @pytest.fixture
@@ -139,8 +153,6 @@ def test_file_without_a_plan_says_that_nobody_planned_the_looks(two):
         other = json.loads(two["against"].read_text())
         for k in range(7):
             record = ledger.record(k + 1)
-            from dataclasses import replace
-
             ledger.append(replace(record, genome=json.dumps(other), number=record.number, cells=(13,)))
     advice = advise(two["out"])
     assert advice.planned == "unplanned"
@@ -186,3 +198,76 @@ def test_command_prints_and_advises(two):
         (("trials", "advise", "nothing.sqlite"), "no ledger"),
     ):
         assert message in answered(*wrong)
+
+
+def test_gap_stores_its_rounds_and_more_trials_continue_the_looks(tmp_path):
+    order = {"n_controllers": 4, "results": tmp_path / "gap.sqlite", "observe": "cells"}
+    part = gap_between("sim", "sim:scribbler-s1", trials=3, **order)
+    assert part.study.advice.comparisons[0].look.n == 3
+    whole = gap_between("sim", "sim:scribbler-s1", trials=7, **order).study
+    comparison = whole.advice.comparisons[0]
+    rounds = whole.target.values.mean(axis=0) - whole.source.values.mean(axis=0)
+    assert comparison.look.n == 7
+    assert comparison.shift.value == pytest.approx(rounds.mean())
+    assert comparison.look.e == pytest.approx(SequentialTest().look(rounds).e)
+    assert whole.advice.planned == "planned"
+    assert advise(order["results"]).to_dict() == whole.advice.to_dict()
+    with Ledger.open(order["results"], writable=False) as ledger:
+        plans = [each["details"] for each in ledger.events() if each["what"] == "comparison planned"]
+        assert [len(plan.get("rounds", ())) for plan in plans] == [0, 3, 7]
+    assert gap_between("sim", "jyro", n_controllers=2, trials=1).study.advice is None, "nothing is saved"
+
+
+def test_gap_that_is_not_complete_says_what_to_do(tmp_path):
+    two = {"n_controllers": 2, "trials": 2, "results": tmp_path / "gap.sqlite"}
+    gap_between("sim", "jyro", **two)
+    with Ledger.open(two["results"]) as ledger:
+        plan = dict(ledger.comparison().plan)
+        del plan["rounds"]
+        ledger.plan_comparison(plan)
+    with pytest.raises(StudyError, match="to the end"):
+        advise(two["results"])
+
+
+def test_transfer_compares_strategies_over_replicates(tmp_path):
+    order = {
+        "study": "sim-paper",
+        "to": "jyro",
+        "strategy": ("plain", "select"),
+        "budget": (2,),
+        "out": tmp_path / "t",
+    }
+    small = {"runs": 2, "repeats": 1, "replicates": 2, "fresh_trials": 2}
+    result = run_transfer(**order, **small)
+    comparison = result.advice.comparisons[0]
+    assert (comparison.first, comparison.second, comparison.look.n) == ("select", "plain", 2)
+    assert advise(tmp_path / "t").to_dict() == result.advice.to_dict()
+
+
+def test_conditions_of_a_study_are_compared_run_by_run(tmp_path):
+    other = '[[condition]]\nname = "novel"\nselection = "novelty"\nplatform = "scribbler"\n'
+    drive(small_study(more=other, replicates="2"), tmp_path)
+    advice = advise(tmp_path)
+    comparison = advice.comparisons[0]
+    assert (comparison.first, comparison.second, comparison.look.n) == ("novel", "robot", 2)
+    assert (advice.planned, advice.maximum, advice.unit) == ("planned", 2, "run")
+
+
+def test_sequential_plan_has_the_pairs_next_to_the_fixed_design():
+    plan = plan_gap(effect=0.1, sequential=True, spreads=Spreads(0.1, 0.2, "a test"))
+    assert (plan.pairs.fixed, plan.pairs.maximum) == (18, 40)
+    assert plan.needed == ()
+    with pytest.raises(StudyError, match="needs --effect"):
+        plan_gap(margin=0.1, sequential=True)
+
+
+def test_lab_shows_what_pairs_and_runs_show(two, tmp_path):
+    tried = try_pairs(**two)
+    assert SavedFile(two["out"]).read().looks == tuple(tried.advice.sentences)
+    folder = tmp_path / "study"
+    other = '[[condition]]\nname = "novel"\nselection = "novelty"\nplatform = "scribbler"\n'
+    for is_blind in (False, True):
+        study = small_study(more=other + f"\n[trials]\nblind = {str(is_blind).lower()}\n")
+        drive(study, folder)
+        looks = Counts(folder, ResultsFolder.open(folder).description).looks()
+        assert looks == ("" if is_blind else advise(folder).summary)

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 import realitygap
+from realitygap._terminal import echo
 from realitygap.robot_families import ports_by_family
 
 from ._code import AllowTasks, code_permission
@@ -89,5 +90,8 @@ def drive(
             resolved, port, path, operator=looking, allow_code=code_permission(allow_code)
         )
     print_result(result, as_json=as_json)
+    is_compared = len(realitygap.study.physical_conditions(resolved)) > 1
+    if is_compared and not as_json and not resolved.trials.blind:
+        echo(f"Looks after each run: {realitygap.study.advise(path).summary}")
     if open_page:
         show_page(written_report(path, to_stderr=as_json))

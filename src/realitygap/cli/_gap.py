@@ -22,7 +22,7 @@ from ._results import print_finding, show_page
 
 if TYPE_CHECKING:
     from realitygap.gap import GapResult, ReplayError, Why
-    from realitygap.stats import Estimate, Needed
+    from realitygap.stats import Estimate, Needed, PlannedPairs
     from realitygap.study import ClosedGap, GapPlan
 
 
@@ -50,12 +50,16 @@ def gap(
         values: dict[str, Any] = result.to_dict() | {"order": order.record(), "report": report}
         for name, part in (("replay", found.study.replay), ("why", found.why)):
             values |= {} if part is None else {name: part.to_dict()}
+        if found.study.advice is not None:
+            values |= {"looks": found.study.advice.to_dict()}
         print_json(values)
         return
     if full:
         _print_all(result, found.study.replay)
     else:
         _print(result, result)
+    if found.study.advice is not None:
+        echo(f"Looks after each round: {found.study.advice.line}")
     if found.why is not None:
         _print_why(found.why)
     elif not full:
@@ -171,6 +175,8 @@ def _plan_json(found: GapPlan) -> dict[str, Any]:
         "score": found.score,
         "order": order.record(),
     }
+    if found.pairs is not None:
+        values |= {"pairs": vars(found.pairs)}
     return values | ({"least": order.least} if order.question == "correlation" else {})
 
 
@@ -180,6 +186,9 @@ def _needed_json(row: Needed) -> dict[str, Any]:
 
 def _print_plan(found: GapPlan) -> None:
     order = found.order
+    if found.pairs is not None:
+        _print_pairs(found, found.pairs)
+        return
     question = {
         "effect": f"to detect a mean difference of {order.value:g}",
         "margin": f"to show equivalence within ±{order.value:g} if there is no difference",
@@ -217,3 +226,25 @@ def _print_plan(found: GapPlan) -> None:
             "A correlation is shown if it is above --least, one-sided at 5 %. `realitygap gap` prints the correlation "
             "without noise if each controller has at least 2 trials."
         )
+
+
+def _print_pairs(found: GapPlan, pairs: PlannedPairs) -> None:
+    order = found.order
+    echo(
+        f"Pairs of trials of two controllers to detect a mean difference of {order.value:g}, in {found.score}\n"
+        f"Trials of one controller vary by {found.spreads.noise:.3f} (standard deviation of {found.spreads.origin})"
+    )
+    if pairs.fixed is None or pairs.quantile is None or pairs.mean is None or pairs.power is None:
+        echo("A paired t test needs over 100,000 pairs.")
+        return
+    echo(f"{'design':24}{'median':>8}{'mean':>8}{'80 %':>8}{'worst case':>12}{'detected':>10}")
+    fixed = f"{pairs.fixed:>8,}"
+    echo(f"{'fixed, one t test':24}{fixed}{fixed}{fixed}{pairs.fixed:>12,}{order.power:>10.2f}")
+    echo(
+        f"{'sequential, any looks':24}{pairs.median:>8,}{pairs.mean:>8,.0f}{pairs.quantile:>8,}{pairs.maximum:>12,}"
+        f"{pairs.power:>10.2f}"
+    )
+    echo(
+        f"The sequential test stops early if the difference is larger. Drive it with: realitygap try A.json --against "
+        f"B.json --on PLATFORM --trials {pairs.maximum} -o pairs.sqlite"
+    )

@@ -43,7 +43,7 @@ def try_genome(order: TryOrder, allow_code: AllowPlatforms = False, as_json: Jso
 
 
 def _try_pairs(order: TryOrder, observer: PortObserver | None, *, as_json: bool) -> None:
-    with resumable(f"All trials are in {order.out}."):
+    with resumable(order.out):
         tried = realitygap.study.try_pairs(
             order, observer=observer, tell=lambda advice: echo(advice.line, err=True)
         )
@@ -88,6 +88,8 @@ def _print(result: TransferResult) -> None:
     echo(f"Regret is to {result.best_in_words}.")
     if result.replicates == 1:
         echo("Intervals are over the fresh trials of one champion. To compare strategies, add --replicates.")
+    elif len(result.strategies) > 1 and result.advice is not None:
+        echo(f"Looks after each replicate: {result.advice.summary}")
 
 
 @command_of(ClosingOrder)

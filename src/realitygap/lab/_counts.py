@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from realitygap.errors import LedgerError
+from realitygap.errors import LedgerError, RealityGapError
 from realitygap.platforms import emulated_robots, is_physical
 from realitygap.records import (
     LEDGER_NAME,
@@ -22,6 +22,7 @@ from realitygap.records import (
     settings_of_condition,
 )
 from realitygap.runs import Condition
+from realitygap.study import advise
 from realitygap.world import Arena
 
 from ._scoring_files import (
@@ -154,6 +155,16 @@ class Counts:
             for condition in {each.trial.condition for each in self._found}:
                 self.arena(condition)
             return self._found
+
+    def looks(self) -> str:
+        """Return what complete runs show of the conditions on a robot; empty if it is blind, or has one."""
+        physical = [each for each in self._settings.values() if is_physical(each)]
+        if self.is_blind or len(physical) < 2 or not (self._folder / LEDGER_NAME).exists():
+            return ""
+        try:
+            return advise(self._folder).summary
+        except RealityGapError as error:
+            return str(error)
 
     def trials(self) -> list[CountedTrial]:
         """Trials as last read."""

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from realitygap.errors import RecordError
+from realitygap.errors import RealityGapError, RecordError
 from realitygap.records import LEDGER_NAME, Ledger, Score, Trial, is_observations, ledger_stamp, open_ledger
+from realitygap.study import advise_ledger
 from realitygap.world import Arena
 
 from ._files import plain_files
@@ -44,11 +45,19 @@ def _folders(folder: Path) -> list[Path]:
 
 @dataclass(frozen=True)
 class SavedTrials:
-    """The trials of a file at one moment, and the notes on each by its number."""
+    """The trials of a file at one moment.
+
+    Attributes:
+        arena: Arena of the trials.
+        trials: The trials.
+        notes: Notes on each trial, by its number.
+        looks: What the trials show of a comparison that is planned in the file, a line each; empty if there is none.
+    """
 
     arena: Arena
     trials: tuple[Trial, ...]
     notes: Mapping[int, str]
+    looks: tuple[str, ...] = ()
 
     def trial(self, number: int | None) -> Trial | None:
         """Return a trial by its number."""
@@ -75,7 +84,7 @@ class SavedFile:
                 trial.trial: "; ".join(f"{note['who']}: {note['text']}" for note in ledger.notes(trial.trial))
                 for trial in trials
             }
-            return SavedTrials(ledger.arena, trials, notes)
+            return SavedTrials(ledger.arena, trials, notes, _looks(ledger))
 
     def _open(self, *, writable: bool = True) -> Ledger:
         """Open the trials. Lines of JSON are converted before they are changed; then the new file has them."""
@@ -107,6 +116,16 @@ class SavedFile:
         who = _named(who)
         with self._open() as ledger:
             ledger.note(text[:LONGEST_TEXT], who, number)
+
+
+def _looks(ledger: Ledger) -> tuple[str, ...]:
+    """Return what the trials of a planned comparison show."""
+    if ledger.comparison() is None:
+        return ()
+    try:
+        return tuple(advise_ledger(ledger).sentences)
+    except RealityGapError as error:
+        return (str(error),)
 
 
 def _named(who: str) -> str:

@@ -19,9 +19,14 @@ class PlanOrder(Order):
     Numbers come from normal formulas. Simulated studies of that size give the power. For a correlation, controllers
     are added until the simulated power reaches --power.
 
+    With --sequential, two controllers are compared instead, in pairs of one trial each. The plan states how many pairs
+    the test of `realitygap try --against` needs, next to those of a fixed design.
+
     Example: realitygap plan --effect 0.05
 
     Example: realitygap plan --margin 0.05 --spread 0.03
+
+    Example: realitygap plan --effect 0.1 --sequential
 
     Example: realitygap plan --effect 0.05 --task light --arena light
 
@@ -46,6 +51,9 @@ class PlanOrder(Order):
     )
     power: float = option(
         0.8, help="Statistical power: the probability of detecting the effect.", at_least=0.05, at_most=0.999
+    )
+    sequential: bool = option(
+        False, help="Plan to compare two controllers in pairs of trials, with looks after each pair."
     )
     data: Path | None = option(
         None,
@@ -81,6 +89,12 @@ class PlanOrder(Order):
             yield (
                 "least",
                 f"least is {self.least} and correlation {self.correlation}, expected -1 < least < correlation < 1.",
+            )
+
+        if self.sequential and self.effect is None:
+            yield (
+                "sequential",
+                "--sequential needs --effect. For example: realitygap plan --effect 0.1 --sequential",
             )
 
     @property

@@ -28,7 +28,7 @@ from ._gap.plan import GapPlan, plan_gap, recorded_spreads
 from ._gap.study import MOST_CONTROLLERS, GapStudy, ShownTrials
 from ._kept_target import StoppedByPerson
 from ._mazes import MAZE_SEEDS, measure_maze
-from ._paired import advise
+from ._paired import advise, advise_ledger
 from ._physical import physical_conditions
 from ._placing import parse_length, placing_words, with_ruled_end
 from ._problems import StudyFileError
@@ -91,6 +91,7 @@ __all__ = [
     "TriedPairs",
     "TwinRow",
     "advise",
+    "advise_ledger",
     "advise_on",
     "calibrate",
     "calibrate_all",

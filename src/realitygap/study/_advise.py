@@ -16,6 +16,7 @@ from realitygap._wording import (
     distribution_caveat,
     look_figures,
     look_verdict,
+    looks_summary,
     pairs_forecast,
 )
 from realitygap.errors import StudyError
@@ -86,6 +87,16 @@ class Advice:
     def line(self) -> str:
         """The main result in one line."""
         return self._lines()[0]
+
+    @property
+    def summary(self) -> str:
+        """All results in one line."""
+        if len(self.comparisons) == 1:
+            return self.line
+        shown = [each for each in self.comparisons if each.is_stop]
+        return looks_summary(
+            [(each.first, each.second, each.look.verdict) for each in shown], len(self.comparisons)
+        )
 
     @property
     def sentences(self) -> list[str]:
@@ -228,3 +239,27 @@ def _scaled(shift: Estimate, width: float) -> Estimate:
         None if each is None else each * width for each in (shift.value, shift.low, shift.high)
     )
     return replace(shift, value=value, low=low, high=high)
+
+
+def strategy_differences(
+    champions: Sequence[tuple[str, int, int, Sequence[float]]],
+) -> list[tuple[str, str, Values]]:
+    """Return the differences between each strategy with a budget and the first, over replicates that both have.
+
+    Args:
+        champions: Strategy, budget, replicate, and fresh scores of each champion.
+    """
+    means: dict[tuple[str, int], dict[int, float]] = {}
+    for strategy, budget, replicate, scores in champions:
+        means.setdefault((strategy, budget), {})[replicate] = float(np.mean(scores))
+    (baseline, of_baseline), *others = means.items()
+    has_budgets = len({budget for _, budget in means}) > 1
+    names = {key: f"{key[0]} {key[1]}" if has_budgets else key[0] for key in means}
+    return [
+        (
+            names[key],
+            names[baseline],
+            np.array([values[k] - of_baseline[k] for k in sorted(values.keys() & of_baseline.keys())]),
+        )
+        for key, values in others
+    ]

@@ -25,9 +25,9 @@ from realitygap.records import (
 )
 from realitygap.runs import Condition
 from realitygap.stats import Null, SequentialTest
-from realitygap.tasks import score_observed
+from realitygap.tasks import Task, score_observed
 
-from ._advise import Advice, Planned, Values, advise_on
+from ._advise import Advice, Planned, advise_on, strategy_differences
 from ._code import task_named
 
 CONTROLLERS = "controllers"
@@ -140,12 +140,15 @@ def advise(
         return advise_ledger(ledger, wanted)
 
 
-def advise_ledger(ledger: Ledger, wanted: Mapping[str, Any] | None = None) -> Advice:
+def advise_ledger(
+    ledger: Ledger, wanted: Mapping[str, Any] | None = None, *, task: Task | None = None
+) -> Advice:
     """Return what is shown by the trials in a ledger, as `advise`.
 
     Args:
         ledger: The ledger.
         wanted: Settings of the test that differ from those of the plan.
+        task: Task that scores the trials of a gap. Default: that of the plan.
     """
     known = ledger.comparison()
     test, planned = _test_of(known, wanted or {})
@@ -154,7 +157,7 @@ def advise_ledger(ledger: Ledger, wanted: Mapping[str, Any] | None = None) -> Ad
     if known is None:
         return _of_two_controllers(ledger, test)
     if known.plan.get("kind") == ROUNDS:
-        return _of_rounds(ledger, known.plan, test, planned)
+        return _of_rounds(ledger, known.plan, test, planned, task)
     return _of_blocks(ledger, known.plan, test, planned)
 
 
@@ -232,7 +235,13 @@ def _coverage(ledger: Ledger, trials: Sequence[int]) -> dict[int, float]:
 # two platforms
 
 
-def _of_rounds(ledger: Ledger, plan: Mapping[str, Any], test: SequentialTest, planned: Planned) -> Advice:
+def _of_rounds(
+    ledger: Ledger,
+    plan: Mapping[str, Any],
+    test: SequentialTest,
+    planned: Planned,
+    task: Task | None,
+) -> Advice:
     """Return advice on a gap: a round has one trial of each controller on the target, and as many in simulation.
 
     Raises:
@@ -243,9 +252,11 @@ def _of_rounds(ledger: Ledger, plan: Mapping[str, Any], test: SequentialTest, pl
         raise StudyError(
             f"{ledger.path} has no trials of the simulator yet. Run the `realitygap gap` that saved it to the end."
         )
-    task = task_named(str(plan["task"]))
-    n, first = int(plan["controllers"]), int(plan["first"])
-    stride = int(plan["stride"])
+    try:
+        task = task or task_named(str(plan["task"]))
+        n, first, stride = (int(plan[name]) for name in ("controllers", "first", "stride"))
+    except (KeyError, TypeError, ValueError) as error:
+        raise RecordError(f"{ledger.path}: the plan of the comparison is damaged ({error}).") from None
     by_round: dict[int, dict[int, int]] = {}
     for trial in ledger.trials(states=["scored"]):
         controller, k = divmod(ledger.record(trial.trial).number - first, stride)
@@ -350,27 +361,3 @@ def _of_transfer(folder: Path, wanted: Mapping[str, Any]) -> Advice:
     if not differences:
         raise StudyError(f"{folder} has one strategy with one budget, expected at least 2 to compare.")
     return advise_on(differences, test=test, score=score, label=label, unit="replicate")
-
-
-def strategy_differences(
-    champions: Sequence[tuple[str, int, int, Sequence[float]]],
-) -> list[tuple[str, str, Values]]:
-    """Return the differences between each strategy with a budget and the first, over replicates that both have.
-
-    Args:
-        champions: Strategy, budget, replicate, and fresh scores of each champion.
-    """
-    means: dict[tuple[str, int], dict[int, float]] = {}
-    for strategy, budget, replicate, scores in champions:
-        means.setdefault((strategy, budget), {})[replicate] = float(np.mean(scores))
-    (baseline, of_baseline), *others = means.items()
-    has_budgets = len({budget for _, budget in means}) > 1
-    names = {key: f"{key[0]} {key[1]}" if has_budgets else key[0] for key in means}
-    return [
-        (
-            names[key],
-            names[baseline],
-            np.array([values[k] - of_baseline[k] for k in sorted(values.keys() & of_baseline.keys())]),
-        )
-        for key, values in others
-    ]

@@ -21,6 +21,7 @@ from realitygap.records import (
 )
 from realitygap.robots import Robot, is_in_this_program
 from realitygap.runs import Condition, Evolution
+from realitygap.stats import SequentialTest
 from realitygap.tasks import score_observed
 from realitygap.trials import (
     Card,
@@ -110,6 +111,15 @@ class PhysicalStudy:
                 condition.settings(),
                 n_generations=condition.neat.generations,
                 n_cells=condition.arena.arena().grid.n_cells,
+            )
+        if len(self._conditions) > 1:
+            self._ledger.plan_comparison(
+                {
+                    "kind": "conditions",
+                    "names": [condition.name for condition in self._conditions],
+                    "maximum": self._study.about.replicates,
+                    "test": SequentialTest().to_dict(),
+                }
             )
         try:
             for block in blocks_of(self._conditions, self._study.about.replicates, self._study.trials):

@@ -64,6 +64,7 @@ class _Page:
         name.props(f"debounce=400 maxlength={LONGEST_NAME}")
         name.on_value_change(lambda event: self._named(text_of(event)))
         self._count = ui.label()
+        self._looks = ui.label().classes("lab-finding").props('role="status"')
         columns = [
             {"name": key, "label": label, "field": key, "align": "left"} for key, label in _COLUMNS.items()
         ]
@@ -96,6 +97,8 @@ class _Page:
 
     def _fill(self) -> None:
         self._count.text = counted(len(self._saved.trials), "trial")
+        self._looks.text = " ".join(self._saved.looks)
+        self._looks.set_visibility(bool(self._saved.looks))
         self._table.rows = [
             {
                 "number": trial.trial,

@@ -97,7 +97,7 @@ class _Page:
         self._sheets = SheetPhotos(lab, counts, photos, lambda: self._visitor.who, self._look_at)
         self._is_looking = self._is_shown = False
         self._can_begin: _Beginning | None = None
-        self._agreement = ""
+        self._agreement = self._looks = ""
         self._emulated = counts.emulated_robot or default_family().emulated
 
     async def show(self) -> None:
@@ -207,6 +207,7 @@ class _Page:
             self._can_begin = await run.io_bound(self._beginning)
         if any(each.second for each in self._counts.trials()):
             self._agreement = await run.io_bound(self._agree) or ""
+        self._looks = await run.io_bound(self._counts.looks) or ""
 
     async def _look(self) -> None:
         """Update the parts that have changed; a grid in use stays."""
@@ -427,6 +428,8 @@ class _Page:
             return
         if self._agreement:
             ui.label(self._agreement)
+        if self._looks:
+            ui.label(self._looks)
         rows = [
             {
                 "number": each.number,

@@ -12,7 +12,16 @@ from realitygap.errors import StudyError, whole_number
 from realitygap.orders import PlanOrder, takes_order
 from realitygap.platforms import open_target
 from realitygap.records import read_observations, those_that_count
-from realitygap.stats import Needed, plan_correlation, plan_effect, plan_margin, trial_reliability
+from realitygap.stats import (
+    Needed,
+    PlannedPairs,
+    plan_correlation,
+    plan_effect,
+    plan_margin,
+    plan_pairs,
+    spread_of_differences,
+    trial_reliability,
+)
 from realitygap.tasks import CoverageTask, Task, score_observed
 from realitygap.world import Arena, load_arena
 
@@ -52,7 +61,8 @@ class GapPlan:
         score: Name of the score, in whose units the numbers are.
         spread: Standard deviation of true differences over controllers that was assumed.
         spreads: Spreads of trials that were assumed.
-        needed: A row for each number of trials.
+        needed: A row for each number of trials; empty for a sequential plan.
+        pairs: Number of pairs of two controllers; None unless the plan is sequential.
     """
 
     order: PlanOrder
@@ -60,6 +70,7 @@ class GapPlan:
     spread: float
     spreads: Spreads
     needed: tuple[Needed, ...]
+    pairs: PlannedPairs | None = None
 
     @property
     def best(self) -> Needed | None:
@@ -145,6 +156,10 @@ def plan_gap(
         scored_by = task or task_named(order.task, allow_code=allow_code)
         known = spreads or _spreads_of(order, scored_by, arena)
         apart = known.controllers / 2 if order.spread is None else order.spread
+        if order.sequential:
+            between = spread_of_differences(0.0, known.noise, 1)
+            pairs = plan_pairs(order.value, between, power=order.power, seed=order.seed)
+            return GapPlan(order, scored_by.score_name, 0.0, known, (), pairs)
         rows = tuple(_needed(order, known, apart, r) for r in trials)
     except ValueError as error:
         raise StudyError(str(error)) from None

@@ -22,13 +22,21 @@ from realitygap.gap import (
 from realitygap.platforms import SimTarget, split_spec
 from realitygap.playback import MovingTrial
 from realitygap.records import OBSERVATIONS, Ledger, Observe, TrialRecord
-from realitygap.stats import Estimate, difference_interval, mean_interval, range_of_differences
+from realitygap.stats import (
+    Estimate,
+    SequentialTest,
+    difference_interval,
+    mean_interval,
+    range_of_differences,
+)
 from realitygap.tasks import CoverageTask, Task, score_observed
 from realitygap.trials import Target, TrialPlan
 from realitygap.world import Arena, Pose
 
+from .._advise import Advice
 from .._controllers import Controller, have_same_score, task_of
 from .._kept_target import KeptTarget
+from .._paired import ROUNDS, advise_ledger
 from .._targets import check_task, open_trials, refuse_too_little
 
 Tell = Callable[[str, int, int], None]
@@ -88,6 +96,8 @@ class GapStudy:
         observe: Observation level of the target.
         step_s: Duration of commands in simulation [s].
         shown: Trials of one controller to show in motion; None if poses are unknown.
+        advice: The rounds of trials so far as a sequential test, which may be looked at after each round: a round has a
+            trial of each controller on both platforms. None if trials are not saved, or the score has no range.
     """
 
     result: GapResult
@@ -103,6 +113,7 @@ class GapStudy:
     observe: Observe
     step_s: float
     shown: ShownTrials | None = None
+    advice: Advice | None = None
 
 
 def study_gap(
@@ -167,6 +178,20 @@ def study_gap(
         refuse_inputs(controllers, platform)
     refuse_inputs(reevolved, target)
     file = None if results is None else open_trials(results, target, observe)
+    looks = SequentialTest(margin=margin)
+    comparison = {
+        "kind": ROUNDS,
+        "source": source.name,
+        "controllers": len(controllers),
+        "first": TARGET_FROM,
+        "stride": MOST_TRIALS,
+        "task": task.name,
+        "test": looks.to_dict(),
+    }
+    if file is not None:
+        known = file.comparison()
+        if known is None or {**known.plan, "rounds": None} != {**comparison, "rounds": None}:
+            file.plan_comparison(comparison)
     on_target = carry_out(target, [*plans, *more], observe, tell, file)
     source, pace_notes = _paced(source, target, on_target) if at_its_pace else (source, ())
     own = [replace(plan, number=plan.number - TARGET_FROM) for plan in plans]
@@ -174,6 +199,11 @@ def study_gap(
     one = side_of(source, in_source, len(controllers), task)
     other = side_of(target, on_target[: len(plans)], len(controllers), task)
     result = measure_gap(one, other, margin=margin, misspecified=misspecified, seed=seed)
+    advice = None
+    if results is not None:
+        with open_trials(results, target, observe) as again:
+            again.plan_comparison({**comparison, "rounds": one.values.mean(axis=0).tolist()})
+            advice = advise_ledger(again, task=task) if np.isfinite(task.score_range).all() else None
     reevolved_there = on_target[len(plans) :]
     result = replace(
         result,
@@ -195,6 +225,7 @@ def study_gap(
         _replay(source, on_target[: len(plans)], len(controllers), tell),
         observe,
         source.step_s,
+        advice=advice,
     )
 
 

@@ -12,7 +12,9 @@ from numpy.typing import NDArray
 
 from realitygap.drawing import card_of
 from realitygap.gap import COVERAGE
-from realitygap.stats import Estimate, t_interval
+from realitygap.stats import Estimate, SequentialTest, t_interval
+
+from .._advise import Advice, advise_on, strategy_differences
 
 
 @dataclass(frozen=True)
@@ -78,6 +80,7 @@ class TransferResult:
             lifts it somewhat, and regret with it.
         champions: Each with its fresh trials.
         score: Score of the trials, with its unit.
+        score_range: Minimum and maximum of the score.
     """
 
     study: str
@@ -90,6 +93,24 @@ class TransferResult:
     best_known: float
     champions: tuple[Transferred, ...]
     score: str = COVERAGE
+    score_range: tuple[float, float] = (0.0, 1.0)
+
+    @property
+    def advice(self) -> Advice | None:
+        """Each strategy compared with the first, over replicates, at any look; None if the score has no range."""
+        differences = strategy_differences(
+            [(each.strategy, each.budget, each.replicate, each.scores) for each in self.champions]
+        )
+        if not differences or not np.isfinite(self.score_range).all():
+            return None
+        return advise_on(
+            differences,
+            test=SequentialTest(),
+            score=self.score,
+            label=self.label,
+            score_range=self.score_range,
+            unit="replicate",
+        )
 
     @property
     def best_in_words(self) -> str:
@@ -113,6 +134,7 @@ class TransferResult:
         Scores of champions are named `coverage` if they are that; otherwise `scores`, and `score` says of what.
         """
         fields = asdict(self)
+        del fields["score_range"]
         if self.score == COVERAGE:
             del fields["score"]
             for champion in fields["champions"]:

@@ -200,6 +200,7 @@ def transfer_to(
         best,
         tuple(champions),
         task.score_name,
+        task.score_range,
     )
     write_whole(folder / "result.json", json.dumps(result.to_dict(), indent=2).encode(), within=folder)
     return result

@@ -111,7 +111,7 @@ def test_wrong_comparisons_are_refused_and_leave_the_plan_alone(two, tmp_path):
     try_pairs(**two)
     with pytest.raises(RecordError, match="other controllers"):
         try_pairs(**{**two, "against": tmp_path / "three.json"})
-    with pytest.raises(RecordError, match="seed"):
+    with pytest.raises(RecordError, match="another order of trials"):
         try_pairs(**{**two, "seed": 7})
     with pytest.raises(StudyError, match="same controller"):
         try_pairs(**{**two, "against": two["genome"], "out": tmp_path / "same.sqlite"})
@@ -246,18 +246,20 @@ def test_transfer_compares_strategies_over_replicates(tmp_path):
 
 def test_conditions_of_a_study_are_compared_run_by_run(tmp_path):
     other = '[[condition]]\nname = "novel"\nselection = "novelty"\nplatform = "scribbler"\n'
-    drive(small_study(more=other, replicates="2"), tmp_path)
+    looks = "[trials]\nnull = 'mean'\nmargin = 0.1\n"
+    drive(small_study(more=other + looks, replicates="2"), tmp_path)
     advice = advise(tmp_path)
     comparison = advice.comparisons[0]
     assert (comparison.first, comparison.second, comparison.look.n) == ("novel", "robot", 2)
     assert (advice.planned, advice.maximum, advice.unit) == ("planned", 2, "run")
+    assert advice.test == SequentialTest(null="mean", margin=0.1)
 
 
 def test_sequential_plan_has_the_pairs_next_to_the_fixed_design():
     plan = plan_gap(effect=0.1, sequential=True, spreads=Spreads(0.1, 0.2, "a test"))
     assert (plan.pairs.fixed, plan.pairs.maximum) == (18, 40)
     assert plan.needed == ()
-    with pytest.raises(StudyError, match="needs --effect"):
+    with pytest.raises(StudyError, match="needs"):
         plan_gap(margin=0.1, sequential=True)
 
 

@@ -113,12 +113,14 @@ class PhysicalStudy:
                 n_cells=condition.arena.arena().grid.n_cells,
             )
         if len(self._conditions) > 1:
+            looks = self._study.trials
+            test = SequentialTest(null=looks.null, margin=looks.margin or None)
             self._ledger.plan_comparison(
                 {
                     "kind": "conditions",
                     "names": [condition.name for condition in self._conditions],
                     "maximum": self._study.about.replicates,
-                    "test": SequentialTest().to_dict(),
+                    "test": test.to_dict(),
                 }
             )
         try:

@@ -106,6 +106,17 @@ class TrialsSection(Settings):
         "sheet (section 2.1: eight).",
     )
 
+    null: Literal["distribution", "mean"] = Field(
+        "distribution",
+        description="Hypothesis of `realitygap trials advise` if several conditions are on a robot: that both of two "
+        "have the same distribution of scores, or the same mean. The ledger stores it before trial 1.",
+    )
+    margin: float = Field(
+        0.0,
+        ge=0,
+        description="Largest difference in score that counts as equivalent there. 0: equivalence is not tested.",
+    )
+
 
 class ConditionNotes(Settings):
     """Notes on a condition, in addition to its settings; they change no result."""

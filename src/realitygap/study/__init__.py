@@ -20,6 +20,7 @@ from ._code import AllowCode, check_files, python_tasks, task_named
 from ._compare import ComparedScores, compare_scores
 from ._controllers import sample_controllers
 from ._duration import estimate_seconds
+from ._estimated import EstimatedScore
 from ._fieldtrial import write_fieldtrial
 from ._file import DEFAULT_NEAT, SECTIONS, load_study, named_studies, parse_study, platform_sections
 from ._gap.between import GapBetween, gap_between

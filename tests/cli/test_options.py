@@ -87,6 +87,7 @@ PRINTED_BY = {
     "study/_closing/plan.py": ("closing-the-gap",),
     "study/_cluster.py": ("run",),
     "study/_code.py": ("gap", "plan"),
+    "study/_compare.py": ("compare",),
     "study/_file.py": ("drive", "gap", "run"),
     "study/_gap/between.py": ("gap",),
     "study/_estimate_table.py": ("estimate",),

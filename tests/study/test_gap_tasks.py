@@ -92,7 +92,7 @@ def test_trials_that_were_kept_are_scored_anew_by_another_task(tmp_path):
         (
             {"task": "wall", "observe": "cells"},
             StudyError,
-            "task 'wall' is scored by its poses. Use --observe track",
+            "task 'wall' is scored by its poses. Use observe track",
         ),
         ({"task": "python:none.py:f"}, TaskError, "none.py cannot be read"),
         ({"controllers": "avoid"}, ControllerError, r"range\.3 to range\.7 are missing"),

@@ -147,6 +147,8 @@ def test_equivalence_ends_a_comparison(two, tmp_path):
 def test_file_without_a_plan_says_that_nobody_planned_the_looks(two):
     single = {name: two[name] for name in ("on", "steps", "out")} | {"trials": 8}
     try_genome(**single, genome=two["genome"])
+    with pytest.raises(RecordError, match="without a comparison"):
+        try_pairs(**two)
     with pytest.raises(StudyError, match="1 controller, expected 2"):
         advise(two["out"])
     with Ledger.open(two["out"]) as ledger:

@@ -33,7 +33,7 @@ class TryOrder(Order):
 
     Example: realitygap try champion.json --on twin:worn-1.toml --trials 20
 
-    Example: realitygap try one.json --against two.json --on emulator://s2 --trials 40 -o pairs.sqlite
+    Example: realitygap try one.json --against two.json --on scribbler:emulator://s2 --trials 40 -o pairs.sqlite
 
     In Python: realitygap.study.try_genome("champion.json", on="twin:worn-1.toml", trials=20)
     """

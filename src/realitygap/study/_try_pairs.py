@@ -100,13 +100,17 @@ def try_pairs(
 
 
 def _refuse_others(file: Ledger, blocks: Blocks) -> None:
-    """Raise an error if a file has the plan of another comparison, before anything is stored.
+    """Raise an error if a file has another comparison, or other trials, before anything is stored.
 
     Raises:
         RecordError: It has.
     """
     known = file.comparison()
     if known is None:
+        if file.trials():
+            raise RecordError(
+                f"{file.path} has trials without a comparison. Nothing was changed. Name another file (-o FILE)."
+            )
         return
     there = str(known.plan.get("order", ""))
     n = min(len(there), len(blocks.order))

@@ -85,7 +85,7 @@ def test_successes_print_each_controller_with_its_test(tmp_path):
 
 
 def test_without_tasks_the_option_is_refused(table):
-    assert "The table has no tasks" in refused("compare", table, "--sim", "mujoco", "--task", "pick")
+    assert "The table has no column task" in refused("compare", table, "--sim", "mujoco", "--task", "pick")
 
 
 REFUSED = {

@@ -160,6 +160,7 @@ def test_a_controller_with_more_trials_has_a_narrower_interval_of_its_own():
     assert (high - low)[[1, 3]].max() < (high - low)[[0, 2]].min()
 
 
+@pytest.mark.slow
 def test_ragged_trials_cover_the_level_as_often_as_claimed():
     # 300 studies: of a coverage of 95 %, 24 or more misses come in 1 of 400 tries
     rng, missed = np.random.default_rng(4), 0
@@ -199,6 +200,24 @@ def test_shared_blocks_take_out_only_the_noise_that_they_leave():
     assert paired.result.paired
     assert paired.result.rms.value == pytest.approx(0.03, abs=0.005)
     assert unpaired.result.rms.value < 0.02  # the starts count as noise of each side
+
+
+@pytest.mark.slow
+def test_level_of_pairs_has_the_interval_of_paired_differences():
+    # 200 studies whose starts add noise of 0.3 to both platforms; differences vary by 0.02 over controllers
+    rng, missed, widths = np.random.default_rng(8), 0, []
+    for _ in range(200):
+        quality = rng.normal(0.5, 0.1, (15, 1)) + rng.normal(0, 0.3, (15, 6))
+        gap = rng.normal(0.05, 0.02, (15, 1))
+        sides = [
+            GapSide(name, "SIM", values + rng.normal(0, 0.02, (15, 6)))
+            for name, values in (("sim", quality), ("real", quality + gap))
+        ]
+        level = measure_gap(*sides, paired=True, resamples=300).level
+        missed += not level.low <= 0.05 <= level.high
+        widths.append(level.high - level.low)
+    assert np.mean(widths) < 0.04  # without pairs 0.15, from the noise of starts
+    assert missed < 24  # of a coverage of 94 %, 24 misses of 200 come in 1 of 1,000 tries
 
 
 # refusals

@@ -158,7 +158,7 @@ class _Work:
         self.pair = source.values[None], target.values[None]
         self.fewest = min(source.trials, target.trials)
         self.alike = [side.name for side in (source, target) if np.ptp(side.means) == 0]
-        self.drawn = bootstrap({"level": mean_difference}, source, target, n_resamples, rng)
+        self.drawn = bootstrap({"level": mean_difference}, source, target, n_resamples, rng, paired=paired)
         if self.n >= 2 and not self.alike:
             self._draw_orders()
 
@@ -174,7 +174,9 @@ class _Work:
                 "source": lambda one, _: reliability(one, self.rng, _FEW_SPLITS),
                 "target": lambda _, other: reliability(other, self.rng, _FEW_SPLITS),
             }
-        self.drawn |= bootstrap(ranks, self.source, self.target, self.n_resamples, self.rng, smooth=True)
+        self.drawn |= bootstrap(
+            ranks, self.source, self.target, self.n_resamples, self.rng, smooth=True, paired=self.paired
+        )
         if self.fewest < 2:
             return
         self.reliabilities = tuple(float(reliability(values, self.rng)[0]) for values in self.pair)

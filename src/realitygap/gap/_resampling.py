@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from realitygap.stats import SMALLEST_N, Ends, Estimate, Method
 
-from ._side import GapSide, Values
+from ._side import GapSide, Values, trial_noise
 
 Statistic = Callable[[Values, Values], Values]
 """A function of trials in simulation (b, c, r) and on the target (b, c, q) that returns a number for each sample,
@@ -27,6 +27,7 @@ def resampled(
     rng: np.random.Generator,
     *,
     smooth: bool = False,
+    paired: bool = False,
 ) -> Iterator[tuple[Values, Values]]:
     """Yield resamples in blocks: (b, c, r) of the source and (b, c, q) of the target.
 
@@ -42,12 +43,14 @@ def resampled(
         rng: Draws them.
         smooth: True to move means that were drawn twice slightly apart, with their covariance. Statistics of ranks
             need this, because a controller drawn twice makes ties that no new sample has.
+        paired: True if trial k of a controller had the same conditions on both sides. Pairs are then resampled
+            together, and means are shrunk by the covariance of their noise.
 
     Source: Davison & Hinkley (1997), Bootstrap Methods and their Application, section 3.8, for two levels and the
     need to shrink. Differs: the two sides are shrunk together, by the linear map that gives their covariance the
     noise's diagonal less. Smoothing: Silverman & Young (1987), Biometrika 74(3), 469-479.
     """
-    latent = shrunk_means(source, target)
+    latent = shrunk_means(source, target, paired=paired)
     residuals = [(_residuals(side), side.n_trials) for side in (source, target)]
     n, size = source.n, source.values.size + target.values.size
     block = max(1, _BLOCK // size)
@@ -55,7 +58,11 @@ def resampled(
         b = min(block, n_resamples - first)
         who = rng.integers(0, n, (b, n))
         means = _smoothed(latent[who], latent, rng) if smooth else latent[who]
-        drawn = [_drawn(residual, counts, who, rng) for residual, counts in residuals]
+        which = [_which(side, who, rng) for side in ((source,) if paired else (source, target))]
+        drawn = [
+            _drawn(residual, counts, who, which[min(k, len(which) - 1)])
+            for k, (residual, counts) in enumerate(residuals)
+        ]
         yield means[:, :, :1] + drawn[0], means[:, :, 1:] + drawn[1]
 
 
@@ -68,14 +75,18 @@ def _smoothed(means: Values, latent: Values, rng: np.random.Generator) -> Values
     return np.asarray(center + moved / math.sqrt(1 + width**2))
 
 
-def shrunk_means(source: GapSide, target: GapSide) -> Values:
+def shrunk_means(source: GapSide, target: GapSide, *, paired: bool = False) -> Values:
     """Return means of controllers on both sides with the covariance that they would have without noise, (c, 2)."""
     means = np.stack([source.means, target.means], axis=1)
     if source.n < 2:
         return means
     center = means.mean(axis=0)
     seen = np.cov(means.T)
-    wanted = seen - np.diag([source.noise.mean(), target.noise.mean()])
+    noise = np.diag([source.noise.mean(), target.noise.mean()])
+    if paired and source.values.shape[1] > 1:
+        shared = (source.noise + target.noise - trial_noise(target.values - source.values)) / 2
+        noise += shared.mean() * (1 - np.eye(2))
+    wanted = seen - noise
     return np.asarray(center + (means - center) @ _map_between(seen, wanted))
 
 
@@ -104,17 +115,21 @@ def _residuals(side: GapSide) -> Values:
     return deviations * math.sqrt(side.trials / (side.trials - 1))
 
 
+def _which(side: GapSide, who: NDArray[np.int64], rng: np.random.Generator) -> NDArray[np.int64]:
+    """Return the trials drawn for each controller, (b, c, r)."""
+    r = side.values.shape[1]
+    most = side.counts[who][:, :, None] if side.n_trials else r
+    return rng.integers(0, most, (*who.shape, r))
+
+
 def _drawn(
-    residuals: Values, counts: tuple[int, ...], who: NDArray[np.int64], rng: np.random.Generator
+    residuals: Values, counts: tuple[int, ...], who: NDArray[np.int64], which: NDArray[np.int64]
 ) -> Values:
     """Return residuals drawn for each controller, (b, c, r); as many as it has trials, and nan after them."""
-    r = residuals.shape[1]
-    if counts:
-        own = np.array(counts)[who][:, :, None]
-        drawn = residuals[who[:, :, None], rng.integers(0, own, (*who.shape, r))]
-        return np.where(np.arange(r) < own, drawn, np.nan)
-    which = rng.integers(0, r, (*who.shape, r))
-    return residuals[who[:, :, None], which]
+    drawn = residuals[who[:, :, None], which]
+    if not counts:
+        return drawn
+    return np.where(np.arange(residuals.shape[1]) < np.array(counts)[who][:, :, None], drawn, np.nan)
 
 
 _NO_ORDER_LEFT = (
@@ -140,10 +155,11 @@ def bootstrap(
     rng: np.random.Generator,
     *,
     smooth: bool = False,
+    paired: bool = False,
 ) -> dict[str, Values]:
     """Return each statistic of the same resamples, (b,); arguments as in `resampled`."""
     found: dict[str, list[Values]] = {name: [] for name in statistics}
-    for one, other in resampled(source, target, n_resamples, rng, smooth=smooth):
+    for one, other in resampled(source, target, n_resamples, rng, smooth=smooth, paired=paired):
         for name, statistic in statistics.items():
             found[name].append(statistic(one, other))
     return {name: np.concatenate(parts) for name, parts in found.items()}

@@ -79,7 +79,7 @@ def compare_scores(order: CompareOrder) -> ComparedScores:
     if order.task is not None:
         tasks = {row.task for row in rows}
         if order.task not in tasks:
-            known = did_you_mean(order.task, tasks - {""}) or "The table has no tasks: leave --task out."
+            known = did_you_mean(order.task, tasks - {""}) or "The table has no column task."
             raise TableError(f"There is no task {order.task!r}. {known}")
         rows = [row for row in rows if row.task in (order.task, "")]
     sim, real = platforms_in(rows, order.sim, order.real)

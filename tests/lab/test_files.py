@@ -7,7 +7,7 @@ import pytest
 from realitygap.errors import StudyError
 from realitygap.lab._files import LONGEST_TEXT, files_outside, refuse_outside, refuse_port
 from realitygap.lab._form import written_form
-from realitygap.lab._gap import gap_mistakes
+from realitygap.lab._gap import free_name, gap_mistakes
 
 
 @pytest.mark.parametrize(
@@ -89,6 +89,30 @@ def test_text_that_is_no_study_file_is_refused(tmp_path, text):
 def test_titles_and_notes_may_hold_anything(tmp_path):
     text = '[study]\ntitle = "/etc/passwd: a study"\nnote = "../.."'
     assert files_outside(tmp_path, text)[0] == []
+
+
+def test_all_names_that_are_unknown_are_found_before_a_gap_starts(tmp_path):
+    values = {
+        "target": "twin:no.toml",
+        "task": "dance",
+        "arena": "moon",
+        "controllers": "papr",
+        "reevolved": "no",
+    }
+    problems = gap_mistakes(tmp_path, values).problems
+    assert set(problems) == set(values)
+    assert problems["task"].startswith("Unknown kind 'dance'.")
+    (tmp_path / "no").mkdir()
+    usual = {"task": "avoid", "arena": "avoid", "controllers": "paper", "reevolved": "no"}
+    assert not gap_mistakes(tmp_path, usual).problems
+
+
+def test_default_name_of_a_gap_is_free(tmp_path):
+    assert free_name(tmp_path, "sim", "twin:robots/worn 1.toml") == "sim-worn-1"
+    (tmp_path / "gaps").mkdir()
+    (tmp_path / "gaps" / "sim-jyro.sqlite").touch()
+    (tmp_path / "gaps" / "sim-jyro-2.html").touch()
+    assert free_name(tmp_path, "sim", "jyro") == "sim-jyro-3"
 
 
 @pytest.mark.parametrize(

@@ -41,8 +41,8 @@ FORMS = {
     "study/seen": (
         "Drive live",
         {
-            "Run": ("-3", "from 0 to"),
-            "Generation": ("-4", "from 0 to"),
+            "Run": ("44", "from 0 to 2."),
+            "Generation": ("-4", "from 0 to 4."),
             "Platform": ("twin:/etc/passwd", OUTSIDE),
         },
     ),

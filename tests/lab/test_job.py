@@ -125,6 +125,33 @@ def test_robot_of_a_gap_is_silent_only_in_a_trial_without_an_answer(tmp_path, mo
     assert job.silent_s == 0
 
 
+def test_closing_a_gap_shows_its_phase_and_no_negative_time(tmp_path, monkeypatch):
+    """It was said to be -28 s from its end, and to have 20 of 32 trials where 20 of 20 were done."""
+    monkeypatch.setattr(_job, "Child", SilentChild)
+    now = [100.0]
+    monkeypatch.setattr(_job.time, "monotonic", lambda: now[0])
+    order = GapOrder(sim="sim", target="twin:worn.toml", n_controllers=8, trials=4)
+    job = GapJob(order, tmp_path / "gap.html", tmp_path, lambda: None, closes=True)
+    seen = []
+    for name, total in (
+        ("twin:worn.toml", 32),
+        ("sim", 32),
+        ("calibrating on twin:worn.toml", 20),
+        ("sim:/tmp/x/fit.toml", 32),
+    ):
+        for done in (1, total // 2, total):
+            now[0] += 8
+            job._hear(TrialCount(name, done, total))
+            seen.append(job.progress)
+            assert 0 < job.share <= 1
+    assert not any("-" in words for words in seen)
+    assert seen[0] == "the twin worn: 1 of 32 trials"
+    assert seen[7] == "calibrating on the twin worn: 10 of 20 trials · 9 s left"
+    assert seen[-1].startswith("sim with fit: 32 of 32 trials")
+    job._hear(Interrupted())
+    assert job.outcome == "Stopped after sim with fit: 32 of 32 trials. They are saved."
+
+
 @pytest.mark.parametrize(
     ("trials", "is_of_robot", "can_resume"), [(0, False, False), (1, False, True), (0, True, True)]
 )

@@ -135,7 +135,7 @@ def test_robot_lost_in_a_gap_keeps_its_trials_and_the_gap_resumes(lab, visit, ro
     is_lost(page, robot)
     resume = page.get_by_role("button", name="Resume")
     assert resume.bounding_box()["y"] < page.get_by_label("Simulator").bounding_box()["y"]
-    kept = lab.root / "gaps" / "gap.sqlite"
+    kept = lab.root / "gaps" / "sim-scribbler.sqlite"
     before = those_that_count(read_observations(kept).trials)
     assert len(before) == n_done
     resume.click()

@@ -142,4 +142,4 @@ def test_studies_have_a_picture_and_one_primary_action_and_can_be_found(lab, vis
     page.get_by_text("No study has this text in its name or title.").wait_for()
     other = visit("gap")
     other.get_by_role("button", name="Measure the gap").click()
-    page.get_by_role("link", name="Gap gap").wait_for()
+    page.get_by_role("link", name="Gap sim-jyro").wait_for()

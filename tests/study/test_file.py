@@ -165,7 +165,7 @@ def test_all_mistakes_are_said_at_once_each_with_its_place():
         ("condition[1] 'x'.selection", "Did you mean 'coverage'?"),
         ("condition[1] 'x'.neat.population", "expected at least 2, got 1"),
         ("condition[2].name", "missing"),
-        ("condition[3] 'x'", "an earlier condition has this name"),
+        ("condition[3] 'x'.name", "an earlier condition has this name"),
         ("condition[3] 'x'.arena.preset", "got 'papr'"),
     ]
     for place, text in expected:
@@ -335,7 +335,7 @@ def test_a_line_has_no_control_characters(key, letters):
 
 def test_conditions_whose_files_some_disks_take_for_one_are_refused():
     (line,) = mistakes(MINIMAL + '[[condition]]\nname = "A"')
-    assert line.startswith("condition[2] 'A': differs from 'a' in capitals only")
+    assert line.startswith("condition[2] 'A'.name: differs from 'a' in capitals only")
 
 
 def test_a_study_made_in_python_is_whole():

@@ -28,7 +28,7 @@ _EMULATORS_FILES = ("arena", "state", "twin")
 """Settings of an emulated robot's port that name files."""
 _PYTHON = "python:"
 """A platform from a file, which is not imported here."""
-_PROSE = ("title", "note", "published_source", "change")
+_PROSE = ("name", "title", "note", "published_source", "change")
 
 
 def last_change(path: Path) -> float | None:

@@ -5,16 +5,18 @@
 
 from __future__ import annotations
 
+import itertools
+import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 from urllib.parse import parse_qsl
 
-from realitygap._wording import duration, with_interval
+from realitygap._wording import duration, platform_in_words, with_interval
 from realitygap.errors import RealityGapError, StudyError
 from realitygap.gap import SHOWN
-from realitygap.orders import CloseOrder, GapOrder
-from realitygap.platforms import names_a_port, platform_of
+from realitygap.orders import CloseOrder, GapOrder, read_order
+from realitygap.platforms import names_a_port, platform_of, split_spec
 from realitygap.report import write_closed_gap, write_gap_report
 from realitygap.robots import is_in_this_program
 from realitygap.stats import Estimate, controllers_for_margin, detectable_difference, spread_of_differences
@@ -31,6 +33,8 @@ ABOVE_THE_REPORT = ("rms", "level", "srcc", "noise_ceiling")
 NOISE, SPREAD = 0.01535, 0.07753
 """Standard deviations of coverage in the pilot on sim, as `pilot_spreads` finds them: trials of one controller about
 their mean, and true differences, for which a plan takes half the spread of controllers."""
+_OF_TRIALS = ("sim", "target", "controllers", "task", "observe", "arena", "noise", "randomize", "seed")
+"""Settings that trials depend on: with others, a gap is another one."""
 STEPS = 100
 """Commands of a trial."""
 PLACING_S = 20.0
@@ -78,13 +82,15 @@ def trial_seconds(target: str) -> float | None:
         return None
 
 
-def gap_mistakes(root: Path, values: Mapping[str, Any]) -> Mistakes:
+def gap_mistakes(root: Path, values: Mapping[str, Any], *, closes: bool = False) -> Mistakes:
     """Return what is wrong in the fields of a gap; a field that is missing is not checked."""
     mistakes = Mistakes()
+    mistakes.in_order(GapOrder, values, root)
     if "name" in values:
         with mistakes.in_field("name"):
             check_name(values["name"])
-    mistakes.in_order(GapOrder, values, root)
+            if not (closes or mistakes.problems):  # closing compares the orders of its folder
+                _refuse_taken(root / "gaps" / f"{values['name']}.html", values)
     if "target" in values and "target" not in mistakes.problems and not values.get("witness"):
         with mistakes.in_field("target"):
             if platform_in(root, values["target"]).needs_person:
@@ -93,6 +99,47 @@ def gap_mistakes(root: Path, values: Mapping[str, Any]) -> Mistakes:
                     "enter its witness. For a robot, use the command: realitygap gap"
                 )
     return mistakes
+
+
+def _refuse_taken(page: Path, values: Mapping[str, Any]) -> None:
+    """Refuse a name if its report is about another gap, or about more trials.
+
+    Raises:
+        StudyError: It is.
+    """
+    if not page.exists():
+        return
+    try:
+        before = read_order(page)
+    except StudyError:
+        before = None
+    if not isinstance(before, GapOrder):
+        raise StudyError(f"There is another report {page.stem}. Choose another name.")
+    other = [
+        field.face.label
+        for field in GapOrder.fields()
+        if field.name in _OF_TRIALS and values.get(field.name, field.default) != getattr(before, field.name)
+    ]
+    if other:
+        raise StudyError(f"The gap {page.stem} has other settings ({', '.join(other)}). Choose another name.")
+    if any(values.get(name, 0) < getattr(before, name) for name in ("n_controllers", "trials")):
+        raise StudyError(
+            f"The gap {page.stem} has {before.n_controllers:,} controllers with {before.trials:,} trials each. Enter "
+            "at least as many to continue it, or choose another name."
+        )
+
+
+def free_name(root: Path, sim: str, target: str) -> str:
+    """Return a name for a gap of two platforms that no file has, such as sim-worn-1."""
+    parts = [split_spec(spec) for spec in (sim, target)]
+    words = [
+        Path(rest).stem if rest and not re.match("/|.*://", rest) else platform for platform, rest in parts
+    ]
+    name = re.sub(r"[^A-Za-z0-9._-]+", "-", "-".join(words)).strip("-._")[:60] or "gap"
+    folder = root / "gaps"
+    taken = {path.stem for path in folder.iterdir()} if folder.is_dir() else set()
+    numbered = (f"{name}-{n}" for n in itertools.count(2))
+    return next(free for free in itertools.chain([name], numbered) if free not in taken)
 
 
 class GapJob(MeasuringJob):
@@ -104,7 +151,8 @@ class GapJob(MeasuringJob):
         order: The order.
         platform: The target.
         n_trials: Number of trials on each platform.
-        trials: Number of trials that are done, by platform.
+        trials: Number of trials that are done, by platform; also those of a calibration.
+        totals: Number of trials that are needed, in the same way.
         is_complete: Whether all trials are done.
         verdict: Verdict of the last report; empty before the first one.
         measures: Name and value of each measure of the last report.
@@ -121,6 +169,7 @@ class GapJob(MeasuringJob):
         self.order = order
         self.n_trials = order.n_trials
         self.trials: dict[str, int] = {}
+        self.totals: dict[str, int] = {}
         self._pace = Pace()
         self.is_complete = False
         self.verdict = ""
@@ -147,8 +196,26 @@ class GapJob(MeasuringJob):
             return self.outcome
         if not self.trials:
             return "Starting…"
+        if self.closes:
+            return f"{self._phase}{self._pace.words}"
         done = ", ".join(f"{name} {n:,}" for name, n in self.trials.items())
         return f"{done} of {self.n_trials:,} trials{self._pace.words}"
+
+    @property
+    def share(self) -> float:
+        """Share of the trials that are done, 0 to 1; if it closes a gap, of the present phase."""
+        done, total = sum(self.trials.values()), 2 * self.n_trials
+        if self.closes and self.trials:
+            name = next(reversed(self.trials))
+            done, total = self.trials[name], self.totals[name]
+        return min(done / max(total, 1), 1.0)
+
+    @property
+    def _phase(self) -> str:
+        """The present phase of closing a gap, with its trials."""
+        name = next(reversed(self.trials))
+        action, on, spec = name.rpartition(" on ")  # such as: calibrating on jyro
+        return f"{action}{on}{platform_in_words(spec, '')}: {self.trials[name]:,} of {self.totals[name]:,} trials"
 
     @property
     def robot_action(self) -> str:
@@ -157,6 +224,8 @@ class GapJob(MeasuringJob):
 
     @property
     def _done_words(self) -> str:
+        if self.closes and self.trials:
+            return f"{self._phase}. They are saved."
         n_done = next(iter(self.trials.values()), 0)  # the target is the first that is told of
         return f"{n_done:,} of {self.n_trials:,} trials on the target. They are saved."
 
@@ -165,7 +234,10 @@ class GapJob(MeasuringJob):
             case TrialCount():
                 known = self.trials.get(message.name, 0)
                 self.trials[message.name] = max(known, message.done)  # each round simulates from the start
-                self._pace.note(sum(self.trials.values()) / max(2 * self.n_trials, 1))
+                self.totals[message.name] = message.total
+                if self.closes and known == 0:
+                    self._pace = Pace()  # trials of another phase take another time
+                self._pace.note(self.share)
             case GapMeasured():
                 self.verdict, self.measures, self.pairs = message.verdict, message.measures, message.pairs
                 if message.rms is not None:
@@ -227,7 +299,7 @@ def pairs_of(gap: GapStudy) -> ScorePairs:
     sides = (gap.source, gap.target)
     ends = [side.intervals() for side in sides]
     return {
-        "sides": [f"{side.name} ({side.label})" for side in sides],
+        "sides": [f"{platform_in_words(side.name, side.label)} ({side.label})" for side in sides],
         "score": gap.result.score,
         "points": [
             {

@@ -172,7 +172,7 @@ class Pace:
         seconds, done = (last - first for last, first in zip(self._last, self._first, strict=True))
         if seconds < EARLY_S or done <= 0:
             return None
-        return seconds * (1.0 - self._last[1]) / done
+        return max(seconds * (1.0 - self._last[1]) / done, 0.0)
 
     @property
     def words(self) -> str:

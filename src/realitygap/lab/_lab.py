@@ -271,7 +271,7 @@ class Lab:
             FormError: Names or platforms that cannot be used.
             StudyError: A gap is being measured, or the robot is in use.
         """
-        gap_mistakes(self.root, {**values, "name": name}).refuse()
+        gap_mistakes(self.root, {**values, "name": name}, closes=closes).refuse()
         page = self.root / "gaps" / f"{name}.html"
         with self._lock:
             if self.gap is not None and not self.gap.is_over:

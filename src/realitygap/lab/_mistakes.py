@@ -8,8 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from realitygap._caller import Caller
-from realitygap.errors import StudyError
+from realitygap.errors import StudyError, did_you_mean
 from realitygap.orders import ORDERS, Order, OrderError
+from realitygap.settings import shown
+from realitygap.study import named_studies
+from realitygap.tasks import task_model
+from realitygap.world import load_arena
 
 from ._files import refuse_outside, refuse_platform
 
@@ -64,8 +68,9 @@ class Mistakes:
             with self.in_field(field.name):
                 if field.face.refers == "platform":
                     refuse_platform(root, value)
-                elif field.face.refers == "file":
-                    refuse_outside(root, str(value or ""))
+                elif value and field.face.refers == "file":
+                    refuse_outside(root, str(value))
+                    _refuse_unknown(root, field.name, str(value))
         try:
             model(**{field.name: value for field, value in given.items()})
         except OrderError as error:
@@ -80,3 +85,22 @@ class Mistakes:
         """
         if self.problems:
             raise FormError(self.problems)
+
+
+def _refuse_unknown(root: Path, field: str, text: str) -> None:
+    """Refuse an arena, a task, or controllers that do not exist.
+
+    Raises:
+        StudyError: They do not.
+    """
+    try:
+        if field == "arena":
+            load_arena(root / text if (root / text).is_file() else text)
+        elif field == "task":
+            task_model({"kind": text})
+    except ValueError as error:
+        message = str(error).replace(f"{root}/", "").rstrip(".")
+        raise StudyError(f"{message[:1].upper()}{message[1:]}.") from None
+    known = ("random", *named_studies())
+    if field in ("controllers", "reevolved") and text not in known and not (root / text).exists():
+        raise StudyError(f"There is no study or folder {shown(text)}. {did_you_mean(text, known)}")

@@ -235,10 +235,11 @@ def _resolve(data: dict[str, Any], problems: Problems, changes: dict[str, Any]) 
         name = values.get("name")
         place = f"condition[{index + 1}]" + (f" {name!r}" if isinstance(name, str) else "")
         if name in names:
-            problems.add(place, "an earlier condition has this name. Give each condition its own.")
+            problems.add(f"{place}.name", "an earlier condition has this name. Give each condition its own.")
         elif isinstance(name, str) and (alike := same_file(name, names)) is not None:
             problems.add(
-                place, f"differs from {alike!r} in capitals only, and some disks take their files for one."
+                f"{place}.name",
+                f"differs from {alike!r} in capitals only, and some disks take their files for one.",
             )
         names.append(name if isinstance(name, str) else "")
         condition, note = _condition(values, base, about, place, problems)

@@ -378,5 +378,8 @@ def _focus(target: str, otherwise: str = "") -> str:
     return (
         f"const [it, other] = ['{target}', '{otherwise}'].map((id) => document.getElementById(id)); "
         "const seen = it?.checkVisibility() ? it : other; "
-        "seen.focus({preventScroll: true}); seen.scrollIntoView({block: 'center'});"
+        "const height = other && seen.getBoundingClientRect().bottom - other.getBoundingClientRect().top; "
+        "const fits = other && height < innerHeight - 200; "
+        "seen.focus({preventScroll: true}); "
+        "(fits ? other : seen).scrollIntoView({block: fits ? 'start' : 'center'});"
     )

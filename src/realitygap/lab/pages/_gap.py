@@ -15,7 +15,7 @@ from starlette.responses import FileResponse, PlainTextResponse, Response
 from realitygap.lab._access import FOREIGN_HEADERS
 from realitygap.lab._choices import Choices, controller_choices, platform_choices
 from realitygap.lab._control import Visitor
-from realitygap.lab._gap import GapJob, gap_mistakes, plan_words
+from realitygap.lab._gap import GapJob, free_name, gap_mistakes, plan_words
 from realitygap.lab._lab import Lab
 from realitygap.lab._messages import ScorePairs
 from realitygap.orders import GapOrder
@@ -89,7 +89,7 @@ class _Page:
     def show(self) -> None:
         hint(
             "Runs the same controllers on a simulator and on a target, and measures how much the two differ. "
-            "The trials of the target are saved: measure again under the same name to continue."
+            "The trials of the target are saved: enter the name of an existing gap to continue it."
         )
         unfinished = Part(self._unfinished, self._show_unfinished)  # above the form, which fills a screen
         with ui.column().classes("lab-cards"):
@@ -126,7 +126,7 @@ class _Page:
     def _show_form(self) -> None:
         self._form = form = Form()
         form.summary()
-        form.text_of(
+        simulator = form.text_of(
             _FIELDS["sim"],
             self._sim,
             self._choices.get("sim"),
@@ -139,12 +139,17 @@ class _Page:
             explanation="Robot, twin, or simulator that counts as reality. An emulator in another program also needs "
             "its witness.",
         )
+        self._name = form.text(
+            "name",
+            "Name",
+            parse=needed,
+            explanation="Name of the report and of the saved trials.",
+        )
+        self._platforms = (simulator, self._target)
+        self._free_name = ""
         with ui.element("div").classes("lab-fields"):
             self._numbers = {key: form.number_of(_FIELDS[key]) for key in _NUMBERS}
         with ui.expansion("Advanced").classes("lab-expansion"):
-            form.text(
-                "name", "Name", "gap", parse=needed, explanation="Name of the report and the saved trials."
-            )
             self._margin = form.number_of(_FIELDS["margin"])
             for key, field in _FIELDS.items():
                 if key not in ("sim", "target", "margin", *_NUMBERS):
@@ -157,8 +162,17 @@ class _Page:
         elements: list[ValueElement[Any]] = [*self._numbers.values(), self._target, self._margin]
         for element in elements:
             element.on_value_change(self._show_plan)
+        for platform in self._platforms:
+            platform.on_value_change(self._propose_name)
+        self._propose_name()
         self._show_plan()
         self._button = ui.button("Measure the gap", on_click=self._submit).props("unelevated no-caps")
+
+    def _propose_name(self) -> None:
+        """Propose a name that no file has, unless the visitor entered another one."""
+        if text_of(self._name) == self._free_name:
+            self._free_name = free_name(self._lab.root, *(text_of(platform) for platform in self._platforms))
+            self._name.value = self._free_name
 
     def _show_plan(self) -> None:
         """State what the entered numbers need; nothing while one of them cannot be used."""
@@ -190,9 +204,9 @@ class _Page:
         """Show the form as one line while a gap is measured."""
         self._form_box.set_visibility(not order)
         if order:
-            with ui.row().classes("lab-row"):
-                ui.label(order)
-                ui.button("Measure the gap").props("unelevated no-caps disable")
+            ui.label(order)
+        else:
+            self._propose_name()
 
     # work and result
 
@@ -200,8 +214,7 @@ class _Page:
         job = self._lab.gap
         if job is None:
             return None
-        share = sum(job.trials.values()) / max(2 * job.n_trials, 1)
-        return _Work(job, job.progress, job.is_over, job.is_failed, share)
+        return _Work(job, job.progress, job.is_over, job.is_failed, job.share)
 
     def _unfinished(self) -> _Work | None:
         work = self._work()

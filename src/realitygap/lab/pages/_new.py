@@ -610,7 +610,7 @@ def _usual_name(condition: dict[str, Any]) -> str | None:
     selection, noise = condition.get("selection"), condition.get("noise")
     return (
         f"{selection}-{100 * noise:g}"
-        if isinstance(selection, str) and isinstance(noise, float | int)
+        if isinstance(selection, str) and isinstance(noise, float | int) and 0 <= noise <= 10
         else None
     )
 

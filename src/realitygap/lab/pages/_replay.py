@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import secrets
-from functools import partial
 from typing import Any
 
 from nicegui import ui
@@ -13,6 +12,7 @@ from realitygap.lab._choices import Choices
 from realitygap.lab._lab import Lab
 from realitygap.lab._live import LiveJob, live_mistakes
 from realitygap.lab._messages import ReplayRefused, TrialChoice
+from realitygap.lab._mistakes import Mistakes
 from realitygap.lab._watcher import Watcher
 from realitygap.orders import Limits
 
@@ -22,6 +22,7 @@ from ._frame import hint, section
 from ._part import Part
 from ._touch import Touch
 
+_NUMBERS = {"replicate": "Run", "generation": "Generation", "individual": "Individual"}
 MOST_TRIALS = 4
 """Number of trials that are played together: more robots cover each other."""
 LIVE_S = 0.05
@@ -48,7 +49,7 @@ class LivePlayer:
             ui.label(job.outcome).classes("lab-problem").props('role="status"')
             return
         if job.scene is None:
-            ui.label("Getting the robot ready ...").props('role="status"')
+            ui.label("Getting the robot ready…").props('role="status"')
             return
         self._player = Player(job.scene, job.trials, live=job.is_live)
         self._player.on("all", self._ready)
@@ -95,12 +96,8 @@ class Replays:
         form.summary()
         with ui.element("div").classes("lab-fields"):
             form.choice("condition", "Condition", self._conditions, self._conditions[0])
-            for key, label in (
-                ("replicate", "Run"),
-                ("generation", "Generation"),
-                ("individual", "Individual"),
-            ):
-                form.number(key, label, None, Limits(0, 2**31))
+            for key, label in _NUMBERS.items():
+                form.number(key, label, None, Limits(high=2**31))
         hint("If you don't choose a run, the run with the median best coverage is shown.")
         with ui.row().classes("lab-row"):
             ui.button("Show trial", on_click=lambda: self._play()).props("unelevated no-caps")
@@ -117,8 +114,9 @@ class Replays:
                 "Platform",
                 choices={"Default": {"": "The platform of the condition"}} | dict(self._platforms),
             )
-        find = partial(live_mistakes, self._lab.root)
-        ui.button("Drive live", on_click=lambda: form.submit(self._drive, find)).props("outline no-caps")
+        ui.button("Drive live", on_click=lambda: form.submit(self._drive, self._mistakes_of_drive)).props(
+            "outline no-caps"
+        )
         self._live = Part(self._live_state, self._show_live)
         self._live.show()
 
@@ -152,10 +150,32 @@ class Replays:
 
         self._has_played = self._is_computing = True
         self._key = secrets.token_hex(8)  # what was asked for before comes too late
-        if not await self._form.submit(ask):
+        if not await self._form.submit(ask, self._mistakes):
             self._is_computing = False
             return
         self._stage.refresh()
+
+    def _mistakes(self, values: dict[str, Any]) -> Mistakes:
+        """Return a mistake for each number that no trial of the chosen condition has."""
+        mistakes = Mistakes()
+        described = self._lab.studies.results(self._name).description
+        conditions = [each for each in described["conditions"] if isinstance(each, dict)]
+        settings = {each["name"]: each.get("settings") or {} for each in conditions}
+        neat = settings.get(values["condition"], {}).get("neat", {})
+        sizes = (described.get("replicates"), neat.get("generations"), neat.get("population"))
+        for key, size in zip(_NUMBERS, sizes, strict=True):
+            number = values.get(key)
+            if number is not None and (number < 0 or number >= (size or 2**31)):
+                words = Limits(0, (size or 2**31) - 1).words
+                mistakes.problems[key] = f"Enter {words}. You entered {number}."
+        if values.get("individual") is not None and values.get("generation", 0) is None:
+            mistakes.problems["generation"] = "Enter the generation of the individual."
+        return mistakes
+
+    def _mistakes_of_drive(self, values: dict[str, Any]) -> Mistakes:
+        mistakes = self._mistakes(values)
+        mistakes.problems |= live_mistakes(self._lab.root, values).problems
+        return mistakes
 
     def _drive(self, values: dict[str, Any]) -> None:
         self._lab.drive_live(self._name, values["platform"], _choice_of(values))

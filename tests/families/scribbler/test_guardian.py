@@ -108,11 +108,19 @@ def loop(robot: Scribbler) -> None:
         robot.drive(Command(0.5, 0.1))
 
 
-def time_to_stand(server: Server) -> float:
-    """Wait until the motors are off, and return how long that took [s]."""
+def time_to_stand(server: Server, frozen: int | None = None) -> float:
+    """Wait until the motors are off, and return how long that took [s].
+
+    Args:
+        server: Server of the robot.
+        frozen: Process that stays frozen. It is stopped again and again, because another program that stops processes
+            for a moment, such as `tests.faults.stops`, may resume it.
+    """
     since = time.monotonic()
     while server.witness.motors() != STILL:
         assert time.monotonic() - since < BUSY_S, "The motors are still running."
+        if frozen is not None:
+            os.kill(frozen, signal.SIGSTOP)
         time.sleep(0.005)
     return time.monotonic() - since
 
@@ -136,7 +144,7 @@ def kill_at_random(server: Server, n_kills: int, number: int, seconds: float) ->
         with fork(loop, server.name) as child:
             time.sleep(rng.uniform(0, 0.3))
             os.kill(child, number)
-            times.append(time_to_stand(server))
+            times.append(time_to_stand(server, child if number == signal.SIGSTOP else None))
             time.sleep(0.1)
             assert server.witness.motors() == STILL
     assert statistics.median(times) < seconds
@@ -245,7 +253,7 @@ robot.close()
     with SERVE[channel](Emulator("s2", "1")) as server:
         with program(DRIVE + report, server.name) as (process, _):
             process.send_signal(signal.SIGSTOP)
-            time_to_stand(server)
+            time_to_stand(server, process.pid)
             process.send_signal(signal.SIGCONT)
             said = process.stdout.readline()
             assert "This program was silent for 1 s, so the motors were stopped: '" in said
@@ -274,7 +282,7 @@ except Exception as error:
     text = (DRIVE + report).replace("step_s=0.05", "step_s=0.05, watchdog_s=1.0")
     with serve_pty(Emulator("s2", "1")) as server, program(text, server.name) as (process, _):
         process.send_signal(signal.SIGSTOP)
-        time_to_stand(server)
+        time_to_stand(server, process.pid)
         process.send_signal(signal.SIGCONT)
         assert "This program was silent for 1 s" in process.stdout.readline()
 
@@ -285,7 +293,7 @@ def test_guardian_that_is_killed_or_frozen_is_replaced_and_the_motors_stop(numbe
         robot.drive(Command(1, 0))
         first = robot.link.guardian_id
         os.kill(first, number)
-        time_to_stand(server)
+        time_to_stand(server, first if number == signal.SIGSTOP else None)
         with pytest.raises(
             RobotError, match="The process that guards the robot ended, so the motors were stopped"
         ):

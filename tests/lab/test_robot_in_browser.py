@@ -219,6 +219,18 @@ def test_bars_of_sensors_are_as_wide_as_the_readings_while_the_robot_drives_into
 
 
 @pytest.mark.skipif(bool(why_not()), reason=why_not() or "-")
+def test_blocked_robot_is_drawn_at_the_wall_that_blocks_it(visit):
+    page = visit("robot")
+    connect(page)
+    hold_key(page)
+    page.get_by_text("Driving, blocked", exact=True).wait_for()
+    page.keyboard.up("ArrowUp")
+    robot, grid = page.locator(".lab-robot polygon").bounding_box(), page.locator(".lab-wall").all()
+    right = max(wall.bounding_box()["x"] for wall in grid)
+    cell = page.locator("[data-cell='0']").bounding_box()["width"]
+    assert abs(robot["x"] + robot["width"] - right) < 0.4 * cell  # half a cell with a circle in its place
+
+
 def test_thymio_in_playground_is_driven_with_its_own_sensors(visit):
     page = visit("robot")
     page.get_by_role("button", name="Use an emulated Thymio").click()

@@ -30,8 +30,10 @@ def test_saved_trials_are_listed_corrected_voided_and_annotated(lab, visit):
             ledger.append(replace(trial(number), purpose="controller", cells=(13, 14)))
     page = visit("gap")
     page.get_by_role("link", name="Saved trials").click()
+    page.get_by_text("the twin worn, 3 trials", exact=True).wait_for()
     page.get_by_role("link", name="gaps/first one.sqlite").click()
-    page.get_by_text("3 trials", exact=True).wait_for()
+    page.get_by_text("the twin worn, 3 trials", exact=True).wait_for()
+    page.get_by_text("TWIN", exact=True).wait_for()
     row = page.get_by_role("row").nth(2)
     row.get_by_role("checkbox").click()
     page.get_by_role("button", name="Save cells").click()
@@ -49,7 +51,7 @@ def test_saved_trials_are_listed_corrected_voided_and_annotated(lab, visit):
     expect(page.get_by_role("button", name="Void trial")).to_be_disabled()
     with open_ledger(file) as ledger:  # a command that drives
         ledger.append(replace(trial(3), purpose="controller", cells=(13, 14)))
-    page.get_by_text("4 trials", exact=True).wait_for()
+    page.get_by_text("the twin worn, 4 trials", exact=True).wait_for()
     expect(row.get_by_role("checkbox")).to_be_checked()
     with open_ledger(file, writable=False) as log:
         assert [each.state for each in log.trials()] == ["scored", "void", "scored", "scored"]

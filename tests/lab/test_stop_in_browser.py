@@ -240,7 +240,7 @@ def test_page_without_the_lab_shows_the_stop_and_disables_everything_else(visit)
     page.context.set_offline(True)
     page.evaluate("window.socket.io.engine.close()")
     page.get_by_text("Reconnecting…").wait_for()
-    lost = page.get_by_role("button", name="Connection lost. Use the robot's power switch.")
+    lost = page.get_by_role("button", name="Connection lost. If a robot moves, use its power switch.")
     lost.wait_for()  # whether a robot is connected is unknown
     assert covered(page.locator(".lab-stop")) == []
     page.get_by_role("button", name="Measure the gap").click()

@@ -117,6 +117,10 @@ def test_cells_are_marked_and_saved_with_the_keyboard(lab, visit):
     grid = page.get_by_role("grid", name="Cells crossed in trial 1")
     expect(grid.get_by_role("row")).to_have_count(6)
     page.locator('[data-counting="1"] [data-cell="0"]').focus()
+    page.keyboard.press("Enter")
+    refused = page.get_by_text("Mark each cell that the line crosses, then save.")
+    refused.wait_for()
+    page.locator('[data-counting="1"] [data-cell="0"]').focus()
     for key in ("ArrowUp", "ArrowRight", "ArrowRight", "Space"):
         page.keyboard.press(key)
     grid.get_by_role("gridcell", name="column 3, row 2, crossed", exact=True).wait_for()
@@ -124,6 +128,7 @@ def test_cells_are_marked_and_saved_with_the_keyboard(lab, visit):
     page.get_by_text("1 of 72 cells").wait_for()
     page.keyboard.press("Enter")
     page.get_by_text("Trial 1: 1 cell saved").wait_for()
+    refused.wait_for(state="detached")  # the visitor has acted on it
     with ledger_of(lab.root) as ledger:
         assert ledger.trial(1).cells == (14,)
 

@@ -58,7 +58,8 @@ _ALL_HEADERS = {
 _WALL = """<!doctype html>
 <html lang="en-US"><meta charset="utf-8"><meta name="viewport" content="width=device-width">
 <title>realitygap lab</title>
-<style>body {{ font: 1.1rem/1.5 system-ui, sans-serif; max-width: 34rem; margin: 3rem auto; padding: 0 1rem }}
+<style>:root {{ color-scheme: light dark }}
+body {{ font: 1.1rem/1.5 system-ui, sans-serif; max-width: 34rem; margin: 3rem auto; padding: 0 1rem }}
 input, button {{ font: inherit; padding: .5rem; box-sizing: border-box; width: 100%; margin: .3rem 0 }}</style>
 <h1>The lab needs its token</h1>
 <p>{message}</p>
@@ -70,6 +71,7 @@ token. Each start of the lab makes a new one.</p>
 """
 _ENTRY = """<!doctype html>
 <html lang="en-US"><meta charset="utf-8"><meta http-equiv="refresh" content="0; url={address}">
+<style>:root {{ color-scheme: light dark }}</style>
 <title>realitygap lab</title><p><a href="{address}">Open the lab</a></p>
 """
 

@@ -12,6 +12,7 @@ from typing import Any
 
 from realitygap.errors import LedgerError, RealityGapError
 from realitygap.platforms import emulated_robots, is_physical
+from realitygap.playback import RobotShape
 from realitygap.records import (
     LEDGER_NAME,
     Ledger,
@@ -188,6 +189,11 @@ class Counts:
             resolved = Condition.from_settings(condition, settings)
             self._arenas[condition] = resolved.arena.arena()
         return self._arenas[condition]
+
+    def outlines(self, condition: str) -> tuple[tuple[tuple[float, float], ...], ...]:
+        """Return the outlines of the robot's parts, (forward, left) [m]."""
+        settings = settings_of_condition(self.description, condition)
+        return RobotShape.of(Condition.from_settings(condition, settings).on).outlines
 
     def _read(self, ledger: Ledger) -> list[CountedTrial]:
         scores = [row for row in ledger.scores() if row["undone"] is None]

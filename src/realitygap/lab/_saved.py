@@ -48,12 +48,16 @@ class SavedTrials:
     """The trials of a file at one moment.
 
     Attributes:
+        target: Platform, as the user named it.
+        label: Its label, such as TWIN.
         arena: Arena of the trials.
         trials: The trials.
         notes: Notes on each trial, by its number.
         looks: What the trials show of a comparison that is planned in the file, a line each; empty if there is none.
     """
 
+    target: str
+    label: str
     arena: Arena
     trials: tuple[Trial, ...]
     notes: Mapping[int, str]
@@ -84,7 +88,8 @@ class SavedFile:
                 trial.trial: "; ".join(f"{note['who']}: {note['text']}" for note in ledger.notes(trial.trial))
                 for trial in trials
             }
-            return SavedTrials(ledger.arena, trials, notes, _looks(ledger))
+            head = ledger.head()
+            return SavedTrials(head.target, head.label, ledger.arena, trials, notes, _looks(ledger))
 
     def _open(self, *, writable: bool = True) -> Ledger:
         """Open the trials. Lines of JSON are converted before they are changed; then the new file has them."""

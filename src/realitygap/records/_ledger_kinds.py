@@ -187,7 +187,9 @@ def checked_cells(cells: Sequence[int], n_cells: int) -> list[int]:
             f"Cell {outside[0]} is outside the grid: expected numbers from 0 to {n_cells - 1}. Nothing was entered."
         )
     if not unique:
-        raise LedgerError("Mark at least the start cell before saving. Nothing was saved.")
+        raise LedgerError(
+            "No cell is marked. Mark each cell that the line crosses, then save. Nothing was saved."
+        )
     return unique
 
 

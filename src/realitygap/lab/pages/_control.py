@@ -17,7 +17,8 @@ from ._part import Part, watching
 
 UNTOLD_S = 0.5
 """Time between two looks for what nothing reports [s]: a robot that is silent, and the end of the time after a stop."""
-_LOST = "Connection lost. Use the robot's power switch."
+_EMULATED = "Emulated robot"
+_LOST = "Connection lost. If a robot moves, use its power switch."
 
 
 def add_stop(lab: Lab) -> None:
@@ -60,7 +61,7 @@ class Stop:
             self._chip = ui.label("").classes("lab-chip").props('role="status"')
             # One button for the whole life of the page: a press is never lost because the button was drawn again.
             with ui.button("Stop robot", on_click=self._press, color=None) as self._button:
-                ui.label(_LOST).classes("lab-stop-lost")
+                self._lost = ui.label(_LOST).classes("lab-stop-lost")
             self._button.classes("lab-stop").props('unelevated no-caps aria-keyshortcuts="Escape"')
         ui.keyboard(on_key=self._key, repeating=False, ignore=[])
         part = Part(self._state, self._update)
@@ -84,6 +85,7 @@ class Stop:
         for fault in ("silent", "lost"):
             self._bar.classes(**{"add" if state.fault == fault else "remove": f"lab-robot-{fault}"})
         self._chip.text = state.text
+        self._lost.text = "Connection lost." if _EMULATED in state.text else _LOST
         self._button.text = "Robot stopped" if state.is_stopped else "Stop robot"
 
     def _press(self) -> None:
@@ -96,7 +98,7 @@ class Stop:
 
 
 def _name_of(port: str) -> str:
-    return "Emulated robot" if "emulator://" in port else f"Robot on {port}"
+    return _EMULATED if "emulator://" in port else f"Robot on {port}"
 
 
 def show_holder(lab: Lab, visitor: Visitor) -> None:

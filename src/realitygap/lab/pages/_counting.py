@@ -272,6 +272,8 @@ class Counting:
             self._counts.score(each.number, draft, self._who(), role)
 
         said = f"Trial {each.number}: {counted(len(draft.cells), 'cell')} saved."
+        if not self._who():
+            ui.run_javascript("document.querySelector('[data-who] input').focus()")
         if await attempt(enter, said, type="positive"):
             self._chosen, self._corrects = None, False
         self._lab.changed()

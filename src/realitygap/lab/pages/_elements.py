@@ -108,6 +108,7 @@ class CellGrid(Element, component="cell_grid.js"):
         line: (x, y) [m] of the points of a line.
         trace: Cells and lines that a photograph or a camera showed.
         ink: Color of the line: the name of a pen, or any color of CSS.
+        outlines: Parts of a robot that is shown by `follow`: (forward, left) [m].
         name: Name of the grid for screen readers.
         change: Called with the marked cells after each tap; None where nothing can be tapped.
     """
@@ -120,6 +121,7 @@ class CellGrid(Element, component="cell_grid.js"):
         line: Sequence[Sequence[float]] = (),
         trace: Trace = NO_TRACE,
         ink: str = "black",
+        outlines: Sequence[Sequence[Sequence[float]]] = (),
         name: str = "Cells",
         change: Callable[[list[int]], Any] | None = None,
     ) -> None:
@@ -141,6 +143,7 @@ class CellGrid(Element, component="cell_grid.js"):
             "sure": list(trace.sure),
             "picture": None if trace.picture is None else self._placed(*trace.picture),
             "ink": ink_of(ink),
+            "outlines": [[[x / grid.cell, y / grid.cell] for x, y in outline] for outline in outlines],
             "locked": change is None,
             "name": name,
         }

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Any
+from weakref import WeakKeyDictionary
 
-from nicegui import run, ui
+from nicegui import Client, run, ui
 
 from realitygap.errors import RealityGapError
 
 WRONG = (RealityGapError, ValueError, TypeError, OSError)
 """Errors that a visitor can correct."""
+_errors: WeakKeyDictionary[Client, ui.notification] = WeakKeyDictionary()
+"""The error that each page shows."""
 
 
 def notify(message: str, **options: Any) -> None:
@@ -24,13 +27,22 @@ def notify(message: str, **options: Any) -> None:
 
 
 def show_error(error: Exception) -> None:
-    """Show an error until the visitor closes it."""
+    """Show an error until the visitor closes it, or acts again."""
+    forget_error()
     close = {"label": "Close", "color": "white", "noCaps": True}
-    notify(str(error), type="negative", multi_line=True, timeout=0, actions=[close])
+    options: Any = {"type": "negative", "multi_line": True, "timeout": 0, "actions": [close]}
+    _errors[ui.context.client] = ui.notification(str(error), position="top", **options)
+
+
+def forget_error() -> None:
+    """Hide the last error of the page, because the visitor has acted again."""
+    if (shown := _errors.pop(ui.context.client, None)) is not None and not shown.is_deleted:
+        shown.dismiss()
 
 
 def try_now(act: Callable[[], Any]) -> bool:
     """Call a function that waits for nothing, and show its error; return whether it succeeded."""
+    forget_error()
     try:
         act()
     except WRONG as error:
@@ -51,6 +63,7 @@ async def attempt(act: Callable[[], Any], done: str = "", **options: Any) -> boo
         Whether it succeeded.
     """
     with ui.context.client:  # the button that was pressed may be gone by then
+        forget_error()
         try:
             await run.io_bound(act)
         except WRONG as error:

@@ -12,6 +12,8 @@ from realitygap.lab._control import RobotControl, Visitor
 from realitygap.lab._hand import Hand
 from realitygap.lab._lab import Lab
 from realitygap.lab._messages import Activity, Senses
+from realitygap.platforms import platform_class
+from realitygap.playback import RobotShape
 from realitygap.robot_families import (
     Reading,
     RobotFamily,
@@ -166,7 +168,7 @@ class _Page:
             form.text(
                 "witness",
                 "Witness",
-                explanation="HOST:PORT of the witness of an emulator in another program. Leave it empty for a robot.",
+                explanation="HOST:PORT that an emulator in another program printed. Leave it empty for a robot.",
             )
 
             def connect(values: dict[str, Any]) -> None:
@@ -226,12 +228,16 @@ class _Page:
     def _show_panels(self, hand: Hand) -> None:
         """Show the position, the pad, the actions, and the readings."""
         self._grid: CellGrid | None = None
+        family = find_family(split_port(hand.port)[0]) or default_family()
         with ui.element("div").classes("lab-drive"):
             with ui.column().classes("lab-cards lab-drive-where"):
                 if hand.arena is not None:
                     section("Position")
                     self._grid = CellGrid(
-                        hand.arena, ink="var(--accent)", name="Position of the emulated robot"
+                        hand.arena,
+                        ink="var(--accent)",
+                        outlines=RobotShape.of(platform_class(family.name)()).outlines,
+                        name="Position of the emulated robot",
                     ).classes("lab-sketch")
                 self._clock = ui.label("").classes("lab-value lab-finding")
             with ui.column().classes("lab-cards lab-drive-pad"):
@@ -243,7 +249,6 @@ class _Page:
             with ui.column().classes("lab-cards lab-senses") as self._senses:
                 section("Sensors")
                 self._motion = ui.label("Standing").props('role="status"')
-                family = find_family(split_port(hand.port)[0]) or default_family()
                 kinds: dict[str, tuple[Reading, ...]] = {
                     "range": family.range_readings.get(hand.n_sensors, ())
                 }
@@ -286,7 +291,7 @@ class _Page:
         hint("During the pre-flight, the robot turns on the spot.")
 
     def _show_facts(self, hand: Hand) -> None:
-        section("Robot")
+        section("Details")
         facts = dict(hand.about)
         if hand.has_battery:
             facts["battery"] = "unknown" if hand.battery_v is None else f"{hand.battery_v:.2f} V"

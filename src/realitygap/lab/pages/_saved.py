@@ -9,7 +9,7 @@ from nicegui import run, ui
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
 
-from realitygap._wording import counted
+from realitygap._wording import counted, platform_in_words
 from realitygap.errors import RealityGapError
 from realitygap.lab._lab import Lab
 from realitygap.lab._saved import SavedFile, SavedTrials, saved_files
@@ -30,8 +30,13 @@ def add_saved(lab: Lab) -> None:
         names = await run.io_bound(saved_files, lab.root) or {}
         with framed(lab, "Saved trials", ""):
             hint("Trials of studies are on the page of each study.")
-            for name in names:
-                ui.link(name, f"/saved/{quote(name)}")
+            for name, path in names.items():
+                with ui.row().classes("lab-row"):
+                    ui.link(name, f"/saved/{quote(name)}")
+                    try:
+                        _show_facts(await run.io_bound(SavedFile(path).read))
+                    except RealityGapError as error:
+                        ui.label(str(error)).classes("lab-problem")
             if not names:
                 ui.label("No saved trials yet. A gap or a calibration saves its trials.")
 
@@ -52,6 +57,14 @@ def add_saved(lab: Lab) -> None:
                 _Page(file, saved, visitor_of(request).who).show()
 
 
+def _show_facts(saved: SavedTrials | None) -> None:
+    """Show the label, platform, and number of trials of a file."""
+    if saved is not None:
+        label = saved.label
+        ui.label(label).classes(f"lab-label-{label.lower()} lab-badge")
+        ui.label(f"{platform_in_words(saved.target, label)}, {counted(len(saved.trials), 'trial')}")
+
+
 class _Page:
     def __init__(self, file: SavedFile, saved: SavedTrials, who: str) -> None:
         self._file, self._saved, self._who = file, saved, who
@@ -60,10 +73,7 @@ class _Page:
 
     def show(self) -> None:
         hint("The command that saved these trials uses your changes when it resumes. It repeats void trials.")
-        name = Form().text("who", "Your name", self._who, explanation="Your name is saved with each entry.")
-        name.props(f"debounce=400 maxlength={LONGEST_NAME}")
-        name.on_value_change(lambda event: self._named(text_of(event)))
-        self._count = ui.label()
+        self._facts = ui.row().classes("lab-row")
         self._looks = ui.label().classes("lab-finding").props('role="status"')
         columns = [
             {"name": key, "label": label, "field": key, "align": "left"} for key, label in _COLUMNS.items()
@@ -73,6 +83,12 @@ class _Page:
         self._table.classes("lab-table").props("flat bordered dense wrap-cells")
         self._table.on_select(lambda event: self._choose([row["number"] for row in event.selection]))
         self._fill()
+        with ui.element("div").classes("lab-wide").props("data-counting"):  # below the table, as is the trial
+            name = Form().text(
+                "who", "Your name", self._who, explanation="Your name is saved with each entry."
+            )
+        name.props(f"debounce=400 maxlength={LONGEST_NAME}")
+        name.on_value_change(lambda event: self._named(text_of(event)))
         self._card = ui.refreshable(self._show_card)
         self._card()
         ui.timer(1.0, self._look)  # a command may save trials
@@ -96,13 +112,15 @@ class _Page:
             self._fill()
 
     def _fill(self) -> None:
-        self._count.text = counted(len(self._saved.trials), "trial")
+        self._facts.clear()
+        with self._facts:
+            _show_facts(self._saved)
         self._looks.text = " ".join(self._saved.looks)
         self._looks.set_visibility(bool(self._saved.looks))
         self._table.rows = [
             {
                 "number": trial.trial,
-                "name": trial.name,
+                "name": trial.name.removeprefix("controller, "),
                 "state": f"{trial.state}: {trial.reason}" if trial.reason else trial.state,
                 "cells": "" if trial.cells is None else str(len(trial.cells)),
                 "notes": self._saved.notes[trial.trial],
@@ -113,6 +131,8 @@ class _Page:
     def _choose(self, numbers: list[int]) -> None:
         self._chosen = numbers[0] if numbers else None
         self._card.refresh()
+        if numbers:
+            ui.run_javascript("document.querySelector('[data-counting]').scrollIntoView()")
 
     def _show_card(self) -> None:
         trial = self._saved.trial(self._chosen)

@@ -74,7 +74,8 @@ class _Shown:
         _title(card)
         with ui.row().classes("lab-row no-wrap"):
             ui.element("span").classes("lab-pen").style(f"background: {ink_of(card['pen'])}")
-            ui.label(f"Pen: {card['pen']}. Sheet {card['sheet']}. {card['n_left']} left in this generation.")
+            paper = "" if question.is_placed else f"Pen: {card['pen']}. Sheet {card['sheet']}. "
+            ui.label(f"{paper}{counted(card['n_left'], 'trial')} left in this generation.")
         if question.is_placed:
             ui.label("The emulated robot is placed at its start automatically.")
         else:
@@ -147,14 +148,16 @@ class Driving:
     def show(self) -> None:
         """Show it."""
         card = self._card
-        arena = self._counts.arena(self._counts.trial(card["trial"]).trial.condition)
+        condition = self._counts.trial(card["trial"]).trial.condition
+        arena, outlines = self._counts.arena(condition), self._counts.outlines(condition)
         with ui.card().classes("lab-card lab-question"):
             ui.label(f"Trial {card['trial']} is being driven").classes("lab-section").props('role="status"')
             hint(f"{card['title']}. Pen: {card['pen']}.")
             self._bar = ui.linear_progress(0, show_value=False).props('aria-label="Steps driven"')
             self._step_words = ui.label("")
             self._silence = Silence()
-            self._grid = CellGrid(arena, ink=card["pen"], name="Position of the robot").classes("lab-sketch")
+            self._grid = CellGrid(arena, ink=card["pen"], outlines=outlines, name="Position of the robot")
+            self._grid.classes("lab-sketch")
             self._cells = ui.label("").classes("lab-value")
             ui.button("Abort trial", on_click=self._job.stop_robot, color=None).classes("lab-pad-stop").props(
                 "unelevated no-caps"
@@ -171,10 +174,10 @@ class Driving:
         if step is not None:
             self._bar.value = (step.step + 1) / step.n_steps
             seen = ", ".join(f"{reading:.0f}" for reading in step.raw)
-            stalled = ", blocked" if step.stalled else ""
+            stalled = " · blocked" if step.stalled else ""
+            motion = f"forward {step.move:+.2f} · turn {step.turn:+.2f}".replace("-", "−")
             self._step_words.text = (
-                f"Step {step.step + 1} of {step.n_steps}: sees {seen}{stalled}; "
-                f"move {step.move:+.2f}, turn {step.turn:+.2f}"
+                f"Step {step.step + 1} of {step.n_steps} · readings {seen} · {motion}{stalled}"
             )
         if job.pose is not None:
             self._cells.text = f"Entered: {self._grid.follow(job.pose, job.line, job.cells)}"

@@ -110,6 +110,7 @@ class _Page:
         with ui.element("div").classes("lab-steps-bar"):
             self._steps.show()
         with ui.element("div").classes("lab-wide") as self._name_box:
+            self._name_box.props("data-who")
             self._show_name()
         self._name_box.set_visibility(not self._visitor.who)
         self._holder = Part(lambda: self._robot_stand().operator, self._show_holder)
@@ -289,7 +290,10 @@ class _Page:
                 ui.label(now.outcome).classes("lab-problem" if now.is_failed else "").props('role="status"')
             self._show_beginning()
             return
-        ui.label(f"{now.label or 'Connecting to the robot'} at {job.port}")
+        with ui.row().classes("lab-row"):
+            if now.label:
+                ui.label(now.label).classes(f"lab-label-{now.label.lower()} lab-badge")
+            ui.label(f"Connected to {job.port}" if now.label else f"Connecting to {job.port}…")
         if now.preflight is not None:
             _show_preflight(now.preflight)
         if now.camera_note:

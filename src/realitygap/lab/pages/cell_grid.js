@@ -12,6 +12,7 @@ export default {
     start: Array, // x, y in cells, heading in radians
     line: Array, // [x, y] in cells
     ink: String,
+    outlines: Array, // of the robot's parts: [forward, left] in cells
     locked: Boolean,
     name: String,
   },
@@ -36,7 +37,7 @@ export default {
           <circle r="0.28" /><path d="M 0 0 L 0.6 0 M 0.38 0.16 L 0.6 0 L 0.38 -0.16" />
         </g>
         <g v-if="robot" :transform="arrow(robot)" class="lab-robot">
-          <circle r="0.9" /><path d="M 0 0 L 0.9 0" />
+          <polygon v-for="(outline, k) in outlines" :key="'o' + k" :points="joined(outline)" /><path :d="'M 0 0 L ' + front + ' 0'" />
         </g>
       </g>
     </svg>`,
@@ -53,6 +54,7 @@ export default {
       const edge = 0.15;
       return `${left - edge} ${this.rows - top - edge} ${right - left + 2 * edge} ${top - bottom + 2 * edge}`;
     },
+    front() { return Math.max(...this.outlines.flat().map(([forward]) => forward)); },
     points() { return this.joined(this.drawn); },
   },
   methods: {

@@ -119,8 +119,9 @@ def time_to_stand(server: Server, frozen: int | None = None) -> float:
     since = time.monotonic()
     while server.witness.motors() != STILL:
         assert time.monotonic() - since < BUSY_S, "The motors are still running."
-        if frozen is not None:
-            os.kill(frozen, signal.SIGSTOP)
+        if frozen is not None and is_alive(frozen):
+            with contextlib.suppress(ProcessLookupError):  # a frozen guardian is replaced
+                os.kill(frozen, signal.SIGSTOP)
         time.sleep(0.005)
     return time.monotonic() - since
 

@@ -218,7 +218,7 @@ def test_a_trial_goes_on_when_the_page_goes_away(lab, visit):
     with ledger_of(lab.root) as ledger:
         assert ledger.trial(1).end == "step limit"
     again = visit(PAGE)
-    again.get_by_text("Pen: blue").wait_for()
+    await_trial(again, 2)
 
 
 def test_robot_changes_hands_when_its_operator_agrees_and_everyone_can_stop_it(lab, visit):

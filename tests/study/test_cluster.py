@@ -280,7 +280,7 @@ def test_workers_that_do_not_share_the_folder_are_told(study, dask, tmp_path, mo
     dask.scheduler()
     dask.worker()
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(ClusterError, match=r"cannot access /proc/self/cwd/r\. .*--out DIR"):
+    with pytest.raises(ClusterError, match=r"cannot access /proc/self/cwd/r\. .*out=DIR"):
         run_study(study, "/proc/self/cwd/r", cluster=dask.address)
     assert n_published(tmp_path) == 0
 

@@ -11,6 +11,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any, Literal, Self
 
+from realitygap._limits import parse_json
 from realitygap.errors import LedgerError
 from realitygap.records._ending import UNDER_WAY, EndReason, is_taken_back, is_whole
 from realitygap.records._ledger_file import create_file, speaking
@@ -131,7 +132,7 @@ class Ledger(LedgerReader):
         before the first trial.
         """
         last = self._one("SELECT details FROM events WHERE what = ? ORDER BY id DESC LIMIT 1", PLAN_EVENT)
-        if last is not None and self._value(last["details"]) == json.loads(_json(plan)):
+        if last is not None and self._value(last["details"]) == parse_json(_json(plan)):
             return
         with self._writing():
             self._run(

@@ -415,6 +415,8 @@ if (!follow()) {
   redraw();
   playInView();
 }
+if (window.matchMedia("print").matches) setPrinted(true); // already, while the trials were unpacked
+window.dispatchEvent(new Event("resize")); // the tables are filled now, and may be wider than the page
 window.addEventListener("hashchange", follow);
 onResize(byId("stage"), () => {
   stage.measure();

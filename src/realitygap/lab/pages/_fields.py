@@ -32,6 +32,7 @@ class _Field:
         problem: Line below it for a mistake.
         help: Explanation below it; None if there is none.
         check: Raises a ValueError if the value cannot be used.
+        marked: The mistake that is shown; None before the field was drawn.
     """
 
     label: str
@@ -39,6 +40,7 @@ class _Field:
     problem: ui.label
     help: ui.label | None
     check: Callable[[], Any]
+    marked: str | None = None
 
 
 def needed(text: str) -> str:
@@ -344,7 +346,10 @@ class Form:
         )
 
     def _mark(self, field: _Field, text: str) -> None:
-        field.problem.text = text
+        # an update sends the value that the server knows, and the visitor may be entering another one
+        if text == field.marked:
+            return
+        field.problem.text = field.marked = text
         field.problem.set_visibility(bool(text))
         about = [each.html_id for each in (field.help, field.problem if text else None) if each is not None]
         for name, value in (

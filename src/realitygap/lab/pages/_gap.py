@@ -139,14 +139,15 @@ class _Page:
             explanation="Robot, twin, or simulator that counts as reality. An emulator in another program also needs "
             "its witness.",
         )
+        self._platforms = (simulator, self._target)
+        self._free_name = free_name(self._lab.root, *map(text_of, self._platforms))
         self._name = form.text(
             "name",
             "Name",
+            self._free_name,
             parse=needed,
             explanation="Name of the report and of the saved trials.",
         )
-        self._platforms = (simulator, self._target)
-        self._free_name = ""
         with ui.element("div").classes("lab-fields"):
             self._numbers = {key: form.number_of(_FIELDS[key]) for key in _NUMBERS}
         with ui.expansion("Advanced").classes("lab-expansion"):
@@ -164,14 +165,13 @@ class _Page:
             element.on_value_change(self._show_plan)
         for platform in self._platforms:
             platform.on_value_change(self._propose_name)
-        self._propose_name()
         self._show_plan()
         self._button = ui.button("Measure the gap", on_click=self._submit).props("unelevated no-caps")
 
     def _propose_name(self) -> None:
         """Propose a name that no file has, unless the visitor entered another one."""
         if text_of(self._name) == self._free_name:
-            self._free_name = free_name(self._lab.root, *(text_of(platform) for platform in self._platforms))
+            self._free_name = free_name(self._lab.root, *map(text_of, self._platforms))
             self._name.value = self._free_name
 
     def _show_plan(self) -> None:

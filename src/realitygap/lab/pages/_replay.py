@@ -5,7 +5,7 @@ from __future__ import annotations
 import secrets
 from typing import Any
 
-from nicegui import ui
+from nicegui import run, ui
 
 from realitygap.errors import StudyError
 from realitygap.lab._choices import Choices
@@ -131,9 +131,10 @@ class Replays:
         self._touch.look()
 
     async def play_first(self) -> None:
-        """Play the typical run, unless a trial was played already."""
+        """Play the typical run, unless a trial was played already, whatever a visitor is entering."""
         if not self._has_played:
-            await self._play()
+            await run.io_bound(self._begin, [], {"condition": self._conditions[0]})
+            self._stage.refresh()
 
     async def _play(self, *, compares: bool = False) -> None:
         before = self._choices if compares else []
@@ -145,15 +146,17 @@ class Replays:
                 )
             if (choice := _choice_of(values)) in before:
                 raise StudyError("This trial is shown already. Choose another condition, run, or generation.")
-            self._watcher.replay(self._key, [*before, choice])
-            self._choices = [*before, choice]
+            self._begin(before, choice)
 
+        if await self._form.submit(ask, self._mistakes):
+            self._stage.refresh()
+
+    def _begin(self, before: list[TrialChoice], choice: TrialChoice) -> None:
+        """Begin to compute a replay; results of earlier requests come too late."""
         self._has_played = self._is_computing = True
-        self._key = secrets.token_hex(8)  # what was asked for before comes too late
-        if not await self._form.submit(ask, self._mistakes):
-            self._is_computing = False
-            return
-        self._stage.refresh()
+        self._key = secrets.token_hex(8)
+        self._watcher.replay(self._key, [*before, choice])
+        self._choices = [*before, choice]
 
     def _mistakes(self, values: dict[str, Any]) -> Mistakes:
         """Return a mistake for each number that no trial of the chosen condition has."""

@@ -153,10 +153,10 @@ class Replays:
 
     def _begin(self, before: list[TrialChoice], choice: TrialChoice) -> None:
         """Begin to compute a replay; results of earlier requests come too late."""
+        key, choices = secrets.token_hex(8), [*before, choice]
+        self._watcher.replay(key, choices)
+        self._key, self._choices = key, choices
         self._has_played = self._is_computing = True
-        self._key = secrets.token_hex(8)
-        self._watcher.replay(self._key, [*before, choice])
-        self._choices = [*before, choice]
 
     def _mistakes(self, values: dict[str, Any]) -> Mistakes:
         """Return a mistake for each number that no trial of the chosen condition has."""

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import contextlib
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 import realitygap
 from realitygap.drawing import ShownAsCard
@@ -14,7 +16,7 @@ from realitygap.orders import EstimateOrder, GapOrder, takes_order
 from realitygap.platforms import RecordedTarget, class_of, open_target, split_spec
 from realitygap.stats import Estimate
 from realitygap.tasks import Task
-from realitygap.trials import PortObserver, Pulse
+from realitygap.trials import PortObserver, Pulse, Target
 from realitygap.world import Arena, Calibration, load_arena
 
 from .._code import task_named
@@ -128,30 +130,10 @@ def gap_between(
         _refuse_elsewhere(champions, f"--reevolved {order.reevolved}", order.target)
     if champions:
         _refuse_elsewhere(setting.controllers, f"--controllers {order.controllers}", order.sim)
-    with (
-        open_target(
-            order.sim,
-            setting.arena,
-            noise=noise_on(order.sim, order.noise),
-            key=2 * order.seed,
-            randomize=order.randomize,
-        ) as source,
-        open_target(
-            order.target,
-            setting.arena,
-            processes=order.processes,
-            witness=order.witness,
-            observer=observer,
-            pulse=pulse,
-            noise=noise_on(order.target, order.noise),
-            key=2 * order.seed + 1,
-        ) as costly,
-    ):
-        if costly.label == "REAL" and order.results is None and not isinstance(costly, RecordedTarget):
-            raise StudyError(
-                f"{setting.n_controllers * setting.trials} trials on {order.target} would not be saved. Name a file "
-                "for them (-o FILE.sqlite), so that the same command can resume."
-            )
+    n_trials = setting.n_controllers * setting.trials
+    with both_open(
+        order, setting.arena, n_trials, observer=observer, pulse=pulse, randomize=order.randomize
+    ) as (source, costly):
         gap = study_gap(
             source,
             costly,
@@ -174,6 +156,48 @@ def gap_between(
         tell_of("Switching parts of the model: 64 choices, each with draws from the posterior.")
         parts = why_gap(calibration, gap, steps=setting.steps, seed=order.seed)
     return GapBetween(gap, parts, order if task is None and arena is None else None)
+
+
+@contextlib.contextmanager
+def both_open(
+    order: GapOrder | EstimateOrder,
+    arena: Arena,
+    n_trials: int,
+    *,
+    observer: PortObserver | None,
+    pulse: Pulse | None,
+    randomize: Literal["no", "posterior"] = "no",
+) -> Iterator[tuple[Target, Target]]:
+    """Open the simulator and the target of an order; `n_trials` will be driven on the target.
+
+    Raises:
+        StudyError: Trials of a real robot would not be saved, or a platform cannot be opened.
+    """
+    with (
+        open_target(
+            order.sim,
+            arena,
+            noise=_noise_on(order.sim, order.noise),
+            key=2 * order.seed,
+            randomize=randomize,
+        ) as source,
+        open_target(
+            order.target,
+            arena,
+            processes=order.processes,
+            witness=order.witness,
+            observer=observer,
+            pulse=pulse,
+            noise=_noise_on(order.target, order.noise),
+            key=2 * order.seed + 1,
+        ) as target,
+    ):
+        if target.label == "REAL" and order.results is None and not isinstance(target, RecordedTarget):
+            raise StudyError(
+                f"{n_trials} trials on {order.target} would not be saved. Name a file for them (-o FILE.sqlite), so "
+                "that the same command can resume."
+            )
+        yield source, target
 
 
 @dataclass(frozen=True)
@@ -275,6 +299,6 @@ def _misspecified(calibration: Calibration | None) -> bool | None:
     return calibration.misspecified if calibration.kind == "all" else calibration.misspecified or None
 
 
-def noise_on(platform: str, noise: float | None) -> float:
+def _noise_on(platform: str, noise: float | None) -> float:
     """Return the noise level a of the paper on a platform, which has its own default."""
     return class_of(platform).default_noise if noise is None else noise

@@ -9,7 +9,7 @@ from realitygap._wording import counted, platform_in_words
 from realitygap.errors import StudyError
 from realitygap.gap import GapSide
 from realitygap.orders import EstimateOrder, takes_order
-from realitygap.platforms import RecordedPlatform, RecordedTarget, open_target, split_spec
+from realitygap.platforms import RecordedPlatform, RecordedTarget, split_spec
 from realitygap.stats import assisted_mean
 from realitygap.tasks import Task
 from realitygap.trials import PortObserver, Pulse, Target
@@ -20,7 +20,7 @@ from .._controllers import Controller, recorded_controllers, sample_controllers,
 from .._estimate_table import estimate_in_table
 from .._estimated import EstimatedScore
 from .._targets import check_task, open_trials, refuse_too_little
-from .between import Say, arena_of, noise_on
+from .between import Say, arena_of, both_open
 from .study import STEPS, TARGET_FROM, Tell, carry_out, plans_of, refuse_inputs, side_of
 from .why import calibration_of
 
@@ -57,24 +57,7 @@ def estimate_score(
     task = task_of(controllers) if order.task is None else task_named(order.task, allow_code=allow_code)
     arena, steps = _place(order, controllers)
     check_task(task, arena)
-    with (
-        open_target(order.sim, arena, noise=noise_on(order.sim, order.noise), key=2 * order.seed) as source,
-        open_target(
-            order.target,
-            arena,
-            processes=order.processes,
-            witness=order.witness,
-            observer=observer,
-            pulse=pulse,
-            noise=noise_on(order.target, order.noise),
-            key=2 * order.seed + 1,
-        ) as target,
-    ):
-        if target.label == "REAL" and order.results is None and not isinstance(target, RecordedTarget):
-            raise StudyError(
-                f"{n * order.trials} trials on {order.target} would not be saved. Name a file for them (-o "
-                "FILE.sqlite), so that the same command can resume."
-            )
+    with both_open(order, arena, n * order.trials, observer=observer, pulse=pulse) as (source, target):
         real = _tried(target, controllers[:n], order.trials, task, order, steps, tell)
         simulated = _tried(source, controllers, order.sim_trials, task, None, steps, tell)
     noise = None if real.trials < 2 else float(real.noise.mean())

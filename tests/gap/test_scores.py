@@ -375,3 +375,9 @@ def test_what_is_no_success_is_refused():
     others = [ScoreRow("", n, p, "", "", "", 0.0, 75, 3) for p in ("sim", "real") for n in "bcd"]
     match = refusal([*few, ScoreRow("", "a", "real", "", "", "", 0.0, 75, 3), *others], BINARY)
     assert "0.857 of 75 trials is no whole number of successes. The nearest share is 0.8533" in match
+
+
+def test_a_refusal_names_twelve_and_counts_the_others():
+    more = SIX | {f"d{k}": 0.5 for k in range(20)}
+    assert refusal(means(sim=more, real=SIX)).count(", d") == 11
+    assert "d11 and 8 more" in refusal(means(sim=more, real=SIX))

@@ -11,7 +11,6 @@ import numpy as np
 from realitygap._wording import (
     counted,
     gap_equivalence,
-    joined,
     methods_of_successes,
     rank_violation,
     ties_in_words,
@@ -381,9 +380,9 @@ def _by_controller(rows: Iterable[ScoreRow], platform: str) -> dict[str, list[Sc
 
 
 def _listed(names: Sequence[str]) -> str:
-    shown = list(names[:_MOST_NAMED])
-    more = len(names) - len(shown)
-    return joined([*shown, f"{more} more"] if more > 0 else shown)
+    more = len(names) - _MOST_NAMED
+    *shown, last = [*names[:_MOST_NAMED], *([f"{more} more"] if more > 0 else [])]
+    return f"{', '.join(shown)} and {last}" if shown else last
 
 
 # scores of one controller

@@ -1,0 +1,175 @@
+"""Point estimates by methods of others, from the trials with poses that our own fits have.
+
+Both minimize the error of whole trajectories: the commands of each trial are given to the simulated robot from the
+trial's start, without noise, and its poses and readings are compared with those observed. Neither fits noise, which has
+no place in such an error: it keeps the robot file's numbers. Each may simulate at most as many sets of numbers as our
+own fit with full effort.
+
+`cma-es`: Hansen (2016), as in the package cmaes, with its default population.
+`least-squares`: bounded least squares by trust regions (Branch, Coleman & Li 1999, in SciPy) from the robot file's
+numbers and three other starts, with differences for the derivatives, which is the method of mujoco.sysid.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy
+from cmaes import CMA
+from numpy.typing import NDArray
+
+from realitygap.calibration import numbers_of, ranges_of, scribbler_prior
+from realitygap.calibration._all_from_poses import own_places
+from realitygap.calibration._prior import MOTION_NOISE, values_at
+from realitygap.platforms import SimEnsemble, SimPlatform
+from realitygap.records import TrialRecord, write_whole
+from realitygap.world import Arena, Calibration, Fitted, RobotModel
+
+from .twin import TwinOfStudy
+
+Floats = NDArray[np.float64]
+MOST_SETS = 24_500
+"""Sets of numbers that a fit may simulate: our own fit, with full effort, has 7 rounds of 3,000, then 5,000."""
+
+EVERY = 5  # steps between compared poses
+POSITION_M, HEADING_RAD, READING = 0.05, 0.2, 0.3
+"""Errors that weigh the same."""
+
+STARTS = 4
+STEP = 0.02  # of a place, for derivatives: the simulation is in single precision and in steps
+NOISE = (*MOTION_NOISE, "range.drop_width", "range.burst", "range.noise_gain", "range.outlier_most")
+
+
+@dataclass(frozen=True)
+class TrajectoryError:
+    """The error of simulated trajectories, at places 0 to 1 between the ends of the prior of each fitted parameter."""
+
+    trials: Sequence[TrialRecord]
+    robot: RobotModel
+    arena: Arena
+    seed: int
+
+    @cached_property
+    def parameters(self) -> list:
+        """The fitted parameters."""
+        return [parameter for parameter in scribbler_prior(self.robot) if parameter.name not in NOISE]
+
+    @cached_property
+    def own(self) -> Floats:
+        """The places of the robot file's numbers, (p,)."""
+        return own_places(self.robot, self.parameters)
+
+    @cached_property
+    def _ensemble(self) -> SimEnsemble:
+        platform = SimPlatform(robot=self.robot, step_s=self.trials[0].step_s)
+        return SimEnsemble(platform, self.arena, ranges=ranges_of(scribbler_prior(self.robot), self.robot))
+
+    @cached_property
+    def _without_noise(self) -> dict[str, float]:
+        return {name: 0.0 for name in MOTION_NOISE if name in self.robot.centers()}
+
+    def numbers(self, places: Floats) -> dict[str, Floats]:
+        """Return the robot's numbers (m,) at places (m, p)."""
+        return numbers_of(self.parameters, values_at(self.parameters, np.atleast_2d(places)), self.robot)
+
+    def residuals(self, places: Floats) -> Floats:
+        """Return (m, d) scaled differences between simulated and observed trials, at places (m, p)."""
+        numbers = self.numbers(places)
+        m = len(np.atleast_2d(places))
+        numbers |= {name: np.full(m, value) for name, value in self._without_noise.items()}
+        found = self._ensemble.replay(
+            [trial.poses[0] for trial in self.trials],
+            [trial.commands for trial in self.trials],
+            numbers, self.seed, keep=("poses", "readings"), same_noise=True,
+        )  # fmt: skip
+        poses = np.stack([trial.poses for trial in self.trials])
+        readings = np.stack([trial.readings for trial in self.trials])
+        off = (found.poses - poses)[:, :, ::EVERY]
+        off[..., 2] = (off[..., 2] + np.pi) % (2 * np.pi) - np.pi
+        off /= [POSITION_M, POSITION_M, HEADING_RAD]
+        read = (found.readings[:, :, : readings.shape[1]] - readings)[:, :, ::EVERY] / READING
+        parts = [np.arctan(part).reshape(m, -1) for part in (off, read)]  # one lost trial must not decide
+        return np.concatenate([part / np.sqrt(part.shape[1]) for part in parts], axis=1)
+
+
+def by_cma_es(error: TrajectoryError) -> Floats:
+    """Return the best places, (p,)."""
+    p = len(error.own)
+    bounds = np.tile([0.0, 1.0], (p, 1))
+    search = CMA(mean=error.own, sigma=0.2, bounds=bounds, seed=error.seed % 2**31)
+    best, least, spent = error.own, np.inf, 0
+    while spent + search.population_size <= MOST_SETS and not search.should_stop():
+        asked = np.array([search.ask() for _ in range(search.population_size)])
+        costs = np.square(error.residuals(asked)).sum(axis=1)
+        spent += len(asked)
+        search.tell(list(zip(asked, costs.tolist(), strict=True)))
+        if costs.min() < least:
+            best, least = asked[costs.argmin()], float(costs.min())
+    return best
+
+
+def by_least_squares(error: TrajectoryError) -> Floats:
+    """Return the best places, (p,)."""
+    p = len(error.own)
+    rng = np.random.default_rng(error.seed)
+    starts = [error.own, *rng.uniform(0.1, 0.9, (STARTS - 1, p))]
+    most = MOST_SETS // (STARTS * (p + 1))
+
+    def jacobian(place: Floats) -> Floats:
+        step = np.where(place + STEP <= 1.0, STEP, -STEP)
+        found = error.residuals(np.vstack([place, place + np.diag(step)]))
+        return ((found[1:] - found[0]) / step[:, None]).T
+
+    fits = [
+        scipy.optimize.least_squares(
+            lambda place: error.residuals(place)[0], start, jac=jacobian, bounds=(0.0, 1.0), max_nfev=most,
+            xtol=1e-4, ftol=1e-4,
+        )
+        for start in np.clip(starts, 0.01, 0.99)
+    ]  # fmt: skip
+    return min(fits, key=lambda fit: fit.cost).x
+
+
+METHODS: dict[str, Callable[[TrajectoryError], Floats]] = {
+    "cma-es": by_cma_es,
+    "least-squares": by_least_squares,
+}
+
+
+def fit_outside(twin: TwinOfStudy, method: str) -> None:
+    """Write the calibration of a twin by a method."""
+    plan = twin.plan
+    with twin.open() as target:
+        trials = twin.calibrating(target, plan.budget)
+        error = TrajectoryError(
+            trials, twin.condition("coverage", "x").on.robot, target.arena, plan.seed_of(twin.twin, method)
+        )
+    place = METHODS[method](error)
+    values = {name: float(each[0]) for name, each in values_at(error.parameters, place[None]).items()}
+    write_outside(
+        twin, method, {name: float(each[0]) for name, each in error.numbers(place).items()}, {}, values
+    )
+
+
+def write_outside(
+    twin: TwinOfStudy, arm: str, numbers: dict[str, float], draws: dict[str, Floats], values: dict[str, float]
+) -> None:
+    """Write the calibration of an outside arm: the robot's numbers, draws if there are any, and the parameters."""
+    robot = twin.condition("coverage", "x").on.robot
+    priors = {parameter.name: parameter for parameter in scribbler_prior(robot)}
+    made = Calibration(
+        kind="all", robot=robot.name, target=f"twin:{twin.twin}", label="TWIN", observe="track",
+        trials=twin.plan.budget, date="", method=arm, numbers=numbers,
+        draws={name: tuple(map(float, each)) for name, each in draws.items()},
+        fitted=tuple(
+            Fitted(
+                name=name, estimate=value, low=value, high=value, identified=True, unit=priors[name].unit,
+                prior_low=priors[name].prior.lowest, prior_high=priors[name].prior.highest,
+            )
+            for name, value in values.items()
+        ),
+    )  # fmt: skip
+    write_whole(twin.fit_path(twin.plan.arm[arm]), made.to_toml().encode(), within=twin.folder)

@@ -1,0 +1,158 @@
+"""The study `closing-the-gap`: its seeds, what it resumes, and its analysis, on results whose truth is known."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from benchmarks.closing.analysis import (
+    Results,
+    analyze,
+    excess_violation,
+    pooled_fall,
+    primary,
+    stratified_mean,
+)
+from benchmarks.closing.plan import FAMILIES, Arm, Plan, Twin, Unit, small_plan
+from benchmarks.closing.twin import TwinOfStudy
+
+ARMS = tuple(Arm(name, "none") for name in ("plain", "prior", "cells", "track"))
+
+
+def plan_of(n=8, **changes):
+    """Return a plan with n twins of each family, whose goals are those of the study."""
+    plan = Plan(
+        digest="a", commit="b", twins=dict.fromkeys(FAMILIES, n), arms=ARMS,
+        tasks={"arms": (), "names": ()}, goals=small_plan().goals,
+    )  # fmt: skip
+    return replace(plan, **changes)
+
+
+def made_up(plan, gap, transfer=0.0, seed=0):
+    """Return results in which each arm's controllers score `gap[arm]` too much in simulation, times a random number."""
+    rng = np.random.default_rng(seed)
+    n, trials = plan.controllers, plan.trials
+    units = {}
+    for twin in plan.names():
+        truth = rng.uniform(0.2, 0.8, 2 * n)
+
+        def tried(means, trials=trials):
+            return (means[:, None] + rng.normal(0, 0.05, (len(means), trials))).tolist()
+
+        head = {"plan": plan.digest, "software": "1", "seconds": 1.0, "label": "TWIN"}
+        kinds = ["random"] * n + ["champion"] * n
+        units[twin, Unit("coverage", "judged")] = head | {
+            "kinds": kinds,
+            "scores": [tried(truth), tried(truth)],
+        }
+        for arm in plan.arms:
+            off = gap[arm.name] * rng.normal(1, 0.2, 2 * n)
+            better = transfer if arm.name in ("cells", "track") else 0.0
+            level = rng.normal(0.5, 0.02, plan.replicates) + better
+            champions = [
+                {"target": tried(np.array([one]))[0], "simulated": tried(np.array([one + gap[arm.name]]))[0]}
+                for one in level
+            ]
+            units[twin, Unit("coverage", arm.name)] = head | {
+                "scores": tried(truth + off), "champions": champions, "calibration": {"misspecified": False},
+            }  # fmt: skip
+    return Results(plan, units)
+
+
+def test_seeds_depend_on_the_commit_the_twin_and_the_purpose():
+    plan = plan_of()
+    seeds = {
+        which.seed_of(Twin(family, k), purpose)
+        for which in (plan, replace(plan, commit="c"))
+        for family in FAMILIES
+        for k in range(8)
+        for purpose in ("twin", "fit")
+    }
+    assert len(seeds) == 2 * 4 * 8 * 2
+    assert plan.seed_of(Twin("worn", 3), "twin") == 1_886_636_496  # the same on each machine
+
+
+def test_all_goals_are_met_by_a_calibration_that_closes_the_gap():
+    gap = {"plain": 0.2, "prior": 0.2, "cells": 0.05, "track": 0.02}
+    rows = primary(made_up(plan_of(), gap, transfer=0.1))
+    assert [row["verdict"] for row in rows] == ["met"] * 8
+    falls = [row["figure"] for row in rows if row["goal"].startswith("P3")]
+    assert np.allclose(falls, [0.75, 0.9], atol=0.05)
+
+
+def test_no_goal_is_met_by_a_calibration_that_changes_nothing():
+    rows = primary(made_up(plan_of(), dict.fromkeys(("plain", "prior", "cells", "track"), 0.2)))
+    verdicts = {row["goal"][:2]: row["verdict"] for row in rows}
+    assert verdicts == {"P1": "open", "P2": "open", "P3": "missed", "P4": "missed"}
+
+
+def test_intervals_of_the_stratified_mean_cover_as_often_as_they_say():
+    """2,000 studies of 8 normal values in each of 4 families; by chance alone 94.0 to 96.0 % in 96 of 100 seeds."""
+    rng = np.random.default_rng(1)
+    families = [name for name in FAMILIES for _ in range(8)]
+    centers = np.repeat([0.0, 1.0, 2.0, 5.0], 8)
+    found = [stratified_mean(rng.normal(centers, 1.0), families).ends for _ in range(2000)]
+    assert 0.94 < np.mean([low <= 2.0 <= high for low, high in found]) < 0.96
+
+
+def test_the_pooled_fall_is_that_of_both_root_mean_squares():
+    before, after = [0.04, 0.01, 0.04, 0.01], [0.01, 0.0025, 0.01, 0.0025]
+    found, _ = pooled_fall(before, after, ["a", "a", "b", "b"], 0.4)
+    assert found.value == pytest.approx(0.5)
+
+
+def test_a_limit_at_the_truth_is_refuted_about_as_often_as_the_level_says():
+    """200 studies of 32 twins; more than 24 below 5 % occur in 1 of 10,000 seeds at a level of 5 %."""
+    rng = np.random.default_rng(2)
+    families = [name for name in FAMILIES for _ in range(8)]
+    n_refuted = 0
+    for _ in range(200):
+        before = rng.gamma(4.0, 0.01, 32)
+        after = before / 4 * rng.gamma(20.0, 1 / 20, 32)  # half of the root mean square
+        n_refuted += pooled_fall(before, after, families, 0.5)[1] < 0.05
+    assert n_refuted <= 24
+
+
+def test_a_perfect_simulator_has_no_excess_of_rank_violations():
+    """The mean over 32 twins; its standard error is about 0.002."""
+    results = made_up(plan_of(), dict.fromkeys(("plain", "prior", "cells", "track"), 0.0), seed=3)
+    excess = [excess_violation(results, twin, "track") for twin in results.twins()]
+    assert abs(np.mean(excess)) < 0.01
+
+
+def test_results_of_another_plan_are_refused(tmp_path):
+    plan = plan_of(1)
+    (tmp_path / "units").mkdir()
+    for (twin, unit), result in made_up(plan, dict.fromkeys(plan.arm, 0.1)).units.items():
+        (tmp_path / "units" / f"{twin}-{unit}.json").write_text(json.dumps(result))
+    analyze(plan, tmp_path, tmp_path / "out")
+    assert (tmp_path / "out" / "scores.parquet").exists()
+    with pytest.raises(SystemExit, match="another plan"):
+        analyze(replace(plan, digest="changed"), tmp_path, tmp_path / "other")
+
+
+@pytest.mark.slow
+def test_a_twin_is_taken_up_where_it_was_left(tmp_path):
+    few = {"controllers": 2, "trials": 2, "replicates": 1, "runs": 2, "repeats": 1, "fresh_trials": 2}
+    arms = (Arm("plain", "none"), Arm("prior", "prior", evolves=False), Arm("path", "path", evolves=False))
+    outside = Arm("npe", "outside")
+    plan = replace(small_plan(), **few, twins={"same": 1}, budget=4, arms=(*arms, outside), fresh_simulated=2)
+    for part in ("twins", "units", "fits", "trials"):
+        (tmp_path / part).mkdir()
+    twin = TwinOfStudy(plan, Twin("same", 0), tmp_path)
+    assert [unit.what for unit in twin.missing] == [
+        "judged",
+        "plain",
+        "prior",
+        "path",
+    ]  # no fit of the other yet
+    twin.carry_out()
+    assert twin.missing == []
+    scores = {path.name: path.read_bytes() for path in (tmp_path / "units").iterdir()}
+    removed = tmp_path / "units" / "same-0-coverage-path.json"
+    removed.unlink()
+    twin.carry_out()
+    again = {path.name: path.read_bytes() for path in (tmp_path / "units").iterdir()}
+    assert again.keys() == scores.keys()
+    for name, before in scores.items():
+        assert json.loads(again[name])["scores"] == json.loads(before)["scores"]

@@ -15,7 +15,9 @@ from __future__ import annotations
 import argparse
 import csv
 import math
+import multiprocessing
 from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import NamedTuple
 
@@ -297,6 +299,7 @@ def truths(setting: Setting, rng: np.random.Generator) -> dict[str, float]:
         "mmrv": float(np.mean([violation(source[None], target[None]) for source, target in studies])),
         "mmrv_floor": float(np.mean(floors)),
         "energy_ends": 2 * apart - within - also_within,
+        "spread": float((sides[1] - sides[0]).std()),
         "equivalence": level,
     }
 
@@ -307,29 +310,38 @@ def coverage(studies: int) -> Iterator[list[str]]:
         "controllers", "trials in simulation", "on the target", "level", "spread", "differences", "measure", "truth",
         "refused [%]", "holds the truth [%]", "upper end misses [%]", "lower end misses [%]",
     ]  # fmt: skip
-    for number, setting in enumerate(COVERED):
-        rng = np.random.default_rng([19, number])
-        true = truths(setting, rng)
-        found: dict[str, list[Ends]] = {name: [] for name in true}
-        for _ in range(studies):
-            ends = ends_of(setting, setting.controllers, setting[1:3], rng)
-            sides = [
-                GapSide(name, "SIM", values, ends=places)
-                for name, values, places in zip(("sim", "target"), study(setting, rng), ends, strict=True)
-            ]
-            result = measure_gap(*sides, margin=0.05, resamples=COVERED_RESAMPLES)
-            for name, kept in found.items():
-                if (interval := getattr(result, name).ends) is not None:
-                    kept.append(interval)
-        head = [str(each) for each in setting[:3]] + [f"{each:g}" for each in setting[3:5]] + [setting.shape]
+    with ProcessPoolExecutor(mp_context=multiprocessing.get_context("spawn")) as pool:
+        for rows in pool.map(coverage_of, range(len(COVERED)), [studies] * len(COVERED)):
+            yield from rows
+
+
+def coverage_of(number: int, studies: int) -> list[list[str]]:
+    """Return the rows of a design."""
+    setting = COVERED[number]
+    rng = np.random.default_rng([19, number])
+    true = truths(setting, rng)
+    found: dict[str, list[Ends]] = {name: [] for name in true}
+    for _ in range(studies):
+        ends = ends_of(setting, setting.controllers, setting[1:3], rng)
+        sides = [
+            GapSide(name, "SIM", values, ends=places)
+            for name, values, places in zip(("sim", "target"), study(setting, rng), ends, strict=True)
+        ]
+        result = measure_gap(*sides, margin=0.05, resamples=COVERED_RESAMPLES)
         for name, kept in found.items():
-            row = [*head, name, f"{true[name]:.3f}", f"{100 * (1 - len(kept) / studies):.1f}"]
-            if not kept:
-                yield [*row, "", "", ""]
-                continue
-            low, high = np.array(kept).T
-            below, above = float((high < true[name] - 1e-9).mean()), float((low > true[name] + 1e-9).mean())
-            yield [*row, *(f"{100 * share:.1f}" for share in (1 - below - above, below, above))]
+            if (interval := getattr(result, name).ends) is not None:
+                kept.append(interval)
+    head = [str(each) for each in setting[:3]] + [f"{each:g}" for each in setting[3:5]] + [setting.shape]
+    rows = []
+    for name, kept in found.items():
+        row = [*head, name, f"{true[name]:.3f}", f"{100 * (1 - len(kept) / studies):.1f}"]
+        if not kept:
+            rows.append([*row, "", "", ""])
+            continue
+        low, high = np.array(kept).T
+        below, above = float((high < true[name] - 1e-9).mean()), float((low > true[name] + 1e-9).mean())
+        rows.append([*row, *(f"{100 * share:.1f}" for share in (1 - below - above, below, above))])
+    return rows
 
 
 def main() -> None:

@@ -128,3 +128,25 @@ def test_four_controllers_have_a_verdict_without_an_interval():
     assert found.verdict == (
         "Too few controllers to judge the level of coverage. Too few controllers to judge the ranking."
     )
+
+
+def test_the_spread_of_gaps_and_the_expected_gap_of_each_controller():
+    """The interval of the standard deviation, 0.1, misses in 1 of 20 seeds."""
+    one, other = sides(c=60, r=4, gap=-0.1, spread=0.1, seed=2)
+    found = measure_gap(one, other)
+    assert found.spread.low < 0.1 < found.spread.high
+    expected = np.array([each.value for each in found.each])
+    observed = other.means - one.means
+    assert np.ptp(expected) < np.ptp(observed)
+    assert (np.sign(expected - observed) == np.sign(found.level.value - observed)).mean() > 0.9
+    assert all(0 <= each.more["p"] <= 1 for each in found.each)
+
+
+def test_controllers_with_one_gap_have_no_spread_and_single_trials_no_model():
+    """The lower end is above 0 in 1 of 40 seeds."""
+    alike = measure_gap(*sides(c=20, gap=-0.1, seed=2))
+    assert alike.spread.low == 0.0
+    single = measure_gap(*sides(r=1))
+    assert single.spread.value is None
+    assert "Drive at least 2" in single.spread.refused
+    assert single.each == ()

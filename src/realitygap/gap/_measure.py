@@ -5,8 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
+import scipy
+from numpy.typing import NDArray
 
 from realitygap._wording import counted
 from realitygap.stats import (
@@ -16,11 +19,14 @@ from realitygap.stats import (
     Ends,
     Estimate,
     Method,
+    RandomEffects,
     exact_share_interval,
+    holm,
     mean_interval,
     pearson,
     percentile_interval,
     prove_equivalence,
+    random_effects,
     range_of_differences,
     resampled_means,
     spearman,
@@ -130,6 +136,8 @@ def measure_gap(
         ),
         energy_ends=work.energy(source.ends, target.ends, "where trials end (observe track)"),
         equivalence=work.equivalence(margin),
+        spread=work.spread(),
+        each=work.each(),
         misspecified=misspecified,
         most_trials=(int(source.counts.max()), int(target.counts.max())),
         words=(source.in_words, target.in_words),
@@ -235,6 +243,41 @@ class _Work:
         resampled = resampled_means(squares, self.n_resamples, self.rng.spawn(1)[0])
         differences = self.target.means - self.source.means
         return self._with_ends(value, rms_interval(differences, squares, resampled, most=self.differences[1]))
+
+    @cached_property
+    def _model(self) -> RandomEffects | Estimate:
+        """The hierarchical model of controllers and trials, or why there is none."""
+        if why := self._without_trials("noise and spread cannot be separated"):
+            return Estimate.refusal(self.n, why)
+        differences = self.target.means - self.source.means
+        return random_effects(differences, self._noise(), self.differences, noun="controllers")
+
+    def _noise(self) -> Values:
+        """Return the variance of each controller's difference of means by the trials of all, (c,).
+
+        A few trials hardly tell the variance of one controller.
+        """
+        if self.paired:
+            return _pooled_noise(self.target.values - self.source.values, self.source.counts)
+        return sum(
+            (_pooled_noise(side.values, side.counts) for side in (self.source, self.target)), np.zeros(self.n)
+        )
+
+    def spread(self) -> Estimate:
+        return self._model if isinstance(self._model, Estimate) else self._model.spread
+
+    def each(self) -> tuple[Estimate, ...]:
+        """Return the expected difference of each controller, and p of no difference by its own trials."""
+        if isinstance(self._model, Estimate):
+            return ()
+        z = (self.target.means - self.source.means) / np.sqrt(self._noise())
+        freedom = int((self.target.counts - 1).sum()) + (
+            0 if self.paired else int((self.source.counts - 1).sum())
+        )
+        corrected = holm(2 * scipy.special.stdtr(freedom, -np.abs(z)))
+        return tuple(
+            replace(one, more={"p": p}) for one, p in zip(self._model.each, corrected.tolist(), strict=True)
+        )
 
     def a12(self) -> Estimate:
         if self.source.are_means or self.target.are_means:
@@ -432,6 +475,12 @@ def _too_few(n: int, margin: float, power: float, needed: int | None) -> str:
 
 def _within_one(value: float) -> float:
     return max(-1.0, min(1.0, value))
+
+
+def _pooled_noise(values: Values, counts: NDArray[np.int64]) -> Values:
+    """Return the variance of the mean of each controller's trials by the scatter of the trials of all, (c,)."""
+    squares = np.nansum((values - trial_means(values)[:, None]) ** 2)
+    return np.asarray(squares / max(1, int((counts - 1).sum())) / counts)
 
 
 def _srcc(source: Values, target: Values) -> Values:

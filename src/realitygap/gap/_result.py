@@ -59,6 +59,12 @@ SHOWN: tuple[Measure, ...] = (
         "mean difference in {score}, target minus simulator",
     ),
     Measure(
+        "spread",
+        "  spread over controllers",
+        "Spread",
+        "standard deviation over controllers of the true difference in {score}: 0 if one number corrects all of them",
+    ),
+    Measure(
         "a12",
         "A12: target above simulator",
         "A₁₂",
@@ -122,7 +128,7 @@ SHOWN: tuple[Measure, ...] = (
 )
 """All measures of a gap, in the order of tables."""
 
-_LATE = ("a12", "energy_ends", "raw_rms", "pearson", "mean_violation")  # after the others in JSON
+_LATE = ("a12", "energy_ends", "raw_rms", "pearson", "mean_violation", "spread")  # after the others in JSON
 
 MEASURES = tuple(each.name for each in SHOWN if each.name not in _LATE)
 """Names of the measures that come first in JSON, each with estimate, low, high, and n."""
@@ -142,6 +148,9 @@ class GapResult(ShownAsCard):
         rms: Root mean square over controllers of the difference of means, the variance of noise taken out.
         raw_rms: The same with the noise.
         level: Mean over controllers of the difference of means.
+        spread: Standard deviation over controllers of the true difference, without noise.
+        each: Expected difference of each controller: its own, drawn toward those of all by as much as its trials are
+            noisy; `more` has p of no difference, corrected over controllers. Empty if `spread` is refused.
         a12: Probability that a trial on the target is above one of the same controller in simulation.
         srcc: Spearman's correlation of means over controllers.
         pearson: Pearson's correlation of means over controllers.
@@ -183,6 +192,8 @@ class GapResult(ShownAsCard):
     energy: Estimate
     equivalence: Estimate
     energy_ends: Estimate
+    spread: Estimate
+    each: tuple[Estimate, ...] = ()
     misspecified: bool | None = None
     luck: Estimate = field(default_factory=lambda: Estimate.refusal(0, "No controller was selected."))
     reevolved: Estimate = field(default_factory=lambda: Estimate.refusal(0, "Nothing was evolved apart."))

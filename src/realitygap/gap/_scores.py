@@ -146,6 +146,11 @@ class ScoreGap:
         found = [*(each.refused for each in of), *self.remarks]
         return [text for text in dict.fromkeys(found) if text]
 
+    @property
+    def expected(self) -> tuple[Estimate | None, ...]:
+        """The expected difference of each controller; None without a model of controllers and trials."""
+        return self.result.each or (None,) * len(self.controllers)
+
     def to_dict(self) -> dict[str, Any]:
         """Return plain values: the measures, the worst pair by name, and the mean scores of each controller."""
         worst = None
@@ -154,7 +159,7 @@ class ScoreGap:
             names = (self.controllers[better].name, self.controllers[worse].name)
             worst = {"better": names[0], "worse": names[1], "violation": violation}
         estimates = (self.source.estimates, self.target.estimates, self.differences)
-        rows = zip(self.controllers, *estimates, strict=True)
+        rows = zip(self.controllers, *estimates, self.expected, strict=True)
         return (
             {"task": self.task}
             | self.result.to_dict()
@@ -168,8 +173,9 @@ class ScoreGap:
                         "sim": sim.to_dict(),
                         "real": real.to_dict(),
                         "difference": apart.to_dict(),
+                        "expected": None if expected is None else expected.to_dict(),
                     }
-                    for each, sim, real, apart in rows
+                    for each, sim, real, apart, expected in rows
                 ],
             }
         )

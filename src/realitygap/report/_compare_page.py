@@ -13,7 +13,14 @@ from realitygap._wording import bracketed, counted, number, p_in_words, signed, 
 from realitygap.gap import SHOWN, ScoreGap
 from realitygap.records import write_whole
 from realitygap.report._gap_figures import draw_gap_differences, draw_gap_pairs
-from realitygap.report._gap_page import measure_row, measures_table, refuse_gap_page
+from realitygap.report._gap_page import (
+    about_expected,
+    expected_cells,
+    expected_columns,
+    measure_row,
+    measures_table,
+    refuse_gap_page,
+)
 from realitygap.report._page import LABELS
 from realitygap.report._placed import FigureOnPage, hover_content, number_figures
 from realitygap.report._table import Column, Part, Row, TableOnPage
@@ -115,7 +122,7 @@ def _controllers_table(gap: ScoreGap, k: int) -> TableOnPage:
     has_p = any("p" in each.more for each in gap.differences)
     rows: list[Row] = []
     estimates = (gap.source.estimates, gap.target.estimates, gap.differences)
-    for controller, sim, real, difference in zip(gap.controllers, *estimates, strict=True):
+    for row, (controller, sim, real, difference) in enumerate(zip(gap.controllers, *estimates, strict=True)):
         p = difference.more.get("p")
         rows.append(
             (
@@ -123,6 +130,7 @@ def _controllers_table(gap: ScoreGap, k: int) -> TableOnPage:
                 *(cell for mean in (sim, real) for cell in (with_interval(mean), str(mean.n or "–"))),
                 f"{signed(float(difference))} {bracketed(difference, signs=True)}".rstrip(),
                 *([""] if has_p and p is None else [p_in_words(p)] if p is not None else []),
+                *expected_cells(gap.result, row, with_p=not has_p),
             )
         )
     columns = (
@@ -130,9 +138,11 @@ def _controllers_table(gap: ScoreGap, k: int) -> TableOnPage:
         *(column for side in sides for column in (Column(f"{side.label} {side.in_words}"), Column("n"))),
         Column("difference"),
         *([Column("p")] if has_p else []),
+        *expected_columns(gap.result, with_p=not has_p),
     )
     has_ends = any(each.ends is not None for each in gap.differences)
     caption = f"Mean {gap.result.score} of each controller, and the difference{' with its 95 % interval' * has_ends}."
+    caption += about_expected(gap.result, with_p=not has_p)
     return TableOnPage(f"controllers-{k}", caption, columns, (Part(rows),), kind="numbers")
 
 

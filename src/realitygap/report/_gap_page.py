@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from realitygap._version import __version__
-from realitygap._wording import bracketed, p_equation, platform_in_words, reproduces
+from realitygap._wording import bracketed, p_equation, p_in_words, platform_in_words, reproduces, signed
 from realitygap.errors import RecordError
 from realitygap.gap import SHOWN, GapResult
 from realitygap.records import is_special, refuse_results, write_whole
@@ -262,12 +262,47 @@ def measures_table(name: str, caption: str, rows: Sequence[Row]) -> TableOnPage:
 
 
 def _controllers_table(gap: GapBetween) -> TableOnPage:
-    study = gap.study
+    study, result = gap.study, gap.study.result
     sides = (study.source, study.target)
-    rows = [
-        (controller.name, *(f"{side.means[k]:.3f}" for side in sides))
+    rows: list[Row] = [
+        (
+            controller.name,
+            *(f"{side.means[k]:.3f}" for side in sides),
+            *expected_cells(result, k),
+        )
         for k, controller in enumerate(study.controllers)
     ]
-    columns = (Column("Controller"), *(Column(f"{side.label} {side.name}") for side in sides))
-    caption = f"Mean {study.result.score} of each controller."
+    columns = (
+        Column("Controller"),
+        *(Column(f"{side.label} {side.name}") for side in sides),
+        *expected_columns(result),
+    )
+    caption = f"Mean {result.score} of each controller.{about_expected(result)}"
     return TableOnPage("controllers", caption, columns, (Part(rows),), kind="numbers")
+
+
+def expected_columns(result: GapResult, *, with_p: bool = True) -> tuple[Column, ...]:
+    """Return the columns of the expected difference of each controller; none without a model."""
+    columns = (Column("expected difference"), *([Column("p")] if with_p else []))
+    return columns if result.each else ()
+
+
+def expected_cells(result: GapResult, k: int, *, with_p: bool = True) -> tuple[str, ...]:
+    """Return the expected difference of controller k, and its p."""
+    if not result.each:
+        return ()
+    one = result.each[k]
+    p = [p_in_words(float(one.more["p"] or 0.0))] if with_p else []
+    return f"{signed(float(one))} {bracketed(one, signs=True)}", *p
+
+
+def about_expected(result: GapResult, *, with_p: bool = True) -> str:
+    """Return the meaning of these columns for the caption; empty without them."""
+    if not result.each:
+        return ""
+    return (
+        " The expected difference, target minus simulator, is the controller’s own, drawn toward that of all "
+        "controllers by as much as its trials are noisy (hierarchical model)."
+        + " p is of no difference, corrected over all controllers (Holm)."
+        * with_p
+    )

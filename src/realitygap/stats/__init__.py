@@ -8,6 +8,7 @@ from ._assisted import FEW_UNITS, Assisted, assisted_mean, least_correlation
 from ._correlation import pearson, rank_correlation, spearman
 from ._equivalence import prove_equivalence
 from ._estimate import CONFIDENCE, Ends, Estimate, Method
+from ._hierarchical import SMALLEST_GROUPS, RandomEffects, random_effects
 from ._means import (
     SMALLEST_N,
     Range,
@@ -109,6 +110,10 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     "Assisted",
     "least_correlation",
     "FEW_UNITS",
+    # values with noise of their own: a hierarchical model
+    "random_effects",
+    "RandomEffects",
+    "SMALLEST_GROUPS",
     # medians
     "median_interval",
     "interval_ranks",

@@ -17,8 +17,8 @@ CONFIDENCE = 0.95
 """Level of all intervals except those of equivalence, which have 90 % because its test has two sides of 5 %."""
 
 Method = Literal[
-    "", "BCa", "Clopper-Pearson", "Fisher z", "Newcombe", "Tango", "Wilson", "betting", "percentiles", "ranks",
-    "regression", "sign-symmetric", "t",
+    "", "BCa", "Clopper-Pearson", "Fisher z", "Newcombe", "Tango", "Wilson", "betting", "empirical Bayes",
+    "percentiles", "profile", "ranks", "regression", "sign-symmetric", "t",
 ]  # fmt: skip
 """How an interval is made: `BCa` and `percentiles`, bootstraps; `ranks`, two observed values; `betting` and
 `sign-symmetric`, valid at any of all looks; the others, formulas."""

@@ -616,6 +616,31 @@ def pairs_forecast(forecast: Forecast | None, n: int, unit: str, fewest: int, ma
     return f"Forecast, if later {unit}s are like these: about {forecast.more:,} more ({limit})."
 
 
+BLIND_NOTE = (
+    "The design is blind: no results by arm are shown. `realitygap trials unblind` shows them, and logs it."
+)
+"""Note on a comparison whose design is blind."""
+
+
+def blind_look(n: int, maximum: int | None, unit: str, *, has_ended: bool) -> str:
+    """Return whether a blind comparison continues, as sentences without a result.
+
+    Args:
+        n: Number of complete pairs.
+        maximum: Number of pairs in the locked design.
+        unit: Noun for a pair.
+        has_ended: True if the locked rule ends it.
+    """
+    of = "" if maximum is None else f" of at most {maximum:,}"
+    state = "Stop: the planned end is reached." if has_ended else "Continue."
+    return f"{counted(n, unit)}{of} complete. {state}"
+
+
+def deviations_sentence(deviations: Sequence[str]) -> str:
+    """Return the deviations from a locked plan, as sentences."""
+    return f"Deviations from the locked plan: {' '.join(deviations) or 'none.'}"
+
+
 def distribution_caveat(null: Null) -> str:
     """Return the limit of a sequential test, as sentences: which hypothesis it refutes."""
     if null == "mean":

@@ -57,7 +57,7 @@ WITH = {
     "transfer": {},
     "try": {
         name: {"against": "other.json", "trials": 40, "out": "pairs.sqlite"}
-        for name in ("against", "margin", "null")
+        for name in ("against", "margin", "null", "blind")
     },
 }
 """Values that a field needs with it."""

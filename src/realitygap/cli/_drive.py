@@ -12,6 +12,7 @@ from realitygap._terminal import echo
 from realitygap.robot_families import ports_by_family
 
 from ._code import AllowTasks, code_permission
+from ._designs import print_deviations
 from ._observer import Camera, operated_under_camera
 from ._options import Json, OpenPage, Replicates, StudyFolder, StudySeed, who_option
 from ._progress import resumable
@@ -63,6 +64,13 @@ def drive(
         bool, typer.Option("--despite-preflight", help="Drive even if the pre-flight check fails.")
     ] = False,
     who: Annotated[str | None, who_option()] = None,
+    lock: Annotated[
+        bool,
+        typer.Option(
+            "--lock",
+            help="Lock the design before trial 1. `trials show` and the report list deviations from it.",
+        ),
+    ] = False,
     allow_code: AllowTasks = False,
     as_json: Json = False,
     open_page: OpenPage = False,
@@ -87,9 +95,11 @@ def drive(
     operator = choose_operator(port, witness, answers, path, quiet=as_json)
     with resumable("Scored trials are saved."), operated_under_camera(camera, resolved, operator) as looking:
         result = realitygap.study.drive_study(
-            resolved, port, path, operator=looking, allow_code=code_permission(allow_code)
+            resolved, port, path, operator=looking, allow_code=code_permission(allow_code), lock=lock
         )
     print_result(result, as_json=as_json)
+    if not as_json:
+        print_deviations(path)
     is_compared = len(realitygap.study.physical_conditions(resolved)) > 1
     if is_compared and not as_json and not resolved.trials.blind:
         echo(f"Looks after each run: {realitygap.study.advise(path).summary}")

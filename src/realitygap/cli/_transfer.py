@@ -11,6 +11,7 @@ from realitygap._wording import number, with_interval
 from realitygap.orders import ClosingOrder, TransferOrder, TryOrder
 
 from ._code import AllowPlatforms
+from ._designs import deviations_of, print_deviations
 from ._observer import attending_observer
 from ._options import Json, ShowPage, print_json
 from ._order import command_of
@@ -34,12 +35,14 @@ def try_genome(order: TryOrder, allow_code: AllowPlatforms = False, as_json: Jso
     mean = statistics.fmean(coverage)
     if as_json:
         about = {"target": tried.target, "label": tried.label, "n_cells": tried.n_cells}
+        about |= deviations_of(order.out)
         print_json(about | {"mean": mean, "coverage": coverage, "order": order.record()})
         return
     echo(
         f"{tried.target} ({tried.label}): {len(coverage)} trial{'s' if len(coverage) > 1 else ''}, mean coverage "
         f"{mean:.3f} of {tried.n_cells} cells: {' '.join(f'{value:.3f}' for value in coverage)}"
     )
+    print_deviations(order.out)
 
 
 def _try_pairs(order: TryOrder, observer: PortObserver | None, *, as_json: bool) -> None:
@@ -49,11 +52,15 @@ def _try_pairs(order: TryOrder, observer: PortObserver | None, *, as_json: bool)
         )
     if as_json:
         about = {"target": tried.target, "label": tried.label, "file": tried.file}
-        print_json(about | tried.advice.to_dict() | {"order": order.record()})
+        design = {} if tried.design is None else {"design": tried.design.to_dict()}
+        print_json(about | tried.advice.to_dict() | design | {"order": order.record()})
         return
     echo(f"{tried.target} ({tried.label}), {tried.advice.score}, in {tried.file}")
     for sentence in tried.advice.sentences:
         echo(sentence)
+    if tried.design is not None:
+        echo(tried.design.line)
+        echo(f"SHA-256 of the locked design: {tried.design.design.sha256}")
 
 
 @command_of(TransferOrder)
@@ -69,9 +76,11 @@ def transfer(order: TransferOrder, allow_code: AllowPlatforms = False, as_json: 
     folder = order.folder
     if as_json:
         about = {"score": result.score, "folder": folder, "champions_folder": folder / "champions"}
+        about |= deviations_of(folder)
         print_json(result.to_dict() | about | {"order": order.record()})
         return
     _print(result)
+    print_deviations(folder)
     echo(f"Results: {folder}   champions: {folder / 'champions'}")
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import getpass
 import math
 import sys
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -17,6 +17,7 @@ from realitygap._terminal import echo
 from realitygap._wording import counted
 from realitygap.errors import LedgerError, StudyError, did_you_mean
 
+from ._designs import deviations_of, print_deviations
 from ._export import write_trials
 from ._grid_editor import pick_cells
 from ._options import (
@@ -32,22 +33,25 @@ from ._tables import wide_console
 if TYPE_CHECKING:
     from realitygap.records import Ledger, ScoreRole, Trial
     from realitygap.stats import Null
+    from realitygap.study import DesignReport
     from realitygap.world import Arena
 
-_WHAT = ("list", "show", "score", "undo", "void", "note", "export", "agreement", "advise")
+_WHAT = ("list", "show", "score", "undo", "void", "note", "export", "agreement", "advise", "amend", "unblind")
 _READING = ("list", "show", "export", "agreement")
 _PRINTING = ("list", "show", "agreement", "advise")
 """Actions that change nothing."""
 
 
 _ONLY_SCORE = "Only for score"
+_ONLY_DESIGNS = "Only for amend and unblind"
 
 
 def trials(
     what: Annotated[
         str,
         typer.Argument(
-            metavar="WHAT", help="Action: list, show, score, undo, void, note, export, agreement or advise."
+            metavar="WHAT",
+            help="Action: list, show, score, undo, void, note, export, agreement, advise, amend or unblind.",
         ),
     ],
     source: Annotated[
@@ -124,6 +128,19 @@ def trials(
             rich_help_panel="Only for export",
         ),
     ] = None,
+    reason: Annotated[
+        str | None,
+        typer.Option(metavar="TEXT", help="Reason for the change.", rich_help_panel=_ONLY_DESIGNS),
+    ] = None,
+    settings: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            metavar="NAME=VALUE",
+            help="New value of a setting of the design, such as trials=60. Repeatable.",
+            rich_help_panel=_ONLY_DESIGNS,
+        ),
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """List, show, score, annotate, and export trials.
@@ -162,6 +179,12 @@ def trials(
 
     Example: realitygap trials advise pairs.sqlite --margin 0.05
 
+    Example: realitygap trials show pairs.sqlite
+
+    Example: realitygap trials amend pairs.sqlite --set trials=60 --reason "scores vary more than planned"
+
+    Example: realitygap trials unblind pairs.sqlite --reason "all pairs are complete"
+
     In Python: realitygap.records.Ledger.open("results/paper-robot/ledger.sqlite").trials()
     """
     if what not in _WHAT:
@@ -181,8 +204,23 @@ def trials(
     _check_format(what, format, success_from, task)
     if what != "advise" and (margin is not None or null is not None):
         raise StudyError(f"--margin and --null are only for advise, not for {what}. Leave them out.")
+    is_change = what in ("amend", "unblind")
+    if not is_change and (reason is not None or settings):
+        raise StudyError(
+            f"--reason and --set are only for amend and unblind, not for {what}. Leave them out."
+        )
+    if is_change and trial is not None:
+        raise StudyError(f"{what} is about a whole design. Leave the trial {trial} out.")
+    if what == "unblind" and settings:
+        raise StudyError("--set is only for amend. Leave it out.")
     if what == "advise":
         _advise(source, margin, null, as_json=as_json)
+        return
+    if is_change:
+        _change_design(what, source, _needed(reason, "--reason"), settings or [], who)
+        return
+    if what == "show" and trial is None and (report := realitygap.study.design_report(source)) is not None:
+        _show_design(report, as_json=as_json)
         return
     name = who or getpass.getuser()
     with realitygap.records.open_ledger(source, writable=what not in _READING) as opened:
@@ -435,7 +473,10 @@ def _show(opened: Ledger, number: int, *, as_json: bool) -> None:
         facts = {
             name: None if is_hidden and name in _BLINDED else value for name, value in vars(trial).items()
         }
-        print_json({**facts, "record": realitygap.records.trial_to_dict(record), "notes": notes})
+        recorded = realitygap.records.trial_to_dict(record)
+        if trial.arm:  # of a blind design
+            recorded |= {"genome": "", "number": None}
+        print_json({**facts, "record": recorded, "notes": notes})
         return
     cells = "not counted" if trial.cells is None else ", ".join(map(str, trial.cells)) or "none"
     lines = {
@@ -474,9 +515,34 @@ def _advise(source: Path, margin: float | None, null: str | None, *, as_json: bo
         raise StudyError(f"--null is {null!r}, expected distribution or mean.")
     advice = realitygap.study.advise(source, margin=margin, null=hypothesis)
     if as_json:
-        print_json(advice.to_dict())
+        print_json(advice.to_dict() | deviations_of(source))
         return
     for sentence in advice.sentences:
+        echo(sentence)
+    print_deviations(source)
+
+
+def _change_design(what: str, source: Path, reason: str, settings: Sequence[str], who: str | None) -> None:
+    if what == "unblind":
+        realitygap.study.unblind_design(source, reason, who=who)
+        echo("Unblinded. The results are shown by arm from now on.")
+    else:
+        pairs = [each.partition("=") for each in settings]
+        for name, equals, _ in pairs:
+            if not equals:
+                raise StudyError(f"--set is {name!r}, expected NAME=VALUE, such as trials=60.")
+        changes = {name: value for name, _, value in pairs}
+        design = realitygap.study.amend_design(source, reason, changes, who=who)
+        echo(f"Amended. The new hash is {design.events[-1].details['sha256']}.")
+    if (report := realitygap.study.design_report(source)) is not None:
+        _show_design(report, as_json=False)
+
+
+def _show_design(report: DesignReport, *, as_json: bool) -> None:
+    if as_json:
+        print_json(report.to_dict())
+        return
+    for sentence in report.sentences:
         echo(sentence)
 
 

@@ -272,7 +272,8 @@ def measure(channel: Channel, work: GapWork) -> None:
         )
         channel.say(GapDone())
         return
-    for trials in rounds(order.trials):
+    # a locked design has one number of trials
+    for trials in (order.trials,) if order.lock or order.blind else rounds(order.trials):
         gap = gap_between(order.model_copy(update={"trials": trials}), pulse=pulses.tell, tell=tell)
         write_gap_report(gap, page)
         channel.say(_measured(gap.study, trials))

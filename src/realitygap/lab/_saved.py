@@ -10,7 +10,7 @@ from typing import Any
 
 from realitygap.errors import RealityGapError, RecordError
 from realitygap.records import LEDGER_NAME, Ledger, Score, Trial, is_observations, ledger_stamp, open_ledger
-from realitygap.study import advise_ledger
+from realitygap.study import advise_ledger, design_report
 from realitygap.world import Arena
 
 from ._files import plain_files
@@ -53,7 +53,8 @@ class SavedTrials:
         arena: Arena of the trials.
         trials: The trials.
         notes: Notes on each trial, by its number.
-        looks: What the trials show of a comparison that is planned in the file, a line each; empty if there is none.
+        looks: What the trials show of a comparison that is planned in the file, and its locked design with all
+            deviations, a line each; empty if there is none.
     """
 
     target: str
@@ -124,11 +125,11 @@ class SavedFile:
 
 
 def _looks(ledger: Ledger) -> tuple[str, ...]:
-    """Return what the trials of a planned comparison show."""
-    if ledger.comparison() is None:
-        return ()
+    """Return what the trials of a planned comparison show, and deviations from a locked design."""
     try:
-        return tuple(advise_ledger(ledger).sentences)
+        looks = () if ledger.comparison() is None else tuple(advise_ledger(ledger).sentences)
+        report = design_report(ledger)
+        return looks if report is None else (*looks, *report.sentences)
     except RealityGapError as error:
         return (str(error),)
 

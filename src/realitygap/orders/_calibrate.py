@@ -13,7 +13,7 @@ from realitygap.robot_families import default_family, port_platforms
 
 from ._field import argument, option
 from ._order import Order
-from ._shared import Seed, Witness, arena_option, seed_option
+from ._shared import Lock, Seed, Witness, arena_option, seed_option
 
 PARTS = ("path", "sensors", "motion", "contact", "all")
 LEVELS = ("track", "cells", "encoders")
@@ -146,6 +146,7 @@ class CalibrateOrder(Order):
     )
     seed: Seed = seed_option(0)
     arena: str = arena_option()
+    lock: Lock = False
     witness: Witness = None
 
     @model_validator(mode="before")
@@ -169,8 +170,8 @@ class CalibrateOrder(Order):
                 "robot",
                 "Expected either the robot to measure (--robot PLATFORM) or recorded trials (--from DATA).",
             )
-        elif self.data and (self.witness is not None or self.choose):
-            yield "data", "--witness and --choose are only for --robot. Leave them out with --from."
+        elif self.data and (self.witness is not None or self.choose or self.lock):
+            yield "data", "--witness, --choose and --lock are only for --robot. Leave them out with --from."
         if self.radius_mm is not None and (self.what != "sensors" or self.base is not None):
             yield "radius_mm", "--radius-mm is only for sensors, instead of --base."
         if self.what != "motion" and (self.step is not None or self.drop_bad_rows):

@@ -22,6 +22,9 @@ from ._field import OrderField, fields_of
 
 OrderT = TypeVar("OrderT", bound="Order")
 
+_NEWER = ("lock", "blind")
+"""Switches that records of before lack. A record has them only if they are on, so that it equals one of before."""
+
 Plain = bool | int | float | str | list[bool | int | float | str]
 """Values of messages and records."""
 
@@ -131,6 +134,7 @@ class Order(Settings):
         """Return the record of the order: plain values from which `read_order` makes it, without files to write."""
         outputs = {each.name for each in self.fields() if each.face.is_output}
         values = self.model_dump(mode="json", exclude=outputs, exclude_none=True)
+        values = {name: value for name, value in values.items() if value is not False or name not in _NEWER}
         return {"command": self.command, "version": __version__, **values}
 
     def to_toml(self) -> str:

@@ -15,6 +15,7 @@ from ._order import Order
 
 ONLY_ROBOTS = "Only for robots"
 ONLY_TWINS = "Only for twins"
+ONLY_LOCKED = "Lock the design"
 ONLY_TABLES = "Only for tables of scores"
 
 _MOST_SEED = 2**63 - 1
@@ -46,6 +47,24 @@ Processes = Annotated[
         default_is="all processors",
         at_least=1,
         panel=ONLY_TWINS,
+    ),
+]
+
+Lock = Annotated[
+    bool,
+    option(
+        help="Lock the design before trial 1: hash, random order, and rules. Reports then list deviations from it.",
+        panel=ONLY_LOCKED,
+        label="Lock the design",
+    ),
+]
+
+Blind = Annotated[
+    bool,
+    option(
+        help="Lock the design, and show no result by arm until `realitygap trials unblind`.",
+        panel=ONLY_LOCKED,
+        label="Blind",
     ),
 ]
 
@@ -178,6 +197,8 @@ class MeasureOrder(PairOrder):
         names=("-o", "--out"),
         is_output=True,
     )
+    lock: Lock = False
+    blind: Blind = False
     processes: Processes = None
     witness: Witness = None
     seed: Seed = seed_option()

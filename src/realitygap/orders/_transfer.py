@@ -12,7 +12,16 @@ from realitygap.robot_families import port_platforms
 
 from ._field import argument, option
 from ._order import Order
-from ._shared import Processes, Seed, Witness, arena_option, folder_option, seed_option
+from ._shared import (
+    Blind,
+    Lock,
+    Processes,
+    Seed,
+    Witness,
+    arena_option,
+    folder_option,
+    seed_option,
+)
 
 ONLY_PAIRS = "Only to compare two controllers"
 
@@ -29,7 +38,8 @@ class TryOrder(Order):
     With --against, the command compares two controllers in pairs of trials, and a coin decides which of them goes
     first. It prints what is shown after each pair, and ends as soon as a difference or equivalence is shown, or after
     --trials pairs. The plan is stored before trial 1, so looking costs nothing. `realitygap trials advise` prints the
-    result again.
+    result again. With --lock, the design is locked: its hash decides the order of each pair, and later changes are
+    listed as deviations.
 
     Example: realitygap try champion.json --on twin:worn-1.toml --trials 20
 
@@ -94,12 +104,19 @@ class TryOrder(Order):
         names=("-o", "--out"),
         is_output=True,
     )
+    lock: Lock = False
+    blind: Blind = False
 
     def conflicts(self) -> Iterator[tuple[str, str]]:
         """Yield the field and the message for each setting that others exclude."""
         if self.against is None:
             if self.margin is not None or self.null != "distribution":
                 yield "against", "--margin and --null need a second controller (--against GENOME)."
+            elif self.blind:
+                yield (
+                    "blind",
+                    "--blind needs a second controller (--against GENOME): one alone has no arms to hide.",
+                )
             return
         if self.trials < FEWEST_PAIRS:
             yield (
@@ -177,6 +194,7 @@ class TransferOrder(Order):
     repeats: int = option(8, help="Trials per individual in simulation.", at_least=1)
     seed: Seed = seed_option()
     out: Path | None = folder_option("results/transfer")
+    lock: Lock = False
     processes: Processes = None
     witness: Witness = None
 

@@ -31,6 +31,7 @@ from realitygap.records._ledger_file import ledger_stamp
 from realitygap.records._ledger_kinds import (
     PATH_PARTS,
     ROBOT,
+    DrivenTrial,
     Generation,
     Individual,
     PhotoCount,
@@ -46,6 +47,16 @@ from realitygap.records._ledger_reader import LedgerReader
 from realitygap.records._ledger_rows import complete_runs, ledger_frame
 from realitygap.records._ledger_schema import ledger_tables
 from realitygap.records._listing import LEDGER_NAME
+from realitygap.records._locked_design import (
+    AMENDED,
+    LOCKED,
+    RESUMED,
+    UNBLINDED,
+    DesignEvent,
+    LockedDesign,
+    canonical_json,
+    secret_path,
+)
 from realitygap.records._observations_file import (
     Observations,
     ObservationsHead,
@@ -63,6 +74,7 @@ from realitygap.records._trial_store import (
     open_ledger,
     open_saved_trials,
     read_observations,
+    refuse_blind,
 )
 from realitygap.records._version import RESULTS_VERSION, RecordWarning
 
@@ -104,6 +116,17 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     "ScoreRole",
     "complete_runs",
     "ledger_frame",
+    # designs that are locked before trial 1
+    "LockedDesign",
+    "DesignEvent",
+    "DrivenTrial",
+    "canonical_json",
+    "secret_path",
+    "LOCKED",
+    "RESUMED",
+    "AMENDED",
+    "UNBLINDED",
+    # the file of a ledger
     "LEDGER_NAME",
     "ledger_stamp",
     "ledger_tables",
@@ -129,6 +152,7 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     "is_observations",
     "not_compared",
     "read_observations",
+    "refuse_blind",
     "write_observations",
     "trial_from_dict",
     "trial_to_dict",

@@ -29,12 +29,22 @@ from realitygap.records._ledger_kinds import (
 )
 from realitygap.records._ledger_reader import LedgerReader, arena_of
 from realitygap.records._lock import FolderLock
+from realitygap.records._locked_design import (
+    LOCKED,
+    LockedDesign,
+    canonical_json,
+    event_hash,
+    lock_details,
+    new_secret,
+    secret_path,
+)
 from realitygap.records._observations_file import (
     Observations,
     ObservationsHead,
     not_compared,
     trial_to_dict,
 )
+from realitygap.records._output import write_whole
 from realitygap.records._trial_record import NO_LINE, TrialRecord
 from realitygap.records._version import RESULTS_VERSION
 
@@ -139,6 +149,73 @@ class Ledger(LedgerReader):
                 "INSERT INTO events (time, trial, what, details) VALUES (?, NULL, ?, ?)",
                 *(_now(), PLAN_EVENT, _json(plan)),
             )
+
+    # a locked design
+
+    def lock_design(
+        self, design: Mapping[str, Any], *, who: str, version: str, is_blind: bool = False
+    ) -> LockedDesign:
+        """Lock a design before trial 1, and return it. If it is blind, its secret is saved next to the ledger.
+
+        Args:
+            design: What decides which trials are driven and how they are judged, as plain values.
+            who: Person who locks it.
+            version: Version of the program.
+            is_blind: True to show codes in place of its arms until it is unblinded.
+
+        Raises:
+            LedgerError: A trial has begun, or a design is locked already.
+            RecordError: The secret cannot be saved.
+        """
+        secret = new_secret() if is_blind else None
+        if secret is not None and self.design() is None:  # first: a design without its secret has no codes
+            write_whole(secret_path(self.path), secret)
+            with contextlib.suppress(OSError):
+                secret_path(self.path).chmod(0o600)
+        with self._writing():
+            if self.design() is not None:
+                raise LedgerError(f"{self.path} has a locked design already. Nothing was changed.")
+            if self._one("SELECT id FROM events WHERE what = 'running'") is not None:
+                raise LedgerError(
+                    f"{self.path} has trials, and a design is locked before the first one. Nothing was changed. Name "
+                    "another file or folder, or drive on without a lock."
+                )
+            self._note_design(LOCKED, lock_details(design, who, version, _now(), secret))
+        return self._locked()
+
+    def change_design(
+        self,
+        what: Literal["design resumed", "design amended", "design unblinded"],
+        details: Mapping[str, Any],
+    ) -> LockedDesign:
+        """Add an event to a locked design, and return it.
+
+        Raises:
+            LedgerError: No design is locked, or its events were edited.
+        """
+        with self._writing():
+            self._locked()
+            self._note_design(what, {"time": _now(), **details})
+        return self._locked()
+
+    def _locked(self) -> LockedDesign:
+        """Return the locked design, whose events are as they were written."""
+        design = self.design()
+        if design is None:
+            raise LedgerError(f"{self.path} has no locked design. A design is locked before the first trial.")
+        if design.problem:
+            raise LedgerError(f"{self.path}: {design.problem}. Nothing was changed. Restore it from a copy.")
+        return design
+
+    def _note_design(self, what: str, details: Mapping[str, Any]) -> None:
+        """Add an event of a design with its hash and that of the event before it."""
+        design = self.design()
+        previous = "" if design is None else str(design.events[-1].details["sha256"])
+        content = json.loads(canonical_json({**details, "previous": previous}))
+        self._run(
+            "INSERT INTO events (time, trial, what, details) VALUES (?, NULL, ?, ?)",
+            *(_now(), what, canonical_json({**content, "sha256": event_hash(content)})),
+        )
 
     # conditions and sittings
 

@@ -69,7 +69,9 @@ class Trial(ShownAsCard):
         cells: Cells as entered and not undone; None before.
         is_closed: True if its generation is closed, so that its score is frozen.
         purpose: Purpose of a trial of a command, as in `TrialRecord`; empty in a study.
-        controller: Number of its controller in the ledger, from 1 on; None in a study, or if commands were given.
+        controller: Number of its controller in the ledger, from 1 on; None in a study, if commands were given, or while
+            the design of the trials is blind.
+        arm: Code of its arm while the design of the trials is blind; empty otherwise.
     """
 
     trial: int
@@ -92,6 +94,7 @@ class Trial(ShownAsCard):
     is_closed: bool
     purpose: str = ""
     controller: int | None = None
+    arm: str = ""
 
     def __repr__(self) -> str:
         cells = "" if self.cells is None else f", {len(self.cells)} cells"
@@ -103,9 +106,31 @@ class Trial(ShownAsCard):
         again = f" (attempt {self.attempt + 1})" if self.attempt else ""
         if not self.condition:
             controller = "" if self.controller is None else f", controller {self.controller}"
+            controller = f", {self.arm}" if self.arm else controller
             return f"{self.purpose}{controller}{again}"
         run = f"{self.condition}, run {self.replicate}"
         return f"{run}, generation {self.generation}, individual {self.individual}{again}"
+
+
+@dataclass(frozen=True)
+class DrivenTrial:
+    """A trial of a command with what a locked design says of it.
+
+    Attributes:
+        trial: Its number in the ledger.
+        number: Number of the trial on its platform.
+        controller: SHA-256 of its controller.
+        state: Its state.
+        reason: Reason why it is void; empty if it is not.
+        battery_v: Battery voltage at its start [V]; None if unknown.
+    """
+
+    trial: int
+    number: int
+    controller: str
+    state: TrialState
+    reason: str
+    battery_v: float | None
 
 
 @dataclass(frozen=True)

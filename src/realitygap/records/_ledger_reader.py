@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import sqlite3
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
@@ -19,11 +20,13 @@ from realitygap.records._ledger_file import connect, speaking
 from realitygap.records._ledger_kinds import (
     PATH_PARTS,
     PLAN_EVENT,
+    DrivenTrial,
     PlannedComparison,
     Score,
     Trial,
     TrialState,
 )
+from realitygap.records._locked_design import DESIGN_EVENTS, LOST_CODE, DesignEvent, LockedDesign, read_design
 from realitygap.records._observations_file import (
     Note,
     Observations,
@@ -70,6 +73,7 @@ class LedgerReader(ClosedOnExit, ShownAsCard):
         self.path = path
         self._connection = connection
         (self._version,) = connection.execute("PRAGMA data_version").fetchone()
+        self._design: tuple[tuple[int, int], LockedDesign | None] | None = None
 
     @classmethod
     def open(cls, path: str | Path, *, writable: bool = True) -> Self:
@@ -151,7 +155,9 @@ class LedgerReader(ClosedOnExit, ShownAsCard):
             clauses.append(f"state IN ({', '.join('?' * len(chosen))})")
             values += chosen
         where = f"WHERE {' AND '.join(clauses)} " if clauses else ""
-        return [self._trial(row) for row in self._all(f"{_TRIALS}{where}ORDER BY place, attempt", *values)]
+        rows = self._all(f"{_TRIALS}{where}ORDER BY place, attempt", *values)
+        codes = self._codes(rows)
+        return [self._trial(row, codes) for row in rows]
 
     def trial(self, number: int) -> Trial:
         """Return a trial by its number.
@@ -164,7 +170,7 @@ class LedgerReader(ClosedOnExit, ShownAsCard):
             (most,) = self._one("SELECT max(id) FROM trials") or (None,)
             has = f"its trials are 1 to {most}" if most else "it has none yet"
             raise LedgerError(f"{self.path} has no trial {number}: {has}.")
-        return self._trial(row)
+        return self._trial(row, self._codes([row]))
 
     def notes(self, number: int | None = None) -> list[dict[str, Any]]:
         """Return notes, oldest first; of one trial, or all."""
@@ -309,6 +315,64 @@ class LedgerReader(ClosedOnExit, ShownAsCard):
         first = self._value(before[-1]["details"]) if before else None
         return PlannedComparison(self._value(rows[-1]["details"]), first)
 
+    def design(self) -> LockedDesign | None:
+        """Return the design that was locked in the ledger, with its changes; None if there is none.
+
+        Raises:
+            LedgerError: An event of it cannot be read. An edited event is reported by `LockedDesign.problem` instead.
+        """
+        (version,) = self._all("PRAGMA data_version")[0]
+        stamp = (version, self._connection.total_changes)
+        if self._design is None or self._design[0] != stamp:
+            marks = ", ".join("?" * len(DESIGN_EVENTS))
+            rows = self._all(
+                "SELECT what, details, (SELECT count(*) FROM events AS begun WHERE begun.what = 'running' AND "
+                f"begun.id < events.id) AS n FROM events WHERE what IN ({marks}) ORDER BY id",
+                *DESIGN_EVENTS,
+            )
+            events = [DesignEvent(row["what"], self._value(row["details"]), row["n"]) for row in rows]
+            try:
+                design = read_design(events, self.path)
+            except (KeyError, TypeError, ValueError) as error:
+                raise LedgerError(f"{self.path} is damaged: the event {error}.") from None
+            self._design = (stamp, design)
+        return self._design[1]
+
+    def _codes(self, rows: Iterable[sqlite3.Row]) -> Mapping[int, str]:
+        """Return the code of each controller, by its number, if the design of these trials is blind."""
+        is_of_command = any(row["controller"] is not None for row in rows)
+        return self._codes_of(self.design()) if is_of_command else {}
+
+    def _codes_of(self, design: LockedDesign | None) -> dict[int, str]:
+        """Return the code of each controller of a blind design, by its number in the ledger."""
+        if design is None or not design.is_blind:
+            return {}
+        codes = design.codes()
+        rows = self._all("SELECT id, genome FROM controllers")
+        return {
+            row["id"]: codes.get(hashlib.sha256(row["genome"].encode()).hexdigest(), LOST_CODE)
+            for row in rows
+        }
+
+    def driven(self) -> list[DrivenTrial]:
+        """Return each trial with its controller, in the order in which they began; none for a study's planned ones."""
+        rows = self._all(
+            "SELECT trials.id, number, state, reason, genome, json_extract(record, '$.battery_v') AS battery "
+            "FROM trials LEFT JOIN controllers ON controllers.id = trials.controller "
+            "WHERE state <> 'planned' ORDER BY place"
+        )
+        return [
+            DrivenTrial(
+                row["id"],
+                row["number"] or 0,
+                hashlib.sha256((row["genome"] or "").encode()).hexdigest(),
+                row["state"],
+                row["reason"] or "",
+                row["battery"],
+            )
+            for row in rows
+        ]
+
     def used_codes(self) -> set[str]:
         """Return the codes that are names of trials."""
         return {row["code"] for row in self._all("SELECT code FROM trials WHERE code IS NOT NULL")}
@@ -333,7 +397,7 @@ class LedgerReader(ClosedOnExit, ShownAsCard):
         with speaking(self.path, self._connection):
             return self._connection.execute(query, values).fetchall()
 
-    def _trial(self, row: sqlite3.Row) -> Trial:
+    def _trial(self, row: sqlite3.Row, codes: Mapping[int, str]) -> Trial:
         values = {name: row[name] for name in row.keys() if name not in ("id", "cells", "is_closed")}  # noqa: SIM118
         cells = None if row["cells"] is None else self._numbers(row["cells"])
         texts = {name: values[name] or "" for name in ("condition", "code", "purpose")}
@@ -341,6 +405,8 @@ class LedgerReader(ClosedOnExit, ShownAsCard):
             name: values[name] or 0 for name in ("replicate", "generation", "individual", "sheet", "pen")
         }
         given = {**values, **texts, **numbers}
+        if given["controller"] in codes:
+            given |= {"controller": None, "arm": codes[given["controller"]]}
         return Trial(trial=row["id"], cells=cells, is_closed=bool(row["is_closed"]), **given)
 
     def _decoded(self, row: sqlite3.Row, *names: str) -> dict[str, Any]:

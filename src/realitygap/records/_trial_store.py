@@ -172,12 +172,27 @@ def read_observations(path: Path | str) -> Observations:
     A torn last line is left out, and `problem` says so.
 
     Raises:
-        RecordError: There is none, it is of another format, or damaged before its last line.
+        RecordError: There is none, it is of another format, damaged before its last line, or its design is blind.
     """
     path = Path(path)
     if not path.exists():
         raise RecordError(f"There is no file {path}. Name one with observed trials.")
     if is_ledger(path):
         with Ledger.open(path, writable=False) as ledger:
+            refuse_blind(ledger)
             return ledger.observations()
     return read_lines(path)
+
+
+def refuse_blind(ledger: Ledger) -> None:
+    """Raise an error if the results of a ledger's arms are not shown yet.
+
+    Raises:
+        RecordError: Its design is blind.
+    """
+    design = ledger.design()
+    if design is not None and design.is_blind:
+        raise RecordError(
+            f"The design of {ledger.path} is blind, and these figures would show results by arm. After the last trial, "
+            f'unblind it: realitygap trials unblind {ledger.path} --reason "complete"'
+        )

@@ -54,7 +54,7 @@ from realitygap.report._tally import (
 from realitygap.report._template import render_page
 from realitygap.report.charts.house import house_style
 from realitygap.stats import CONFIDENCE, MEDIAN_SMALLEST_N, interval_ranks
-from realitygap.study import load_study, named_studies
+from realitygap.study import design_report, load_study, named_studies
 
 REPORT_NAME = "report.html"
 
@@ -327,7 +327,8 @@ def _banners(tally: Tally) -> list[tuple[str, str]]:
         banners.append(("Results of another version", tally.folder.version_note))
     if tally.driven:
         message = " ".join(describe_driven(name, driven) for name, driven in tally.driven.items())
-        banners.append(("Trials on a robot", message))
+        report = design_report(tally.folder.path)
+        banners.append(("Trials on a robot", message if report is None else f"{message} {report.line}"))
     if tally.uncounted:
         banners.append(
             (

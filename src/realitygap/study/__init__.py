@@ -3,7 +3,7 @@
 from realitygap.platforms import open_target
 
 from . import _cards  # noqa: F401  # what notebooks show
-from ._advise import Advice, Advised, Planned, advise_on
+from ._advise import Advice, Advised, BlindAdvice, Planned, advise_on
 from ._bench import measure_speed
 from ._calibrate.from_log import calibrate_from_log
 from ._calibrate.from_table import calibrate_from_table
@@ -19,6 +19,8 @@ from ._closing.summary import summarize_closing
 from ._code import AllowCode, check_files, python_tasks, task_named
 from ._compare import ComparedScores, compare_scores
 from ._controllers import sample_controllers
+from ._design import DESIGN_NAME, amend_design, unblind_design
+from ._deviations import DesignReport, design_report
 from ._duration import estimate_seconds
 from ._estimated import EstimatedScore
 from ._fieldtrial import write_fieldtrial
@@ -56,6 +58,7 @@ from ._try_pairs import TriedPairs, try_pairs
 
 __all__ = [
     "DEFAULT_NEAT",
+    "DESIGN_NAME",
     "MAZE_SEEDS",
     "MOST_CONTROLLERS",
     "PLANS",
@@ -63,6 +66,7 @@ __all__ = [
     "Advice",
     "Advised",
     "AllowCode",
+    "BlindAdvice",
     "CalibratedRow",
     "CameraObserver",
     "ClosedGap",
@@ -71,6 +75,7 @@ __all__ = [
     "ClosingSummary",
     "ComparedScores",
     "ConditionNotes",
+    "DesignReport",
     "EstimatedScore",
     "GapBetween",
     "GapPlan",
@@ -94,6 +99,7 @@ __all__ = [
     "advise",
     "advise_ledger",
     "advise_on",
+    "amend_design",
     "calibrate",
     "calibrate_all",
     "calibrate_from_log",
@@ -104,6 +110,7 @@ __all__ = [
     "close_gap",
     "closing_the_gap",
     "compare_scores",
+    "design_report",
     "drive_study",
     "estimate_score",
     "estimate_seconds",
@@ -146,6 +153,7 @@ __all__ = [
     "try_genome",
     "try_on",
     "try_pairs",
+    "unblind_design",
     "with_ruled_end",
     "write_fieldtrial",
     "write_trials",

@@ -11,8 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realitygap._wording import (
+    BLIND_NOTE,
     MULTIPLE_LOOKS,
     PLANNED_LOOKS,
+    blind_look,
     distribution_caveat,
     look_figures,
     look_verdict,
@@ -163,6 +165,69 @@ class Advice:
             "test": self.test.to_dict() | {"alpha": self._alpha},
             "sentences": self.sentences,
         }
+
+
+@dataclass(frozen=True)
+class BlindAdvice(Advice):
+    """Advice on a comparison whose design is blind: how many pairs are complete, and whether to stop.
+
+    It has no comparison and no E. The sign of an effect would name an arm. E has no sign, but its change after a trial
+    is void or counted again would tell the operator which results bring the end closer.
+
+    Attributes:
+        n: Number of complete pairs.
+        has_ended: True if the locked rule ends the comparison.
+    """
+
+    n: int
+    has_ended: bool
+
+    @property
+    def is_stop(self) -> bool:
+        """True if the locked rule ends the comparison."""
+        return self.has_ended
+
+    @property
+    def line(self) -> str:
+        """Whether to continue, in one line."""
+        return blind_look(self.n, self.maximum, self.unit, has_ended=self.has_ended)
+
+    @property
+    def summary(self) -> str:
+        """Whether to continue, in one line."""
+        return self.line
+
+    @property
+    def sentences(self) -> list[str]:
+        """Whether to continue, and how to see results."""
+        return [self.line, BLIND_NOTE]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain values for JSON."""
+        return {
+            "is_blind": True,
+            "score": self.score,
+            "label": self.label,
+            "unit": self.unit,
+            "pairs": self.n,
+            "maximum": self.maximum,
+            "is_stop": self.has_ended,
+            "sentences": self.sentences,
+        }
+
+
+def blinded(advice: Advice, maximum: int) -> BlindAdvice:
+    """Return advice without results by arm.
+
+    Args:
+        advice: The advice.
+        maximum: Number of blocks in the locked design.
+    """
+    n = max(each.look.n for each in advice.comparisons)
+    has_ended = advice.is_stop or n >= maximum
+    return BlindAdvice(
+        advice.score, advice.label, advice.unit, advice.test, advice.planned, maximum, (), n, has_ended
+    )
 
 
 def advise_on(

@@ -10,7 +10,7 @@ from collections import Counter
 from pathlib import Path
 
 from realitygap.errors import RecordError, StudyError
-from realitygap.records import Trial, open_ledger, refuse_results, write_whole
+from realitygap.records import Trial, open_ledger, refuse_blind, refuse_results, write_whole
 from realitygap.tasks import CoverageTask, Task, score_observed
 
 from ._tracked import trial_in
@@ -56,6 +56,7 @@ def write_fieldtrial(
     writer.writerow(COLUMNS)
     numbers: Counter[str] = Counter()
     with open_ledger(source, writable=False) as ledger:
+        refuse_blind(ledger)
         operators = {row["trial"]: row["who"] for row in ledger.scores() if row["undone"] is None}
         for trial in ledger.trials(states=("scored",)):
             if not trial.n_steps:

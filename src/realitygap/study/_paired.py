@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,8 +26,9 @@ from realitygap.runs import Condition
 from realitygap.stats import Null, SequentialTest
 from realitygap.tasks import Task, score_observed
 
-from ._advise import Advice, Planned, advise_on, strategy_differences
+from ._advise import Advice, Planned, advise_on, blinded, strategy_differences
 from ._code import task_named
+from ._design import digest_of
 
 CONTROLLERS = "controllers"
 ROUNDS = "rounds"
@@ -96,11 +96,6 @@ class Blocks:
         return rows
 
 
-def digest_of(genome: str) -> str:
-    """Return the SHA-256 of a controller."""
-    return hashlib.sha256(genome.encode()).hexdigest()
-
-
 def planned_test(plan: Mapping[str, Any]) -> SequentialTest:
     """Return the test of a plan in a ledger.
 
@@ -149,7 +144,29 @@ def advise_ledger(
         ledger: The ledger.
         wanted: Settings of the test that differ from those of the plan.
         task: Task that scores the trials of a gap. Default: that of the plan.
+
+    Returns:
+        The advice. While the design of the trials is blind, it has no result by arm: see `BlindAdvice`.
+
+    Raises:
+        StudyError: There are not two that can be compared, or another test was asked for while the design is blind.
+        RecordError: The plan is damaged.
     """
+    locked = ledger.design()
+    if locked is None or not locked.is_blind:
+        return unblinded_advice(ledger, wanted, task=task)
+    if wanted:
+        raise StudyError(
+            f"The design of {ledger.path} is blind, so only its locked test is used. Leave {', '.join(wanted)} out, "
+            "or unblind the design first."
+        )
+    return blinded(unblinded_advice(ledger, task=task), int(locked.design["blocks"]))
+
+
+def unblinded_advice(
+    ledger: Ledger, wanted: Mapping[str, Any] | None = None, *, task: Task | None = None
+) -> Advice:
+    """Return advice as `advise_ledger`, also by arm while the design is blind: only for rules, never to be shown."""
     known = ledger.comparison()
     test, planned = _test_of(known, wanted or {})
     if ledger.conditions():

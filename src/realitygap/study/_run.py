@@ -15,11 +15,13 @@ from realitygap.errors import OutgrownError, StudyError, whole_number
 from realitygap.platforms import built_in_platforms
 from realitygap.records import LEDGER_NAME, Ledger, ResultsFolder
 from realitygap.runs import Condition
+from realitygap.stats import SequentialTest
 from realitygap.tasks import source_hash
 from realitygap.trials import Operator
 
 from ._cluster import Cluster
 from ._code import AllowCode, with_code_allowed
+from ._design import hold_to_design
 from ._executors import ChunkTask, Executor, Threads
 from ._file import load_study
 from ._physical import (
@@ -144,6 +146,7 @@ def drive_study(
     operator: Operator | None = None,
     open_robot: OpenRobot | None = None,
     allow_code: AllowCode = False,
+    lock: bool = False,
 ) -> StudyResult:
     """Drive the conditions of a study that are on a robot, or what is missing of them.
 
@@ -161,10 +164,12 @@ def drive_study(
             emulated robot in this program has.
         open_robot: Called with the settings of a condition when a trial is to be driven; opens `port` when not given.
         allow_code: Permission to run Python files, as in `run_study`.
+        lock: True to lock the design of these conditions before the first trial. `[trials]` decides their order, and
+            whether they are blind.
 
     Raises:
-        StudyError: No condition of the study is on a robot, nobody places the robot, or the folder holds another
-            study.
+        StudyError: No condition of the study is on a robot, nobody places the robot, the folder holds another study,
+            or the study differs from the locked design.
         RealityGapError: The robot cannot be reached, or failed; what was scored is safe.
     """
     study, path = _resolved(study, out, seed, replicates, allow_code)
@@ -176,9 +181,36 @@ def drive_study(
         _adopt(folder, study)
         ledger_path = path / LEDGER_NAME
         with Ledger.open(ledger_path) if ledger_path.exists() else Ledger.create(ledger_path) as ledger:
+            hold_to_design(ledger, _physical_design(study, port), lock=lock)
             physical = PhysicalStudy(study, ledger, operator, open_robot or connect_robot(port, arena), port)
             waiting = physical.carry_out()
         return StudyResult(folder, 0, 0, 0.0, _physical_result(study, folder, physical.n_driven, waiting))
+
+
+def _physical_design(study: Study, port: str) -> dict[str, Any]:
+    """Return all that decides which trials of a study a robot drives, and how they are judged."""
+    conditions, trials = physical_conditions(study), study.trials
+    test = SequentialTest(null=trials.null, margin=trials.margin or None)
+    return {
+        "command": "drive",
+        "settings": {
+            "study": study.about.name,
+            "replicates": study.about.replicates,
+            **trials.model_dump(mode="json"),
+        },
+        "names": {"port": port},
+        "target": {"name": port},
+        "arms": [{"name": each.name, "sha256": each.hash()} for each in conditions],
+        "others": [],
+        "unit": "",
+        "blocks": 0,
+        "first": 0,
+        "stride": None,
+        "score": ", ".join(dict.fromkeys(each.task_of_trials.name for each in conditions)),
+        "exclusion": "A trial counts unless it is void, for a reason that does not depend on its score. It is driven "
+        "again.",
+        "test": test.to_dict(),
+    }
 
 
 def check_has_robot(study: Study) -> None:

@@ -18,6 +18,7 @@ from realitygap.records import (
     Ledger,
     ObservationsHead,
     open_ledger,
+    refuse_blind,
     refuse_results,
     write_observations,
     write_whole,
@@ -144,6 +145,7 @@ def _driven_trials(source: Path, numbers: Sequence[int]) -> list[TrialToTrack]:
             "and drive it: realitygap try champion.json --on sim --observe track -o trials.sqlite"
         )
     with open_ledger(source, writable=False) as ledger:
+        refuse_blind(ledger)
         if not numbers:
             trials = ledger.trials(states=("driven", "scored"))
             numbers = [

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import shlex
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 from realitygap.errors import StudyError
 from realitygap.evolution import OUTPUTS, ControllerInterface, Genome
+from realitygap.gap import COVERAGE
 from realitygap.orders import TryOrder, takes_order
 from realitygap.platforms import open_target
-from realitygap.records import Observe, TrialRecord
+from realitygap.records import Ledger, Observe, TrialRecord
 from realitygap.trials import PortObserver, Target, TrialPlan
 from realitygap.world import load_arena
 
+from ._design import design_of, hold_to_design, refuse_lock_without_file
 from ._kept_target import KeptTarget
 from ._targets import open_trials, refuse_more_than_is_seen
 
@@ -26,6 +29,7 @@ def try_on(
     steps: int = 100,
     observe: Observe = "cells",
     out: str | Path | None = None,
+    hold: Callable[[Ledger], object] | None = None,
 ) -> list[TrialRecord]:
     """Drive a controller on a target.
 
@@ -36,6 +40,7 @@ def try_on(
         steps: Commands in each.
         observe: Observation level of the trials.
         out: File for the trials, as they end. Trials in it are not driven again.
+        hold: Called with the open file before the first trial, such as to lock a design in it.
 
     Raises:
         StudyError: So much cannot be seen of it.
@@ -46,6 +51,8 @@ def try_on(
     plans = [TrialPlan(genome=genome, steps=steps, number=k) for k in range(trials)]
     file = None if out is None else open_trials(out, target, observe)
     with KeptTarget(target, file, is_exclusive=True) as kept:
+        if file is not None and hold is not None:
+            hold(file)
         return kept.carry_out(plans, observe)
 
 
@@ -85,6 +92,8 @@ def try_genome(order: TryOrder, *, observer: PortObserver | None = None) -> Trie
         RobotError: The robot failed; what is in the file is safe.
     """
     genome = genome_of(order.genome, order)
+    refuse_lock_without_file(order, order.out)
+    arms = [(order.genome.stem, genome.to_json())]
     arena = load_arena(order.arena)
     with open_target(order.on, arena, witness=order.witness, observer=observer, key=order.seed) as target:
         trials = try_on(
@@ -94,6 +103,9 @@ def try_genome(order: TryOrder, *, observer: PortObserver | None = None) -> Trie
             steps=order.steps,
             observe=order.observe,
             out=order.out,
+            hold=lambda file: hold_to_design(
+                file, design_of(order, target, score=COVERAGE, arms=arms), lock=order.lock
+            ),
         )
         return TriedGenome(target.name, target.label, target.arena.grid.n_cells, trials)
 

@@ -17,6 +17,8 @@ from realitygap.trials import PortObserver, TrialPlan
 from realitygap.world import load_arena
 
 from ._advise import Advice
+from ._design import design_of, hold_to_design
+from ._deviations import DesignReport, design_report
 from ._kept_target import KeptTarget
 from ._paired import CONTROLLERS, Blocks, advise_ledger
 from ._targets import open_trials, refuse_more_than_is_seen
@@ -32,12 +34,14 @@ class TriedPairs:
         label: Label of its trials.
         advice: What the pairs show.
         file: File with the plan and the trials.
+        design: The locked design, and the deviations from it; None if there is none.
     """
 
     target: str
     label: str
     advice: Advice
     file: Path
+    design: DesignReport | None = None
 
 
 @takes_order(TryOrder)
@@ -50,7 +54,8 @@ def try_pairs(
     """Compare two controllers from files on a platform, as `realitygap try GENOME --against GENOME`.
 
     The plan is stored in the file before the first trial: test, margin, maximum, and which of both goes first in each
-    pair. The comparison ends when a difference or equivalence is shown, or at the maximum.
+    pair. The comparison ends when a difference or equivalence is shown, or at the maximum. With `lock`, the order
+    follows from the hash of the locked design. With `blind`, the advice has no result by arm.
 
     Args:
         observer: Observer of a robot without a witness: it places the robot and reports what it drew.
@@ -60,7 +65,8 @@ def try_pairs(
         ValueError: The order has no second controller.
         StudyError: There is no such file, arena, or platform, no file for the trials, or so much cannot be seen.
         ControllerError: The platform lacks what a controller sees.
-        RecordError: The file is of other controllers or another target, or cannot be written.
+        RecordError: The file is of other controllers or another target, has a locked design that differs, or cannot be
+            written.
         RobotError: The robot failed; what is in the file is safe.
     """
     if order.against is None:
@@ -73,7 +79,8 @@ def try_pairs(
     names = _names(order.genome, order.against)
     if genomes[0].to_json() == genomes[1].to_json():
         raise StudyError(f"{order.genome} and {order.against} are the same controller, expected two.")
-    blocks = Blocks.drawn([each.to_json() for each in genomes], order.trials, order.seed)
+    texts = [each.to_json() for each in genomes]
+    blocks = Blocks.drawn(texts, order.trials, order.seed)
     test = SequentialTest(null=order.null, margin=order.margin)
     arena = load_arena(order.arena)
     with open_target(order.on, arena, witness=order.witness, observer=observer, key=order.seed) as target:
@@ -83,7 +90,13 @@ def try_pairs(
                 genome.interface.check(target.inputs, name, target.name)
         file = open_trials(order.out, target, order.observe)
         with KeptTarget(target, file, is_exclusive=True) as kept:
-            _refuse_others(file, blocks)
+            arms = list(zip(names, texts, strict=True))
+            design = design_of(order, target, score=COVERAGE, arms=arms, unit="pair")
+            if (locked := hold_to_design(file, design, lock=order.lock, blind=order.blind)) is not None:
+                firsts = [locked.order(block)[0] for block in range(order.trials)]
+                blocks = Blocks(blocks.digests, "".join("AB"[first] for first in firsts))
+            if locked is None or file.trials():
+                _refuse_others(file, blocks)
             file.plan_comparison(
                 {
                     "kind": CONTROLLERS,
@@ -96,7 +109,7 @@ def try_pairs(
                 }
             )
             _drive(kept, file, blocks, genomes, order, tell)
-            return TriedPairs(target.name, target.label, advise_ledger(file), order.out)
+            return TriedPairs(target.name, target.label, advise_ledger(file), order.out, design_report(file))
 
 
 def _refuse_others(file: Ledger, blocks: Blocks) -> None:

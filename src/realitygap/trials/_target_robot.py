@@ -97,6 +97,21 @@ class PacedRobot(ClosedOnExit):
         median = float(np.median(self._lasted)) if self._lasted else self.step_s
         return median if median > self.step_s * (1 + LATE) else self.step_s
 
+    @property
+    def facts(self) -> dict[str, str]:
+        """Facts that the robot reported when it was connected, such as its model and the version of its firmware."""
+        facts = getattr(getattr(self._robot, "info", None), "__dict__", {})
+        return {
+            name: str(value)
+            for name, value in facts.items()
+            if isinstance(value, str | int) and name not in ("port", "label")
+        }
+
+    @property
+    def least_battery_v(self) -> float | None:
+        """Smallest voltage of its battery [V]; None if the robot has no such limit."""
+        return getattr(self._robot, "least_battery_v", None)
+
     def stop(self) -> None:
         """Stop the motors."""
         self._robot.stop()
@@ -148,6 +163,8 @@ class RobotTarget(ClosedOnExit):
         self._inputs = inputs_of_robot(robot.n_sensors, robot.channels)
         self.observes: Observe = observer.observes
         self.identity = observer.identity
+        self.robot_facts = robot.facts
+        self.least_battery_v = robot.least_battery_v
 
     def _ready(self) -> PacedRobot:
         """Return the robot, and open it if necessary."""

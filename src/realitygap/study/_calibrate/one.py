@@ -16,6 +16,7 @@ from realitygap.calibration import Fit, of_one_length, ruled, step_of
 from realitygap.errors import RecordError, StudyError, did_you_mean
 from realitygap.platforms import DEFAULT_ROBOT, SimPlatform, split_spec
 from realitygap.records import (
+    Ledger,
     Observations,
     Observe,
     TrialRecord,
@@ -58,6 +59,7 @@ def calibrate(
     choose: bool = False,
     operator: Operator | None = None,
     tell: Tell | None = None,
+    hold: Callable[[Ledger], object] | None = None,
 ) -> Calibration:
     """Run the trials of a calibration on a target, and fit a simulated robot to the observations.
 
@@ -73,6 +75,7 @@ def calibrate(
         choose: True to choose the last trials of `all` after a first fit, as the most informative ones.
         operator: Puts the robot where it has to stand; None if the target places itself.
         tell: Called after each trial.
+        hold: Called with the open file before the first trial, such as to lock a design in it.
 
     Raises:
         StudyError: There is no such kind, or the target, the robot and the kind do not go together.
@@ -89,6 +92,8 @@ def calibrate(
         )
     file = None if trials_file is None else open_trials(trials_file, target, observe, robot=str(robot))
     with KeptTarget(target, file, operator=operator) as kept:
+        if file is not None and hold is not None:
+            hold(file)
         return _calibrated(kind, kept, robot, observe, budget, seed, tell, choose=choose)
 
 

@@ -12,6 +12,8 @@ from realitygap.records import existing_trials, is_observations, refuse_links
 from realitygap.trials import Operator, PortObserver, Pulse
 from realitygap.world import Calibration, load_arena, read_calibration
 
+from .._design import design_of, hold_to_design
+from .._deviations import check_unblinded
 from .from_log import calibrate_from_log
 from .from_table import calibrate_from_table
 from .hold_out import hold_out_of
@@ -62,6 +64,8 @@ def make_calibration(
         )
     else:
         made = _measured(order, out, observer, operator, pulse, tell)
+        deviations = check_unblinded(existing_trials(out.with_suffix(".trials.sqlite")))
+        made = made.model_copy(update={"notes": (*made.notes, *deviations)})
     made = made.model_copy(update={"order": order.record()})
     save_calibration(out, made)
     return made.in_file(out)
@@ -171,4 +175,5 @@ def _measured(
             choose=order.choose,
             operator=operator,
             tell=tell,
+            hold=lambda file: hold_to_design(file, design_of(order, target, score=""), lock=order.lock),
         )

@@ -21,6 +21,7 @@ from realitygap.world import Arena, Calibration, load_arena
 
 from .._code import task_named
 from .._controllers import Controller, recorded_controllers, sample_controllers, task_of
+from .._design import refuse_lock_without_file
 from .shown import with_shown
 from .study import STEPS, GapStudy, Tell, study_gap
 from .why import calibration_of, why_gap
@@ -130,6 +131,7 @@ def gap_between(
         _refuse_elsewhere(champions, f"--reevolved {order.reevolved}", order.target)
     if champions:
         _refuse_elsewhere(setting.controllers, f"--controllers {order.controllers}", order.sim)
+    refuse_lock_without_file(order, order.results)
     n_trials = setting.n_controllers * setting.trials
     with both_open(
         order, setting.arena, n_trials, observer=observer, pulse=pulse, randomize=order.randomize
@@ -149,6 +151,7 @@ def gap_between(
             results=order.results,
             at_its_pace=calibration is None or not calibration.step_s,
             steps=setting.steps,
+            order=order,
         )
         gap = with_shown(gap, source, costly, controller=shown, steps=setting.steps)
     parts = None

@@ -17,11 +17,13 @@ from realitygap.world import Arena
 
 from .._code import task_named
 from .._controllers import Controller, recorded_controllers, sample_controllers, task_of
+from .._design import refuse_lock_without_file
+from .._deviations import check_unblinded
 from .._estimate_table import estimate_in_table
 from .._estimated import EstimatedScore
 from .._targets import check_task, open_trials, refuse_too_little
 from .between import Say, arena_of, both_open
-from .study import STEPS, TARGET_FROM, Tell, carry_out, plans_of, refuse_inputs, side_of
+from .study import STEPS, TARGET_FROM, Tell, carry_out, hold_to_rounds, plans_of, refuse_inputs, side_of
 from .why import calibration_of
 
 
@@ -51,6 +53,7 @@ def estimate_score(
     if not order.target:
         return estimate_in_table(order)
     _refuse_own_calibration(order.sim, order.target)
+    refuse_lock_without_file(order, order.results)
     controllers, n = _drawn(order, allow_code=allow_code)
     if say is not None:
         say(f"Driving {n} of {len(controllers)} controllers: {order.controllers}.")
@@ -59,6 +62,7 @@ def estimate_score(
     check_task(task, arena)
     with both_open(order, arena, n * order.trials, observer=observer, pulse=pulse) as (source, target):
         real = _tried(target, controllers[:n], order.trials, task, order, steps, tell)
+        deviations = check_unblinded(order.results)
         simulated = _tried(source, controllers, order.sim_trials, task, None, steps, tell)
     noise = None if real.trials < 2 else float(real.noise.mean())
     means = simulated.means
@@ -77,6 +81,7 @@ def estimate_score(
         f"{side.label}: {counted(side.n, 'controller')} with {counted(side.trials, 'trial')} each"
         for side in (real, simulated)
     )
+    basis = " ".join((f"{basis}." if deviations else basis, *deviations))
     title = f"Mean {task.score_name} {whose}on {names[1]}, assisted by {names[0]}"
     return EstimatedScore(assisted, title, "controller", real.means, means, basis, task.score_name, order)
 
@@ -152,8 +157,10 @@ def _tried(
     genomes = [each.genome for each in controllers]
     first = 0 if order is None else TARGET_FROM
     plans = plans_of(genomes, trials, first, steps, sees_end=task.needs_trace)
-    observe, file = task.observe, None
+    observe, file, locked = task.observe, None, None
     if order is not None:
         observe = refuse_too_little(task, platform, order.observe)
         file = None if order.results is None else open_trials(order.results, platform, observe)
-    return side_of(platform, carry_out(platform, plans, observe, tell, file), len(controllers), task)
+        locked = None if file is None else hold_to_rounds(file, order, platform, controllers, task)
+    driven = carry_out(platform, plans, observe, tell, file, locked)
+    return side_of(platform, driven, len(controllers), task)

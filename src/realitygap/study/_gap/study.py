@@ -19,9 +19,10 @@ from realitygap.gap import (
     measure_gap,
     replay_error,
 )
+from realitygap.orders import EstimateOrder, GapOrder
 from realitygap.platforms import SimTarget, split_spec
 from realitygap.playback import MovingTrial
-from realitygap.records import OBSERVATIONS, Ledger, Observe, TrialRecord
+from realitygap.records import OBSERVATIONS, Ledger, LockedDesign, Observe, TrialRecord
 from realitygap.stats import (
     Estimate,
     SequentialTest,
@@ -35,6 +36,8 @@ from realitygap.world import Arena, Pose
 
 from .._advise import Advice
 from .._controllers import Controller, have_same_score, task_of
+from .._design import design_of, hold_to_design
+from .._deviations import check_unblinded
 from .._kept_target import KeptTarget
 from .._paired import ROUNDS, advise_ledger
 from .._targets import check_task, open_trials, refuse_too_little
@@ -132,6 +135,7 @@ def study_gap(
     results: str | Path | None = None,
     at_its_pace: bool = False,
     steps: int = STEPS,
+    order: GapOrder | None = None,
 ) -> GapStudy:
     """Try the same controllers on a simulator and on a target, and measure the gap.
 
@@ -155,10 +159,12 @@ def study_gap(
         results: File that stores the target's trials as they end. Trials in it are not driven again.
         at_its_pace: True to give commands of a `sim` without calibration the duration that they had on the target.
         steps: Commands in each trial.
+        order: The order, whose design may be locked. Default: nothing is locked.
 
     Raises:
         ValueError: A number is out of range, or so much cannot be seen.
-        StudyError: The two platforms are in different arenas, or the task needs to see more.
+        StudyError: The two platforms are in different arenas, the task needs to see more, the order differs from a
+            locked design, or all trials are driven and the design is blind.
         TaskError: The task cannot be scored in the arena.
         RecordError: The file has trials of something else, or cannot be written.
         RobotError: The robot failed; what was kept is safe.
@@ -188,11 +194,15 @@ def study_gap(
         "task": task.name,
         "test": looks.to_dict(),
     }
+    locked = None
+    if file is not None and order is not None:
+        locked = hold_to_rounds(file, order, target, controllers, task, others=reevolved)
     if file is not None:
         known = file.comparison()
         if known is None or {**known.plan, "rounds": None} != {**comparison, "rounds": None}:
             file.plan_comparison(comparison)
-    on_target = carry_out(target, [*plans, *more], observe, tell, file)
+    on_target = carry_out(target, [*plans, *more], observe, tell, file, locked)
+    deviations = check_unblinded(results)
     source, pace_notes = _paced(source, target, on_target) if at_its_pace else (source, ())
     own = [replace(plan, number=plan.number - TARGET_FROM) for plan in plans]
     in_source = carry_out(source, own, seen, tell)
@@ -210,7 +220,7 @@ def study_gap(
         score=task.score_name,
         luck=_luck(controllers, task),
         reevolved=_reevolved(controllers, source, one, reevolved, reevolved_there, target, task),
-        notes=pace_notes,
+        notes=(*pace_notes, *deviations),
     )
     return GapStudy(
         result,
@@ -278,8 +288,12 @@ def carry_out(
     observe: Observe,
     tell: Tell | None,
     file: Ledger | None = None,
+    locked: LockedDesign | None = None,
 ) -> list[TrialRecord]:
-    """Return trials in the order of their plans: those in the file, and the others, saved as they end."""
+    """Return trials in the order of their plans: those in the file, and the others, saved as they end.
+
+    If a design is locked, its hash decides the order of the controllers in each round.
+    """
     done: set[int] = set()
 
     def told(k: int, _: TrialRecord) -> None:
@@ -287,8 +301,37 @@ def carry_out(
         if tell is not None:
             tell(platform.name, len(done), len(plans))
 
+    turns = list(range(len(plans)))
+    if locked is not None:
+        n = len(locked.arms)
+        turns[: n * locked.design["blocks"]] = [
+            n * k + arm for k in range(locked.design["blocks"]) for arm in locked.order(k)
+        ]
     with KeptTarget(platform, file) as kept:
-        return kept.carry_out(plans, observe, told)
+        driven = kept.carry_out([plans[turn] for turn in turns], observe, told)
+    return [trial for _, trial in sorted(zip(turns, driven, strict=True), key=lambda each: each[0])]
+
+
+def hold_to_rounds(
+    file: Ledger,
+    order: GapOrder | EstimateOrder,
+    target: Target,
+    controllers: Sequence[Controller],
+    task: Task,
+    others: Sequence[Controller] = (),
+) -> LockedDesign | None:
+    """Lock the design of an order whose rounds have a trial of each controller, or hold the order to it."""
+    design = design_of(
+        order,
+        target,
+        score=task.name,
+        arms=[(each.name, each.genome.to_json()) for each in controllers],
+        unit="round",
+        first=TARGET_FROM,
+        stride=MOST_TRIALS,
+        others=[each.genome.to_json() for each in others],
+    )
+    return hold_to_design(file, design, lock=order.lock, blind=order.blind)
 
 
 def _by_controller(trials: Sequence[TrialRecord], n: int) -> list[TrialRecord]:

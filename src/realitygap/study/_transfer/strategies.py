@@ -31,6 +31,7 @@ from realitygap.trials import Target
 from realitygap.world import load_calibration, load_robot
 
 from .._code import allowed_task
+from .._design import design_of, hold_folder_to_design
 from .._file import load_study
 from .._study import Study
 from .._targets import check_task, refuse_more_than_is_seen, refuse_too_little
@@ -184,10 +185,13 @@ def transfer_to(
     work = _Work(plan, chosen, target, folder, tell or (lambda _: None))
     work.refuse(names)
     _adopt(folder, plan)
+    task = chosen.task_of_trials
+    more = {"strategies": list(names), "condition": chosen.name}
+    design = design_of(order, target, score=task.name, more=more)
+    hold_folder_to_design(folder, target, design, lock=order.lock)
     champions = [
         work.carry_out(name, n, r) for name in names for n in order.budgets for r in range(order.replicates)
     ]
-    task = chosen.task_of_trials
     rows, best = summarize_transfer(champions, work.known(), task.score_range)
     result = TransferResult(
         order.study,

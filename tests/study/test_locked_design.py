@@ -174,6 +174,7 @@ def test_no_view_shows_results_by_arm_while_the_design_is_blind(two, tmp_path):
     saved = SavedFile(file).read()
     texts["lab"] = repr(saved) + " ".join(trial.name for trial in saved.trials) + " ".join(saved.looks)
     assert "Stop: the planned end is reached." in texts["lab"]
+    assert "Deviations from the locked plan: none." in saved.looks
     for call in (
         lambda: write_fieldtrial(file, tmp_path / "z.csv", 0.1),
         lambda: advise(file, null="mean"),

@@ -129,7 +129,9 @@ def _looks(ledger: Ledger) -> tuple[str, ...]:
     try:
         looks = () if ledger.comparison() is None else tuple(advise_ledger(ledger).sentences)
         report = design_report(ledger)
-        return looks if report is None else (*looks, *report.sentences)
+        if report is None:
+            return looks
+        return (*looks, report.line, f"SHA-256 of the locked design: {report.design.sha256}.")
     except RealityGapError as error:
         return (str(error),)
 

@@ -53,11 +53,15 @@ WITH = {
     "estimate": {"range": {"range": "0:100"}, "minus": {"of": "A"}},
     "compare": {"range": {"range": "0:100"}},
     "gap": {},
-    "plan": {"margin": {"effect": None}, "correlation": {"effect": None, "correlation": 0.9}},
+    "plan": {
+        "margin": {"effect": None},
+        "correlation": {"effect": None, "correlation": 0.9},
+        "alpha": {"sequential": True},
+    },
     "transfer": {},
     "try": {
         name: {"against": "other.json", "trials": 40, "out": "pairs.sqlite"}
-        for name in ("against", "margin", "null", "blind")
+        for name in ("against", "margin", "null", "alpha", "blind")
     },
 }
 """Values that a field needs with it."""

@@ -136,6 +136,14 @@ def test_another_test_than_the_planned_one_is_reported(two):
     assert advise(two["out"]).planned == "planned"
 
 
+def test_error_rate_is_that_of_the_order(two):
+    with pytest.raises(StudyError, match="at least 8 pairs"):
+        try_pairs(**{**two, "trials": 7}, alpha=0.01)
+    tried = try_pairs(**two, alpha=0.01).advice
+    assert (tried.test.alpha, tried.planned) == (0.01, "planned")
+    assert tried.comparisons[0].e >= 100
+
+
 def test_equivalence_ends_a_comparison(two, tmp_path):
     alike = {**two, "genome": tmp_path / "two.json", "against": tmp_path / "three.json", "margin": 0.2}
     comparison = try_pairs(**alike).advice.comparisons[0]
@@ -261,6 +269,8 @@ def test_sequential_plan_has_the_pairs_next_to_the_fixed_design():
     plan = plan_gap(effect=0.1, sequential=True, spreads=Spreads(0.1, 0.2, "a test"))
     assert (plan.pairs.fixed, plan.pairs.maximum) == (18, 40)
     assert plan.needed == ()
+    strict = plan_gap(effect=0.1, sequential=True, alpha=0.01, spreads=Spreads(0.1, 0.2, "a test"))
+    assert (strict.pairs.fixed, strict.pairs.maximum) == (27, 58)
     with pytest.raises(StudyError, match="needs"):
         plan_gap(margin=0.1, sequential=True)
 

@@ -244,7 +244,8 @@ def _print_pairs(found: GapPlan, pairs: PlannedPairs) -> None:
         f"{'sequential, any looks':24}{pairs.median:>8,}{pairs.mean:>8,.0f}{pairs.quantile:>8,}{pairs.maximum:>12,}"
         f"{pairs.power:>10.2f}"
     )
+    level = "" if order.alpha == PlanOrder.model_fields["alpha"].default else f" --alpha {order.alpha:g}"
     echo(
         f"The sequential test stops early if the difference is larger. Drive it with: realitygap try A.json --against "
-        f"B.json --on PLATFORM --trials {pairs.maximum} -o pairs.sqlite"
+        f"B.json --on PLATFORM --trials {pairs.maximum}{level} -o pairs.sqlite"
     )

@@ -8,7 +8,7 @@ from typing import ClassVar, Literal, get_args
 
 from ._field import option
 from ._order import Order, OrderError
-from ._shared import Seed, arena_option, seed_option, task_option
+from ._shared import ALPHA, Seed, alpha_option, arena_option, seed_option, task_option
 
 Question = Literal["effect", "margin", "correlation"]
 
@@ -55,6 +55,7 @@ class PlanOrder(Order):
     sequential: bool = option(
         False, help="Plan to compare two controllers in pairs of trials, with looks after each pair."
     )
+    alpha: float = alpha_option()
     data: Path | None = option(
         None,
         help="Recorded trials to estimate the noise from.",
@@ -91,6 +92,8 @@ class PlanOrder(Order):
                 f"least is {self.least} and correlation {self.correlation}, expected -1 < least < correlation < 1.",
             )
 
+        if self.alpha != ALPHA and not self.sequential:
+            yield "alpha", "--alpha is only for --sequential. Leave it out."
         if self.sequential and self.effect is None:
             yield (
                 "sequential",

@@ -18,6 +18,9 @@ ONLY_TWINS = "Only for twins"
 ONLY_LOCKED = "Lock the design"
 ONLY_TABLES = "Only for tables of scores"
 
+ALPHA = 0.05
+"""Default error rate of a sequential test."""
+
 _MOST_SEED = 2**63 - 1
 """Integers of kernels and of TOML have 64 bits. No help text shows this limit, because it has 19 digits."""
 
@@ -131,6 +134,18 @@ def score_option(**face: str) -> Any:
         default_is="score, or success",
         metavar="COLUMN",
         **face,  # type: ignore[arg-type]  # mypy takes them for limits
+    )
+
+
+def alpha_option(**face: str) -> Any:
+    """Return the field of the error rate of a sequential test."""
+    return option(
+        ALPHA,
+        help="Error rate: probability to claim a difference if there is none, at any number of looks.",
+        above=0,
+        at_most=0.5,
+        metavar="A",
+        **face,  # type: ignore[arg-type]
     )
 
 

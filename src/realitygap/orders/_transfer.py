@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, ClassVar, Literal
@@ -13,11 +14,13 @@ from realitygap.robot_families import port_platforms
 from ._field import argument, option
 from ._order import Order
 from ._shared import (
+    ALPHA,
     Blind,
     Lock,
     Processes,
     Seed,
     Witness,
+    alpha_option,
     arena_option,
     folder_option,
     seed_option,
@@ -25,8 +28,10 @@ from ._shared import (
 
 ONLY_PAIRS = "Only to compare two controllers"
 
-FEWEST_PAIRS = 6
-"""Pairs below which a test at 5 % can show nothing: each of them at most doubles E/2, which begins at 1/2."""
+
+def fewest_pairs(alpha: float) -> int:
+    """Return the pairs below which a test can show nothing: each of them at most doubles E/2, which begins at 1/2."""
+    return math.floor(math.log2(2 / alpha)) + 1
 
 
 class TryOrder(Order):
@@ -76,6 +81,7 @@ class TryOrder(Order):
         metavar="M",
         panel=ONLY_PAIRS,
     )
+    alpha: float = alpha_option(panel=ONLY_PAIRS)
     null: Literal["distribution", "mean"] = option(
         "distribution",
         help="Hypothesis to refute: that both have the same distribution of coverage, or the same mean, which needs "
@@ -110,18 +116,18 @@ class TryOrder(Order):
     def conflicts(self) -> Iterator[tuple[str, str]]:
         """Yield the field and the message for each setting that others exclude."""
         if self.against is None:
-            if self.margin is not None or self.null != "distribution":
-                yield "against", "--margin and --null need a second controller (--against GENOME)."
+            if self.margin is not None or self.null != "distribution" or self.alpha != ALPHA:
+                yield "against", "--margin, --null and --alpha need a second controller (--against GENOME)."
             elif self.blind:
                 yield (
                     "blind",
                     "--blind needs a second controller (--against GENOME): one alone has no arms to hide.",
                 )
             return
-        if self.trials < FEWEST_PAIRS:
+        if self.trials < (fewest := fewest_pairs(self.alpha)):
             yield (
                 "trials",
-                f"--trials is {self.trials}, expected at least {FEWEST_PAIRS} pairs with --against: fewer can show "
+                f"--trials is {self.trials}, expected at least {fewest} pairs with --against: fewer can show "
                 "nothing. For example: --trials 40",
             )
 

@@ -287,15 +287,16 @@ def fewest(
     return high
 
 
-def fewest_pairs(effect: float, spread: float, power: float = POWER) -> int | None:
-    """Return the fewest pairs with which a paired t test at 5 % finds a mean difference; None above 100,000.
+def fewest_pairs(effect: float, spread: float, power: float = POWER, alpha: float = ALPHA) -> int | None:
+    """Return the fewest pairs with which a paired t test finds a mean difference; None above 100,000.
 
     Args:
         effect: Mean difference.
         spread: Standard deviation of a difference, above 0.
         power: Probability of detecting it.
+        alpha: Two-sided level.
     """
-    return fewest(lambda n: _t_power(effect / spread, n), power)
+    return fewest(lambda n: _t_power(effect / spread, n, alpha=alpha), power)
 
 
 def runs_needed(effect: float, *, paired: bool, alpha: float = ALPHA) -> int | None:

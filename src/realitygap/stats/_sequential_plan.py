@@ -85,7 +85,7 @@ def plan_pairs(
     Args:
         effect: Mean difference, above 0.
         spread: Standard deviation of a difference.
-        test: The test. Default: the sign-symmetric one at 5 %.
+        test: The test, which also gives the level of the fixed design. Default: the sign-symmetric one at 5 %.
         power: Power of the fixed design.
         maximum: Maximum number of pairs. Default: twice the fixed number, and 4 more.
         seed: Seed of the simulated studies.
@@ -96,13 +96,14 @@ def plan_pairs(
     check_finite({"effect": effect, "spread": spread})
     if effect <= 0 or spread < 0:
         raise ValueError(f"effect is {effect} and spread {spread}, expected above 0, and 0 or more.")
-    fixed = fewest_pairs(effect, spread, power) if spread > 0 else 2
+    test = test or SequentialTest()
+    fixed = fewest_pairs(effect, spread, power, test.alpha) if spread > 0 else 2
     if fixed is None:
         return PlannedPairs(None)
     most = 2 * fixed + 4 if maximum is None else maximum
     studies = max(100, min(_STUDIES, _MOST_DRAWN // most))
     differences = np.clip(np.random.default_rng(seed).normal(effect, spread, (studies, most)), -1.0, 1.0)
-    ends = (test or SequentialTest()).stops(differences)
+    ends = test.stops(differences)
     pairs = np.where(ends > 0, ends, most)
     return PlannedPairs(
         fixed, most, _rank(pairs, 0.5), float(pairs.mean()), _rank(pairs, _QUANTILE), float((ends > 0).mean())

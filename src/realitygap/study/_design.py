@@ -91,12 +91,13 @@ def design_of(
 def _rules(order: Order, unit: Unit) -> dict[str, Any]:
     """Return the rules that follow from settings alone, so that an amendment of these changes them."""
     blocks = int(getattr(order, "trials", 0)) if unit else 0
+    alpha: float = getattr(order, "alpha", SequentialTest().alpha)
     null: Null = getattr(order, "null", "distribution")
     margin: float | None = getattr(order, "margin", None)
     has_test = order.command in ("try", "gap") and unit
     return {
         "blocks": blocks,
-        "test": SequentialTest(null=null, margin=margin).to_dict() if has_test else None,
+        "test": SequentialTest(alpha, null, margin).to_dict() if has_test else None,
     }
 
 

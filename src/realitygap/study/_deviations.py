@@ -220,7 +220,7 @@ def _void(ledger: Ledger) -> Iterator[str]:
 
 def _batteries(ledger: Ledger, locked: LockedDesign) -> Iterator[str]:
     least = (locked.design.get("target") or {}).get("least_battery_v")
-    if least is None:
+    if not isinstance(least, int | float):
         return
     for where, trial in driven_trials(ledger):
         if trial.battery_v is not None and trial.battery_v < least:
@@ -237,7 +237,7 @@ def _ends(ledger: Ledger, locked: LockedDesign) -> Iterator[str]:
         yield "The test is not the one of the locked design."
     n, stopped_at = count_complete(ledger, locked), None
     if unit == "pair" and known is not None:
-        (look,) = (each.look for each in unblinded_advice(ledger).comparisons)
+        look = unblinded_advice(ledger).comparisons[0].look
         stopped_at = look.n if look.is_stop else None
         if look.claimed_at is not None and look.claimed_at < look.n:
             yield f"{counted(look.n - look.claimed_at, unit)} were driven after the test had ended."

@@ -81,7 +81,7 @@ def try_pairs(
         raise StudyError(f"{order.genome} and {order.against} are the same controller, expected two.")
     texts = [each.to_json() for each in genomes]
     blocks = Blocks.drawn(texts, order.trials, order.seed)
-    test = SequentialTest(null=order.null, margin=order.margin)
+    test = SequentialTest(order.alpha, order.null, order.margin)
     arena = load_arena(order.arena)
     with open_target(order.on, arena, witness=order.witness, observer=observer, key=order.seed) as target:
         refuse_more_than_is_seen(target, order.observe)

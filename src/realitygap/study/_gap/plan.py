@@ -15,6 +15,7 @@ from realitygap.records import read_observations, those_that_count
 from realitygap.stats import (
     Needed,
     PlannedPairs,
+    SequentialTest,
     plan_correlation,
     plan_effect,
     plan_margin,
@@ -158,7 +159,8 @@ def plan_gap(
         apart = known.controllers / 2 if order.spread is None else order.spread
         if order.sequential:
             between = spread_of_differences(0.0, known.noise, 1)
-            pairs = plan_pairs(order.value, between, power=order.power, seed=order.seed)
+            test = SequentialTest(order.alpha)
+            pairs = plan_pairs(order.value, between, test=test, power=order.power, seed=order.seed)
             return GapPlan(order, scored_by.score_name, 0.0, known, (), pairs)
         rows = tuple(_needed(order, known, apart, r) for r in trials)
     except ValueError as error:

@@ -260,6 +260,7 @@ def measure(key: Key) -> dict[str, Any]:
         "set": name,
         "family": family,
         "twin": twin,
+        "sentence": SETS[name][twin].sentence if family == "outside" else "",
         "seed": seed,
         "observe": observe,
         "label": "TWIN",

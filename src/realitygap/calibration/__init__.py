@@ -13,7 +13,7 @@ from ._motion import fit_motion
 from ._motion_log import LogPrediction, MotionLogFit, fit_motion_log, fit_motion_logs, motion_log
 from ._path import fit_path, path_plans
 from ._plans import contact_plans, excitation, motion_plans, next_trials, random_controllers
-from ._predictive import PREDICTED, Misfit, misfits, prediction_errors
+from ._predictive import PREDICTED, TOLERATED, Misfit, misfits, prediction_errors
 from ._prior import (
     CONTACT,
     MOTION,
@@ -27,6 +27,7 @@ from ._prior import (
     values_of,
 )
 from ._range_table import choose_frame, fit_range_table
+from ._residual_patterns import Pattern, residual_patterns
 from ._ruler import Moved, end_pose_of, moved_in, ruled
 from ._score import information_of
 from ._simulate import Simulate, of_one_length, step_of
@@ -50,6 +51,7 @@ __all__ = [
     "LEAST_STEPS",
     "MOTION",
     "PREDICTED",
+    "TOLERATED",
     "BearingFrom",
     "Effect",
     "Effort",
@@ -65,6 +67,7 @@ __all__ = [
     "Moved",
     "Parameter",
     "PathErrors",
+    "Pattern",
     "Placement",
     "Posterior",
     "SensorFit",
@@ -111,6 +114,7 @@ __all__ = [
     "prediction_errors",
     "random_controllers",
     "ranges_of",
+    "residual_patterns",
     "ruled",
     "scribbler_prior",
     "sensor_plans",

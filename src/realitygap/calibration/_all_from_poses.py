@@ -167,21 +167,33 @@ def _spread_slip(
     """Spread slip, from encoders or from the prior, and compensate for it with `gain`."""
     for parameter in prior:
         if parameter.name == SLIP:
-            slips = _slips(parameter, shots, rng)
+            slips = _slips(parameter, shots, float(np.median(values.get("drive.axle", 0.0))), rng)
             values[SLIP] = slips
             for name, power in WITH_SLIP.items():
                 if name in values:
                     values[name] = values[name] * (1 - slips) ** power
 
 
-def _slips(parameter: Parameter, shots: Shots, rng: np.random.Generator) -> Floats:
-    """Return draws of slip, (N_DRAWS,)."""
+def _slips(parameter: Parameter, shots: Shots, axle: float, rng: np.random.Generator) -> Floats:
+    """Return draws of slip, (N_DRAWS,): the share of the wheels' distance that the middle of their axle lacks.
+
+    The middle of the axle moves along an arc, whose chord is shorter. If the axle is not at the origin, the origin
+    moves farther in turns.
+
+    Args:
+        parameter: Slip, with its prior.
+        shots: Commands.
+        axle: Position of the axle, ahead of the origin [m].
+        rng: Random numbers.
+    """
     turned = np.abs(np.diff(shots.wheels, axis=1)).mean(axis=2)
     some = shots.known & ~shots.touching & np.isfinite(turned) & (turned > LEAST_WAY)
     forward = some & (np.prod(np.sign(np.nan_to_num(np.diff(shots.wheels, axis=1))), axis=2) > 0)
     if forward.sum() < LEAST_COMMANDS:
         return np.asarray(parameter.prior.of(rng.uniform(size=N_DRAWS)))
-    lost = 1.0 - np.hypot(*shots.moved[forward][:, :2].T) / turned[forward]
+    ahead, aside, turn = shots.moved[forward].T
+    chord = np.hypot(ahead + axle * (np.cos(turn) - 1), aside + axle * np.sin(turn))
+    lost = 1.0 - chord / np.sinc(turn / (2 * np.pi)) / turned[forward]
     n = len(lost)
     medians = [np.median(lost[rng.integers(n, size=n)]) for _ in range(N_STALLS)]
     draws = np.clip(np.array(medians), parameter.prior.lowest, parameter.prior.highest)

@@ -84,6 +84,11 @@ def _in_own_frame(after: NDArray[np.floating], before: Floats) -> Floats:
     return np.stack([x * cosine + y * sine, y * cosine - x * sine, turn], axis=-1)
 
 
+def moved_by(rehearsal: Rehearsal, poses: Floats) -> Floats:
+    """Return the motion of m robots at each command from poses (k, t + 1, 3), (m, k, t, 3); 0 if there was none."""
+    return np.nan_to_num(_in_own_frame(rehearsal.poses[:, :, 1:].astype(np.float64), poses[None, :, :-1]))
+
+
 @dataclass(frozen=True)
 class Shooter:
     """A simulation of the commands of shots in `sim`."""
@@ -95,10 +100,9 @@ class Shooter:
 
     def moved(self, values: Mapping[str, Floats], key: int) -> Floats:
         """Return the motion of m robots at each command, (m, k, t, 3); 0 if there was none."""
-        before = self.shots.poses[None, :, :-1]
 
         def of(rehearsal: Rehearsal) -> Floats:
-            return np.nan_to_num(_in_own_frame(rehearsal.poses[:, :, 1:].astype(np.float64), before))
+            return moved_by(rehearsal, self.shots.poses)
 
         numbers = numbers_of(self.prior, values, self.robot)
         return self.ensemble.summarize(self.shots.play, numbers, key, of, keep=("poses",))

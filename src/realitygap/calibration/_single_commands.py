@@ -26,6 +26,7 @@ NOISE = (
     "drive.travel_noise_per_m",
 )
 SLIP = "drive.slip"
+DEAD_BAND = "drive.dead_band"
 FREEDOM = 4.0  # degrees, of the t distribution
 FINEST = np.array([3e-4, 3e-4, 2e-3])  # [m, m, rad] added to the scale of differences of free robots
 COARSE = np.array([6e-3, 6e-3, 6e-2])  # likewise where robots touch something: there `sim` errs most
@@ -38,6 +39,7 @@ N_NOISE = 200  # draws of noise
 MOST_OFF = 5.0  # standard deviations beyond which a difference tells of no noise
 SCAN = (0.002, 0.05, 0.15, 0.3, 0.45, 0.6, 0.75, 0.9, 0.998)  # places of each parameter that are tried first
 SCANS = 2
+BANDS = (np.arange(60) + 0.5) / 60  # places of the dead band that are compared
 N_SHIFT = 100  # robots that show by how much noise moves the mean
 NOISE_FLOOR = np.array([1e-4, 1e-3])  # [m, rad]
 PARTS = {"drive.delay_jitter": 0.05, "drive.heading_noise_per_m": 0.05,
@@ -67,6 +69,8 @@ class MotionOfCommands:
         self.mean = [p for p in shooter.prior if is_motion(p.name)]
         self.noise = [p for p in shooter.prior if p.name in NOISE]
         self.n_simulated = 0
+        names = [p.name for p in self.mean]
+        self.band = names.index(DEAD_BAND) if DEAD_BAND in names else None
         self.own_scales: Floats | None = None  # (k, t, 3) of the noise, once it is known
         self.shift: Floats = np.zeros(3)  # by which noise moves the mean, likewise
 
@@ -124,6 +128,8 @@ class MotionOfCommands:
         off = self._off(tried)
         fall = off[:p] - off[p:]
         fall[..., 2] = wrapped(fall[..., 2])
+        if self.band is not None:
+            fall[self.band] = 0.0
         return np.asarray(fall / (ends[1] - ends[0])[:, None, None, None])
 
     def _scales(self, off: Floats) -> Floats:
@@ -139,7 +145,33 @@ class MotionOfCommands:
         return scales
 
     def _best(self, start: Floats) -> tuple[Floats, Floats]:
-        """Return the places with the smallest differences, and these differences.
+        """Return the places with the smallest differences, and these differences."""
+        places, off = self._smoothly_best(start)
+        if self.band is not None:
+            best = self._bands(places, self._scales(off))[1].argmin()
+            band = places[self.band]
+            places[self.band] = BANDS[best]
+            if abs(BANDS[best] - band) > STEP:
+                places, off = self._smoothly_best(places)
+        return places, off
+
+    def _bands(self, places: Floats, scales: Floats) -> tuple[Floats, Floats]:
+        """Return the costs of each block of commands, (n_blocks, b), and their sums, (b,), for each dead band.
+
+        A dead band only decides which commands move a wheel. So differences change in steps, and their slopes tell
+        nothing of its likely values.
+        """
+        tried = np.repeat(places[None], len(BANDS), axis=0)
+        tried[:, self.band] = BANDS
+        off = self._off(tried) / scales
+        costs = 0.5 * (FREEDOM + 3.0) * np.log1p((off**2).sum(axis=-1) / FREEDOM)
+        block, n_blocks = self.shooter.shots.blocks(BLOCK)
+        sums = np.zeros((n_blocks, len(BANDS)))
+        np.add.at(sums, block.reshape(-1), costs.reshape(len(BANDS), -1).T)
+        return sums, sums.sum(axis=0)
+
+    def _smoothly_best(self, start: Floats) -> tuple[Floats, Floats]:
+        """Return the places with the smallest differences for the dead band at the start, and these differences.
 
         SciPy's robust losses weigh each difference by itself. Here, all three of a command have one weight: a robot
         that takes another path differs in all of them.
@@ -154,6 +186,8 @@ class MotionOfCommands:
             flat = (slopes * weight).reshape(len(places), -1)
             curvature = flat @ flat.T + PRIOR_PRECISION * np.eye(len(places))
             pull = flat @ (off / scales * weight).reshape(-1) + PRIOR_PRECISION * (0.5 - places)
+            if self.band is not None:
+                pull[self.band] = 0.0
             cost = _cost(off / scales, places)
             for _ in range(6):
                 damped = curvature + damping * np.diag(np.diag(curvature))
@@ -187,7 +221,16 @@ class MotionOfCommands:
             draws[k] = _within(
                 places, curvature, shares @ pulls + PRIOR_PRECISION * (self.rng.uniform(size=p) - places)
             )
+        if self.band is not None:
+            draws[:, self.band] = self._draws_of_band(places, scales, n)
         return draws
+
+    def _draws_of_band(self, places: Floats, scales: Floats, n: int) -> Floats:
+        """Return places of the dead band, (n,), each with other weights of blocks; even between two commands."""
+        costs, _ = self._bands(places, scales)
+        logs = -self.rng.exponential(size=(n, len(costs))) @ costs
+        best = np.argmax(logs + self.rng.gumbel(size=logs.shape), axis=1)
+        return np.asarray(BANDS[best] + (self.rng.uniform(size=n) - 0.5) / len(BANDS))
 
     def _noise(self, places: Floats, off: Floats) -> Floats:
         """Return draws of the noise of robots that touch nothing, (N_NOISE, q).

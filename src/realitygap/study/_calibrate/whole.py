@@ -20,6 +20,7 @@ from realitygap.calibration import (
     Floats,
     Misfit,
     Parameter,
+    Pattern,
     Posterior,
     evidence_of,
     excitation,
@@ -35,6 +36,7 @@ from realitygap.calibration import (
     of_one_length,
     random_controllers,
     ranges_of,
+    residual_patterns,
     scribbler_prior,
     step_of,
     values_of,
@@ -194,16 +196,23 @@ class _Fitter:
         return evidence_in(self.arena, trials)
 
     def posterior(self, trials: Sequence[TrialRecord], effort: Effort) -> Posterior:
-        """Return the part of the prior that remains.
+        """Return the part of the prior that remains."""
+        return self._posteriors(trials, effort)[0]
 
-        It is three parts of a fit whose minimum is sharp, and one part that of whole trials by simulation alone: where
-        `sim` cannot make both, the first knows how the robot moves and the second what comes of it. With poses, the
-        first is that of single commands. Without poses, it is that of whole trials with the same commands.
+    def _posteriors(
+        self, trials: Sequence[TrialRecord], effort: Effort
+    ) -> tuple[Posterior, Posterior | None]:
+        """Return the part of the prior that remains, and with poses, the part of it that single commands leave.
+
+        What remains is three parts of a fit whose minimum is sharp, and one part that of whole trials by simulation
+        alone: where `sim` cannot make both, the first knows how the robot moves and the second what comes of it. With
+        poses, the first is that of single commands. Without poses, it is that of whole trials with the same commands.
         """
         usable = [trial for trial in trials if len(trial.commands) >= LEAST_STEPS]
         if not usable:
-            return self._posterior_of_trials(trials, effort)
-        if all(trial.observe == "track" for trial in usable):
+            return self._posterior_of_trials(trials, effort), None
+        is_seen = all(trial.observe == "track" for trial in usable)
+        if is_seen:
             sharp = fit_from_poses(
                 usable, self.ensemble, self.prior, self.robot, self.arena, seed=self.seed, tell=self.tell
             )
@@ -222,7 +231,7 @@ class _Fitter:
                 effort=effort,
             )
             self.tell(f"commands: {sum(len(trial.commands) for trial in usable)}, given again")
-        return mixed(sharp, whole, self.prior, share=OF_COMMANDS)
+        return mixed(sharp, whole, self.prior, share=OF_COMMANDS), sharp if is_seen else None
 
     def _posterior_of_trials(self, trials: Sequence[TrialRecord], effort: Effort) -> Posterior:
         return fit_all(
@@ -237,8 +246,9 @@ class _Fitter:
         """Return all that the trials tell."""
         if not self.evidence(trials):
             return self._as_it_is()
-        posterior = self.posterior(trials, effort)
+        posterior, of_commands = self._posteriors(trials, effort)
         numbers, draws = self.robots(posterior)
+        patterns = [] if of_commands is None else self._patterns(trials, of_commands)
         found = misfits(self.evidence(trials), self.simulate, draws, key=self.seed)
         fitted = tuple(_fitted(parameter, posterior) for parameter in self.prior)
         parts = Fit(
@@ -246,10 +256,15 @@ class _Fitter:
             numbers=numbers,
             draws=draws,
             method=METHOD,
-            notes=(*_bound_by_prior(fitted), *(_said_of(misfit) for misfit in found)),
-            misspecified=any(misfit.is_too_large for misfit in found),
-            misspecification_p=min(1.0, len(found) * min(misfit.p for misfit in found)),
-            evidence={"misfit": {misfit.kind: round(misfit.share, 4) for misfit in found}},
+            notes=(
+                *_bound_by_prior(fitted),
+                *(_said_of(misfit) for misfit in found),
+                *_patterns_in_words(patterns),
+            ),
+            misspecified=any(misfit.is_too_large for misfit in found)
+            or any(pattern.is_too_large for pattern in patterns),
+            misspecification_p=_smallest_p(found, patterns),
+            evidence=_evidence_of(found, patterns),
         )
         return compare_on_trials(
             parts,
@@ -257,6 +272,13 @@ class _Fitter:
             lambda some: self.robots(self.posterior(some, "least")),
             self.ensemble,
             seed=self.seed,
+        )
+
+    def _patterns(self, trials: Sequence[TrialRecord], posterior: Posterior) -> list[Pattern]:
+        usable = [trial for trial in trials if len(trial.commands) >= LEAST_STEPS]
+        numbers = self.numbers(posterior.values)
+        return residual_patterns(
+            usable, self.ensemble, self.robot, self.arena, numbers, key=self.seed + len(usable)
         )
 
     def robots(self, posterior: Posterior) -> tuple[dict[str, float], dict[str, Floats]]:
@@ -347,3 +369,43 @@ def _bound_by_prior(fitted: Sequence[Fitted]) -> tuple[str, ...]:
 def _said_of(misfit: Misfit) -> str:
     most = f"expected at most {misfit.tolerated:.0%}"
     return f"{misfit.kind}: {misfit.share:.0%} of its variance is neither predicted nor chance, {most}."
+
+
+def _patterns_in_words(patterns: Sequence[Pattern]) -> list[str]:
+    """Return a note on the largest pattern of each kind that is too large, or that there is none.
+
+    Without poses, there are no patterns and no notes. The other patterns are mostly shadows of the largest: a robot has
+    most of its headings in some part of the arena.
+    """
+    largest: dict[str, Pattern] = {}
+    for pattern in patterns:
+        if pattern.is_too_large:
+            largest.setdefault(pattern.kind, pattern)
+    if patterns and not largest:
+        return [
+            "What the fit leaves goes with no time, trial, heading, place, or command by more than expected."
+        ]
+    return [
+        f"{pattern.message} {_percent(pattern.share)} of the variance of {pattern.kind} goes with {pattern.goes_with}, "
+        f"expected at most {_percent(pattern.tolerated)}."
+        for pattern in largest.values()
+    ]
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.2g}%"
+
+
+def _smallest_p(found: Sequence[Misfit], patterns: Sequence[Pattern]) -> float:
+    """Return the smallest p over kinds of observation, and of the strongest pattern, times their number."""
+    values = [misfit.p for misfit in found] + [min(pattern.p for pattern in patterns)] * bool(patterns)
+    return min(1.0, len(values) * min(values))
+
+
+def _evidence_of(found: Sequence[Misfit], patterns: Sequence[Pattern]) -> dict[str, dict[str, float]]:
+    shares = {"misfit": {misfit.kind: round(misfit.share, 4) for misfit in found}}
+    if patterns:
+        shares["patterns"] = {
+            f"{pattern.kind} by {pattern.goes_with}": round(pattern.share, 6) for pattern in patterns
+        }
+    return shares

@@ -181,6 +181,14 @@ def test_damaged_events_are_one_error(path):
                 ledger.design()
 
 
+def test_design_without_its_lock_is_damaged(path):
+    with contextlib.closing(sqlite3.connect(path)) as connection:
+        connection.execute("UPDATE events SET what = 'another' WHERE what = 'design locked'")
+        connection.commit()
+    with Ledger.open(path, writable=False) as ledger, pytest.raises(LedgerError, match="before it"):
+        ledger.design()
+
+
 def lock_and_die(path: str, point: str) -> None:
     """Lock a blind design, and end as a power cut does at a point."""
 

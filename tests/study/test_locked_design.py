@@ -12,9 +12,10 @@ import pytest
 
 from realitygap.errors import RealityGapError, RecordError, StudyError
 from realitygap.evolution import NeatSettings, Population
+from realitygap.lab._counts import Counts
 from realitygap.lab._saved import SavedFile
 from realitygap.orders import OrderError
-from realitygap.records import RESUMED, Ledger, open_ledger, secret_path
+from realitygap.records import RESUMED, Ledger, ResultsFolder, open_ledger, secret_path
 from realitygap.report import write_report
 from realitygap.study import (
     BlindAdvice,
@@ -27,6 +28,7 @@ from realitygap.study import (
     gap_between,
     make_calibration,
     run_transfer,
+    sample_controllers,
     try_pairs,
     unblind_design,
     write_fieldtrial,
@@ -377,6 +379,24 @@ def test_gap_and_estimate_drive_each_round_in_the_order_of_the_hash_and_list_dev
         gap_between("sim", "sim:scribbler-s1", **order, lock=True)
 
 
+def test_blind_gap_shows_no_controller_until_it_is_unblinded(tmp_path):
+    order = {"n_controllers": 3, "trials": 2, "observe": "cells", "results": tmp_path / "gap.sqlite"}
+    with pytest.raises(StudyError, match="2 of 2 rounds complete") as end:
+        gap_between("sim", "sim:scribbler-s1", **order, blind=True)
+    file = order["results"]
+    texts = [str(end.value), *(repr(each) for each in SavedFile(file).read().looks)]
+    views = (("list",), ("list", "--json"), ("show",), ("show", "--json"), ("show", "2", "--json"))
+    for action, *rest in (*views, ("advise",), ("advise", "--json")):
+        texts.append(answered("trials", action, file, *rest))
+    assert "2 rounds of at most 2 complete. Stop" in texts[-2]
+    names = [each.name for each in sample_controllers("random", 3, 1)]
+    for text in texts:
+        for word in (*names, '"hidden"', "controller 1", '"number": 4', "E ="):
+            assert word not in text, (word, text)
+    unblind_design(file, "all trials are driven")
+    assert gap_between("sim", "sim:scribbler-s1", **order).study.result.notes
+
+
 def test_calibration_and_single_controller_lock_their_rules(two, tmp_path):
     fit = {"robot": "sim", "budget": 2, "out": tmp_path / "fit.toml"}
     made = make_calibration("path", **fit, lock=True)
@@ -432,4 +452,6 @@ def test_study_on_a_robot_locks_its_conditions_and_lists_deviations(tmp_path):
     drive(replicates="2")
     (amended,) = deviations(tmp_path)
     assert amended.endswith("more runs. replicates: 1 → 2.")
+    looks = Counts(tmp_path, ResultsFolder.open(tmp_path).description).looks()
+    assert looks == f"Deviations from the locked plan: {amended}"
     assert amended in write_report(tmp_path).read_text("utf-8").replace("&#39;", "'")

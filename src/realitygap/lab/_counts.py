@@ -23,7 +23,7 @@ from realitygap.records import (
     settings_of_condition,
 )
 from realitygap.runs import Condition
-from realitygap.study import advise
+from realitygap.study import advise, design_report
 from realitygap.world import Arena
 
 from ._scoring_files import (
@@ -158,12 +158,21 @@ class Counts:
             return self._found
 
     def looks(self) -> str:
-        """Return what complete runs show of the conditions on a robot; empty if it is blind, or has one."""
-        physical = [each for each in self._settings.values() if is_physical(each)]
-        if self.is_blind or len(physical) < 2 or not (self._folder / LEDGER_NAME).exists():
+        """Return what complete runs show of the conditions on a robot, and deviations from a locked design.
+
+        There is nothing to show of one condition, or of blind ones.
+        """
+        if not (self._folder / LEDGER_NAME).exists():
             return ""
+        physical = [each for each in self._settings.values() if is_physical(each)]
+        is_compared = len(physical) > 1 and not self.is_blind
         try:
-            return advise(self._folder).summary
+            report = design_report(self._folder)
+            parts = (
+                advise(self._folder).summary if is_compared else "",
+                "" if report is None else report.line,
+            )
+            return " ".join(filter(None, parts))
         except RealityGapError as error:
             return str(error)
 

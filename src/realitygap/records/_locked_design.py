@@ -211,6 +211,8 @@ def read_design(events: Sequence[DesignEvent], ledger: Path) -> LockedDesign | N
     """
     if not events:
         return None
+    if events[0].what != LOCKED:
+        raise ValueError(f"{events[0].what!r} has no {LOCKED!r} before it")
     for event in events:
         _check(event)
     problem, previous = "", ""

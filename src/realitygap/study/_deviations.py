@@ -103,7 +103,7 @@ def design_report(source: Ledger | Path | str) -> DesignReport | None:
 
 
 def check_unblinded(file: Path | str | None) -> tuple[str, ...]:
-    """Return the deviations of a command whose trials are all driven, in one line; empty without a locked design.
+    """Return hash and deviations of the design of a command whose trials are all driven; empty without a locked one.
 
     Args:
         file: File of its trials; None if there is none.
@@ -119,13 +119,13 @@ def check_unblinded(file: Path | str | None) -> tuple[str, ...]:
             f"{report.progress}. The design is blind, so no result is shown. Unblind it, then run the same command "
             f'again: realitygap trials unblind {file} --reason "all trials are driven"'
         )
-    return (report.line,)
+    return (f"SHA-256 of the locked design: {report.design.sha256}.", report.line)
 
 
 def _deviations(ledger: Ledger, locked: LockedDesign) -> Iterator[str]:
     if locked.problem:
         yield f"The record was edited: {locked.problem}."
-    if locked.was_blind and locked.secret is None:
+    if locked.is_blind and locked.secret is None:
         yield f"The secret of the codes, {secret_path(ledger.path).name}, is missing or was replaced."
     yield from _amendments(locked)
     yield from _sessions(ledger, locked)

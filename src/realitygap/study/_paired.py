@@ -26,9 +26,9 @@ from realitygap.runs import Condition
 from realitygap.stats import Null, SequentialTest
 from realitygap.tasks import Task, score_observed
 
-from ._advise import Advice, Planned, advise_on, blinded, strategy_differences
+from ._advise import Advice, BlindAdvice, Planned, advise_on, blinded, strategy_differences
 from ._code import task_named
-from ._design import digest_of
+from ._design import count_complete, digest_of
 
 CONTROLLERS = "controllers"
 ROUNDS = "rounds"
@@ -160,7 +160,14 @@ def advise_ledger(
             f"The design of {ledger.path} is blind, so only its locked test is used. Leave {', '.join(wanted)} out, "
             "or unblind the design first."
         )
-    return blinded(unblinded_advice(ledger, task=task), int(locked.design["blocks"]))
+    maximum = int(locked.design["blocks"])
+    if locked.design["unit"] != "round":
+        return blinded(unblinded_advice(ledger, task=task), maximum)
+    n, label = count_complete(ledger, locked), ledger.head().label  # the rule of a gap is to drive all rounds
+    test = SequentialTest() if locked.design["test"] is None else planned_test(locked.design)
+    return BlindAdvice(
+        str(locked.design["score"]), label, "round", test, "planned", maximum, (), n, n >= maximum
+    )
 
 
 def unblinded_advice(

@@ -81,8 +81,10 @@ def order_driven(file):
 
 
 def test_order_follows_from_the_hash_and_a_clean_run_has_no_deviations(two):
-    tried = try_pairs(**two, lock=True)
+    said = []
+    tried = try_pairs(**two, lock=True, say=said.append, tell=lambda advice: said.append(advice.line))
     locked = tried.design.design
+    assert said[0].endswith(f"SHA-256: {locked.sha256}"), "before trial 1"
     assert tried.design.deviations == ()
     assert tried.design.line == "Deviations from the locked plan: none."
     n = tried.advice.comparisons[0].look.n

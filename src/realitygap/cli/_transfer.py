@@ -48,7 +48,10 @@ def try_genome(order: TryOrder, allow_code: AllowPlatforms = False, as_json: Jso
 def _try_pairs(order: TryOrder, observer: PortObserver | None, *, as_json: bool) -> None:
     with resumable(order.out):
         tried = realitygap.study.try_pairs(
-            order, observer=observer, tell=lambda advice: echo(advice.line, err=True)
+            order,
+            observer=observer,
+            tell=lambda advice: echo(advice.line, err=True),
+            say=lambda text: echo(text, err=True),
         )
     if as_json:
         about = {"target": tried.target, "label": tried.label, "file": tried.file}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import getpass
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal
 
@@ -113,7 +113,12 @@ def target_facts(target: Target) -> dict[str, Any]:
 
 
 def hold_to_design(
-    file: Ledger, design: Mapping[str, Any], *, lock: bool, blind: bool = False
+    file: Ledger,
+    design: Mapping[str, Any],
+    *,
+    lock: bool,
+    blind: bool = False,
+    say: Callable[[str], None] | None = None,
 ) -> LockedDesign | None:
     """Lock the design of an order before its first trial, or check that the order is the one that was locked.
 
@@ -122,6 +127,7 @@ def hold_to_design(
         design: The design of the order.
         lock: True to lock it. A design that is locked already holds without it.
         blind: True to lock it blind.
+        say: Called with the hash when it was locked, before trial 1, so that it can be published.
 
     Returns:
         The locked design; None if the order has no lock, and the file none either.
@@ -131,10 +137,14 @@ def hold_to_design(
         RecordError: The file has trials of before the lock, or its design was edited.
     """
     try:
-        return _held(file, design, lock or blind, blind)
+        was_locked = file.design() is not None
+        locked = _held(file, design, lock or blind, blind)
     except BaseException:
         file.close()
         raise
+    if locked is not None and not was_locked and say is not None:
+        say(f"Locked the design in {file.path}. SHA-256: {locked.sha256}")
+    return locked
 
 
 def _held(file: Ledger, design: Mapping[str, Any], lock: bool, blind: bool) -> LockedDesign | None:
@@ -160,7 +170,9 @@ def _held(file: Ledger, design: Mapping[str, Any], lock: bool, blind: bool) -> L
     return locked
 
 
-def hold_folder_to_design(folder: Path, target: Target, design: Mapping[str, Any], *, lock: bool) -> None:
+def hold_folder_to_design(
+    folder: Path, target: Target, design: Mapping[str, Any], *, lock: bool, say: Callable[[str], None]
+) -> None:
     """Lock the design of an order whose trials are in several files of a folder, or hold the order to it.
 
     Args:
@@ -168,6 +180,7 @@ def hold_folder_to_design(folder: Path, target: Target, design: Mapping[str, Any
         target: Target of the trials.
         design: The design of the order.
         lock: True to lock it.
+        say: Called with the hash when it was locked.
 
     Raises:
         StudyError: The order differs from the locked design.
@@ -182,7 +195,7 @@ def hold_folder_to_design(folder: Path, target: Target, design: Mapping[str, Any
             "folder, or drive on without a lock."
         )
     with open_trials(path, target, "cells", within=folder) as file:
-        hold_to_design(file, design, lock=lock)
+        hold_to_design(file, design, lock=lock, say=say)
 
 
 def open_design(source: Path | str, *, writable: bool = True) -> Ledger:

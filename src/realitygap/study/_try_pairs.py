@@ -50,6 +50,7 @@ def try_pairs(
     *,
     observer: PortObserver | None = None,
     tell: Callable[[Advice], None] | None = None,
+    say: Callable[[str], None] | None = None,
 ) -> TriedPairs:
     """Compare two controllers from files on a platform, as `realitygap try GENOME --against GENOME`.
 
@@ -60,6 +61,7 @@ def try_pairs(
     Args:
         observer: Observer of a robot without a witness: it places the robot and reports what it drew.
         tell: Called after each pair with what is shown.
+        say: Called with the hash when the design was locked.
 
     Raises:
         ValueError: The order has no second controller.
@@ -92,7 +94,9 @@ def try_pairs(
         with KeptTarget(target, file, is_exclusive=True) as kept:
             arms = list(zip(names, texts, strict=True))
             design = design_of(order, target, score=COVERAGE, arms=arms, unit="pair")
-            if (locked := hold_to_design(file, design, lock=order.lock, blind=order.blind)) is not None:
+            if (
+                locked := hold_to_design(file, design, lock=order.lock, blind=order.blind, say=say)
+            ) is not None:
                 firsts = [locked.order(block)[0] for block in range(order.trials)]
                 blocks = Blocks(blocks.digests, "".join("AB"[first] for first in firsts))
             if locked is None or file.trials():

@@ -152,6 +152,7 @@ def gap_between(
             at_its_pace=calibration is None or not calibration.step_s,
             steps=setting.steps,
             order=order,
+            say=say,
         )
         gap = with_shown(gap, source, costly, controller=shown, steps=setting.steps)
     parts = None

@@ -61,7 +61,7 @@ def estimate_score(
     arena, steps = _place(order, controllers)
     check_task(task, arena)
     with both_open(order, arena, n * order.trials, observer=observer, pulse=pulse) as (source, target):
-        real = _tried(target, controllers[:n], order.trials, task, order, steps, tell)
+        real = _tried(target, controllers[:n], order.trials, task, order, steps, tell, say)
         deviations = check_unblinded(order.results)
         simulated = _tried(source, controllers, order.sim_trials, task, None, steps, tell)
     noise = None if real.trials < 2 else float(real.noise.mean())
@@ -151,6 +151,7 @@ def _tried(
     order: EstimateOrder | None,
     steps: int,
     tell: Tell | None,
+    say: Say | None = None,
 ) -> GapSide:
     """Return the trials of controllers on a platform; of the target, saved if the order has a file."""
     refuse_inputs(controllers, platform)
@@ -161,6 +162,6 @@ def _tried(
     if order is not None:
         observe = refuse_too_little(task, platform, order.observe)
         file = None if order.results is None else open_trials(order.results, platform, observe)
-        locked = None if file is None else hold_to_rounds(file, order, platform, controllers, task)
+        locked = None if file is None else hold_to_rounds(file, order, platform, controllers, task, say=say)
     driven = carry_out(platform, plans, observe, tell, file, locked)
     return side_of(platform, driven, len(controllers), task)

@@ -136,6 +136,7 @@ def study_gap(
     at_its_pace: bool = False,
     steps: int = STEPS,
     order: GapOrder | None = None,
+    say: Callable[[str], None] | None = None,
 ) -> GapStudy:
     """Try the same controllers on a simulator and on a target, and measure the gap.
 
@@ -160,6 +161,7 @@ def study_gap(
         at_its_pace: True to give commands of a `sim` without calibration the duration that they had on the target.
         steps: Commands in each trial.
         order: The order, whose design may be locked. Default: nothing is locked.
+        say: Called with the hash when the design was locked.
 
     Raises:
         ValueError: A number is out of range, or so much cannot be seen.
@@ -196,7 +198,7 @@ def study_gap(
     }
     locked = None
     if file is not None and order is not None:
-        locked = hold_to_rounds(file, order, target, controllers, task, others=reevolved)
+        locked = hold_to_rounds(file, order, target, controllers, task, others=reevolved, say=say)
     if file is not None:
         known = file.comparison()
         if known is None or {**known.plan, "rounds": None} != {**comparison, "rounds": None}:
@@ -319,6 +321,7 @@ def hold_to_rounds(
     controllers: Sequence[Controller],
     task: Task,
     others: Sequence[Controller] = (),
+    say: Callable[[str], None] | None = None,
 ) -> LockedDesign | None:
     """Lock the design of an order whose rounds have a trial of each controller, or hold the order to it."""
     design = design_of(
@@ -331,7 +334,7 @@ def hold_to_rounds(
         stride=MOST_TRIALS,
         others=[each.genome.to_json() for each in others],
     )
-    return hold_to_design(file, design, lock=order.lock, blind=order.blind)
+    return hold_to_design(file, design, lock=order.lock, blind=order.blind, say=say)
 
 
 def _by_controller(trials: Sequence[TrialRecord], n: int) -> list[TrialRecord]:

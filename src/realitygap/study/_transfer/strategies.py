@@ -188,7 +188,7 @@ def transfer_to(
     task = chosen.task_of_trials
     more = {"strategies": list(names), "condition": chosen.name}
     design = design_of(order, target, score=task.name, more=more)
-    hold_folder_to_design(folder, target, design, lock=order.lock)
+    hold_folder_to_design(folder, target, design, lock=order.lock, say=work.tell)
     champions = [
         work.carry_out(name, n, r) for name in names for n in order.budgets for r in range(order.replicates)
     ]

@@ -9,17 +9,30 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from realitygap.errors import RealityGapError, RecordError, StudyError
 from realitygap.evolution import NeatSettings, Population
 from realitygap.lab._counts import Counts
 from realitygap.lab._saved import SavedFile
 from realitygap.orders import OrderError
-from realitygap.records import RESUMED, Ledger, ResultsFolder, open_ledger, secret_path
+from realitygap.records import (
+    LOCKED,
+    RESUMED,
+    DesignEvent,
+    DrivenTrial,
+    Ledger,
+    LockedDesign,
+    ResultsFolder,
+    open_ledger,
+    secret_path,
+)
 from realitygap.report import write_report
 from realitygap.study import (
     BlindAdvice,
     _design,
+    _deviations,
     advise,
     amend_design,
     design_report,
@@ -457,3 +470,34 @@ def test_study_on_a_robot_locks_its_conditions_and_lists_deviations(tmp_path):
     looks = Counts(tmp_path, ResultsFolder.open(tmp_path).description).looks()
     assert looks == f"Deviations from the locked plan: {amended}"
     assert amended in write_report(tmp_path).read_text("utf-8").replace("&#39;", "'")
+
+
+PLAN = {"arms": [{"name": name, "sha256": name} for name in "AB"], "unit": "pair", "blocks": 6, "first": 0}
+DRIVEN = st.lists(st.integers(0, 2), min_size=1, max_size=6)
+"""Times that each pair was void, of the pairs that were driven."""
+
+
+def driven_as_planned(plan, voids):
+    """The trials of a comparison in which pairs are void and driven again at once, as the command does it."""
+    trials = []
+    for block, n_void in zip(plan, voids, strict=False):
+        for attempt in range(n_void + 1):
+            state = "scored" if attempt == n_void else "void"
+            trials += [(*key, state) for key in block]
+    return [
+        DrivenTrial(k + 1, number, controller, state, "it was pushed", None)
+        for k, (number, controller, state) in enumerate(trials)
+    ]
+
+
+@given(st.binary(min_size=32, max_size=32).map(bytes.hex), DRIVEN, st.data())
+def test_only_other_orders_than_the_planned_one_are_out_of_order(sha256, voids, data):
+    locked = LockedDesign((DesignEvent(LOCKED, {"sha256": sha256, "design": PLAN}, 0),))
+    trials = driven_as_planned(_design.planned_blocks(locked), voids)
+    found = list(_deviations._order(trials, locked))
+    assert len(found) == sum(n > 0 for n in voids), "a line for each pair with void trials"
+    assert all("has void trials" in each for each in found)
+    clean = driven_as_planned(_design.planned_blocks(locked), [0] * len(voids))
+    k = data.draw(st.integers(0, len(clean) - 2))
+    clean[k], clean[k + 1] = clean[k + 1], clean[k]
+    assert [each for each in _deviations._order(clean, locked) if "out of order" in each]

@@ -16,5 +16,5 @@ realitygap.write_movie(
     condition="novelty-50",
     generation=4,
     speed=2,
-    width=380,
+    width=368,
 )

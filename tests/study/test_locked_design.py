@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
+import os
 import re
+import signal
+import sys
 from contextlib import contextmanager
 from dataclasses import replace
 
@@ -48,6 +51,7 @@ from realitygap.study import (
 )
 
 from ..cli.invoked import answered, printed
+from ..forks import fork_context
 from ..trials.fake_robot import FakeRobot
 from .physical import Unattended, small_study
 
@@ -121,6 +125,34 @@ def test_resuming_keeps_order_and_codes_and_an_unlocked_command_is_held_to_the_d
         try_pairs(**{**two, "trials": 20})
     with pytest.raises(StudyError, match="margin"):
         try_pairs(**two, margin=0.1)
+
+
+def try_and_die(two, n):
+    """Compare two controllers, and end as a power cut does after n pairs."""
+
+    def die(advice):
+        if advice.n == n:
+            os.kill(os.getpid(), signal.SIGKILL)
+
+    try_pairs(**two, blind=True, tell=die)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="kills processes")
+def test_killed_comparison_keeps_order_and_codes(two):
+    codes = []
+    for n in (1, 3):
+        process = fork_context().Process(target=try_and_die, args=(two, n))
+        process.start()
+        process.join(60)
+        assert process.exitcode == -signal.SIGKILL
+        with Ledger.open(two["out"], writable=False) as ledger:
+            codes.append(ledger.design().codes())
+    tried = try_pairs(**two)
+    locked, n = tried.design.design, tried.advice.n
+    assert codes == [locked.codes()] * 2
+    assert order_driven(two["out"]) == [arm for block in range(n) for arm in locked.order(block)]
+    assert tried.design.deviations == ()
 
 
 def test_wrong_locks_are_refused(two):

@@ -36,7 +36,7 @@ from realitygap.report import (
     twin_table,
     why_table,
 )
-from realitygap.stats import median_interval
+from realitygap.stats import mean_interval, median_interval
 from realitygap.study import summarize_closing
 from realitygap.study._closing.summary import is_met
 
@@ -270,6 +270,7 @@ def _at_goal(twin: dict[str, Any], budget: int, observe: str) -> dict[str, Any] 
 
 
 MEANS_HEAD = ("twin", "controller", "kind", "TWIN", "none", "cells", "track")
+EXCESS_HEAD = ("observed", "twins", "MMRV", "floor", "excess", "95 % interval")
 KIND_HEAD = (
     "controllers",
     "observed",
@@ -290,6 +291,29 @@ EARLIER_HEAD = (
     "95 % interval",
     "what changed since the row before",
 )
+
+
+def excess_table(summary: dict[str, Any]) -> Iterable[Sequence[str]]:
+    """By how much the rank violation exceeds what the twin's noise causes, mean over twins, before and after."""
+    for observe in ("none", *summary["plan"]["observations"]):
+        rows = [
+            twin if observe == "none" else _at_goal(twin, summary["budget"], observe)
+            for twin in summary["twins"]
+        ]
+        gaps = [row["gap"] for row in rows if row is not None and row["gap"].get("mmrv_floor") is not None]
+        if not gaps:
+            continue
+        violations, floors = (np.array([gap[name] for gap in gaps]) for name in ("mmrv", "mmrv_floor"))
+        excess = mean_interval(violations - floors)
+        ends = "–" if excess.ends is None else f"{excess.low:.4f} to {excess.high:.4f}"
+        yield (
+            observe,
+            str(len(gaps)),
+            f"{violations.mean():.4f}",
+            f"{floors.mean():.4f}",
+            f"{excess.value:.4f}",
+            ends,
+        )
 
 
 def means_table(summary: dict[str, Any]) -> Iterable[Sequence[str]]:
@@ -469,6 +493,7 @@ def texts(summary: dict[str, Any]) -> dict[str, str]:
         "directions.md": directions(summary),
         "summary.json": slim(summary),
         "means.csv": table(MEANS_HEAD, means_table(summary)),
+        "excess.csv": table(EXCESS_HEAD, excess_table(summary)),
     }
 
 

@@ -13,6 +13,7 @@ Measuring takes an hour, by hand:
     uv run python benchmarks/calibration.py sensors --n 12 --first-seed 1000 $data
     uv run python benchmarks/calibration.py flags --n 30 --first-seed 1001 $data
     uv run python benchmarks/calibration.py same --n 30 --first-seed 1001 $data
+    uv run python benchmarks/misspecification.py final --out docs/data/misspecification.jsonl
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import binom
 
+from realitygap.calibration import TOLERATED
 from realitygap.stats import Estimate, bca_mean, exact_share_interval, holm
 
 DOCS = Path(__file__).parent
@@ -35,6 +37,8 @@ PAGES = (DOCS / "explanations" / "calibration.md", DOCS / "explanations" / "infe
 MEASURED = DOCS / "data" / "calibration.jsonl"
 EACH = DOCS / "data" / "calibration.csv"
 EACH_OF_KINDS = DOCS / "data" / "calibration-kinds.csv"
+CHECKED = DOCS / "data" / "misspecification.jsonl"
+EACH_CHECKED = DOCS / "data" / "misspecification.csv"
 CLOSING = DOCS / "data" / "closing" / "summary.json"
 BLOCK = re.compile(r"(<!-- (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
 GOAL = 0.9
@@ -182,6 +186,50 @@ def flagged(rows: Sequence[Row], closing: Row) -> str:
     )
 
 
+def checked(rows: Sequence[Row]) -> str:
+    """How many twins the check flags: all of it, and its shares of the variance alone."""
+    lines = [
+        "| twins (TWIN) | observed | flagged | 95 % interval | by the share of the variance alone |",
+        "|---|---|---|---|---|",
+    ]
+    for observe in OBSERVED:
+        for what, is_outside in (("made by hand", True), ("of the families", False)):
+            some = [
+                row
+                for row in rows
+                if row["observe"] == observe and (row["family"] == "outside") == is_outside
+            ]
+            if some:
+                part = exact_share_interval(sum(row["flagged"] for row in some), len(some))
+                alone = sum(
+                    any(share > TOLERATED[kind] for kind, share in row["misfit"].items()) for row in some
+                )
+                lines.append(
+                    f"| {what} | `{observe}` | {count(part)} of {part.n} | {bounds(part)} | {alone} of {len(some)} |"
+                )
+    return "\n".join(lines) + "\n"
+
+
+def each_checked(rows: Sequence[Row]) -> str:
+    """What the check reports of each twin that was made by hand, with poses."""
+    lines: list[list[object]] = [["twin", "flagged", "report"]]
+    lines += [
+        [
+            row["sentence"],
+            "yes" if row["flagged"] else "no",
+            " ".join(note for note in row["notes"] if "goes with" in note or _is_beyond(note, row["misfit"])),
+        ]
+        for row in rows
+        if row["family"] == "outside" and row["observe"] == "track"
+    ]
+    return _csv(lines)
+
+
+def _is_beyond(note: str, misfit: dict[str, float]) -> bool:
+    """Return whether a note is of a kind of observation whose share is too large."""
+    return any(note.startswith(f"{kind}:") and share > TOLERATED[kind] for kind, share in misfit.items())
+
+
 def by_observation(rows: Sequence[Row]) -> dict[str, Sequence[Row]]:
     """Return the calibrations of everything, by what they observe."""
     return {
@@ -235,6 +283,11 @@ def measured() -> list[Row]:
     return [json.loads(line) for line in MEASURED.read_text("utf-8").splitlines()]
 
 
+def checks() -> list[Row]:
+    """Return what `benchmarks/misspecification.py` measured."""
+    return [json.loads(line) for line in CHECKED.read_text("utf-8").splitlines()]
+
+
 def rewrite(text: str) -> str:
     """A page with the tables of what was measured."""
     rows = measured()
@@ -245,6 +298,7 @@ def rewrite(text: str) -> str:
         "kinds": kinds(rows),
         "below_kinds": below(by_kind(rows), "`calibrate`"),
         "flagged": flagged(rows, closing),
+        "checked": checked(checks()),
     }
     return BLOCK.sub(lambda found: found[1] + blocks[found[2]] + found[3], text)
 
@@ -255,6 +309,7 @@ def main() -> None:
         page.write_text(rewrite(page.read_text("utf-8")), "utf-8")
     EACH.write_text(each(measured()), "utf-8")
     EACH_OF_KINDS.write_text(each_of_kinds(measured()), "utf-8")
+    EACH_CHECKED.write_text(each_checked(checks()), "utf-8")
 
 
 if __name__ == "__main__":

@@ -69,3 +69,17 @@ def test_a_robot_of_sim_is_found_again(seed: int) -> None:
             "range.amplitude", "range.incidence")  # fmt: skip
     assert {name: size for name, size in off.items() if name in sure and size > 0.05} == {}
     assert np.median(list(off.values())) < 0.02
+
+
+@pytest.mark.slow
+def test_dead_band_below_a_soft_one_is_even_up_to_it() -> None:
+    """A wheel stands still up to the soft dead band, whatever the dead band below it is."""
+    numbers = {"drive.dead_band": 0.03, "drive.soft_dead_band": 0.12}
+    with SimTarget(SimPlatform(set=numbers), ARENA, key=5) as target:
+        trials = list(target.carry_out(all_plans(ARENA, PLATFORM.robot, 6, 5), "track"))
+    prior = scribbler_prior(PLATFORM.robot)
+    ensemble = SimEnsemble(PLATFORM, ARENA, ranges=ranges_of(prior, PLATFORM.robot))
+    posterior = fit_from_poses(trials, ensemble, prior, PLATFORM.robot, ARENA, seed=5)
+    low, high = np.quantile(posterior.values["drive.dead_band"], [0.05, 0.95])
+    assert low < 0.03
+    assert 0.08 < high < 0.14

@@ -12,12 +12,14 @@ trials repeat the recorded commands. It may simulate as many sets of numbers as 
 from __future__ import annotations
 
 import argparse
+import tempfile
 from pathlib import Path
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from sbi.inference import NPE
+from torch.utils.tensorboard.writer import SummaryWriter
 
 from realitygap.calibration import numbers_of, ranges_of, scribbler_prior, values_of
 from realitygap.platforms import SimEnsemble, SimPlatform
@@ -91,8 +93,11 @@ def fit(twin: TwinOfStudy, sets: int) -> None:
     )
     tensors = [torch.as_tensor(each, dtype=torch.float32) for each in (places, simulated, observed)]
     normal = torch.distributions.MultivariateNormal(torch.zeros(len(prior)), torch.eye(len(prior)))
-    inference = NPE(prior=normal, show_progress_bars=False)
-    inference.append_simulations(tensors[0], tensors[1]).train()
+    with tempfile.TemporaryDirectory() as logs:  # else they are in the working directory
+        writer = SummaryWriter(logs)
+        inference = NPE(prior=normal, summary_writer=writer, show_progress_bars=False)
+        inference.append_simulations(tensors[0], tensors[1]).train()
+        writer.close()
     drawn = inference.build_posterior().sample((N_DRAWS,), x=tensors[2][0], show_progress_bars=False)
     values = values_of(prior, np.asarray(drawn, dtype=float))
     middle = {name: np.median(each, keepdims=True) for name, each in values.items()}

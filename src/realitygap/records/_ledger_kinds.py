@@ -71,7 +71,8 @@ class Trial(ShownAsCard):
         purpose: Purpose of a trial of a command, as in `TrialRecord`; empty in a study.
         controller: Number of its controller in the ledger, from 1 on; None in a study, if commands were given, or while
             the design of the trials is blind.
-        arm: Code of its arm while the design of the trials is blind; empty otherwise.
+        arm: Code of its arm if the design is blind and its cells are not known; `blind` if they are. Empty if the
+            design is not blind.
     """
 
     trial: int

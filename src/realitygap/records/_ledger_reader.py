@@ -26,7 +26,14 @@ from realitygap.records._ledger_kinds import (
     Trial,
     TrialState,
 )
-from realitygap.records._locked_design import DESIGN_EVENTS, LOST_CODE, DesignEvent, LockedDesign, read_design
+from realitygap.records._locked_design import (
+    DESIGN_EVENTS,
+    HIDDEN_CODE,
+    LOST_CODE,
+    DesignEvent,
+    LockedDesign,
+    read_design,
+)
 from realitygap.records._observations_file import (
     Note,
     Observations,
@@ -406,7 +413,8 @@ class LedgerReader(ClosedOnExit, ShownAsCard):
         }
         given = {**values, **texts, **numbers}
         if given["controller"] in codes:
-            given |= {"controller": None, "arm": codes[given["controller"]]}
+            # a list of codes beside cells would show results by arm
+            given |= {"controller": None, "arm": codes[given["controller"]] if cells is None else HIDDEN_CODE}
         return Trial(trial=row["id"], cells=cells, is_closed=bool(row["is_closed"]), **given)
 
     def _decoded(self, row: sqlite3.Row, *names: str) -> dict[str, Any]:

@@ -49,6 +49,9 @@ _DESIGN_FORMS: Mapping[str, Any] = {
 }
 """What each event, and each design, has to have."""
 
+HIDDEN_CODE = "blind"
+"""In place of the code of an arm where its cells are shown."""
+
 LOST_CODE = "???"
 """Code of every arm if the file with the secret is missing or is another one."""
 

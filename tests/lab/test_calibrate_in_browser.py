@@ -79,7 +79,7 @@ def test_wizard_leads_from_the_robot_to_a_result_and_shows_a_rejection(lab, visi
     step.filter(has_text="Robot").wait_for()
     page.get_by_label("Name", exact=True).fill("refused")
     page.get_by_role("button", name="Next").click()
-    step.filter(has_text="What").wait_for()
+    step.filter(has_text="Part").wait_for()
     page.locator('[data-kind="path"]').press("Space")
     page.locator('[data-kind="path"][aria-checked="true"]').wait_for()
     page.get_by_role("button", name="Calibrate", exact=True).click()

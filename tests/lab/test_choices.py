@@ -32,8 +32,8 @@ def offered(choices) -> list[str]:
 
 def test_files_of_the_folder_are_offered_by_what_they_are(folder):
     choices = platform_choices(folder, "target")
-    assert choices["Twins in this folder"] == {"twin:worn.toml": "worn"}
-    assert choices["Robot files in this folder"] == {"sim:mine.toml": "mine"}
+    assert choices["Twins in this folder"] == {"twin:worn.toml": "twin worn"}
+    assert choices["Robot files in this folder"] == {"sim:mine.toml": "sim with mine"}
     assert "twin:worn.toml" not in offered(platform_choices(folder, "simulator"))
     assert not any("study" in text or "elsewhere" in text for text in offered(choices))
 
@@ -56,7 +56,7 @@ def test_a_form_takes_everything_that_it_offers(folder, monkeypatch):
 def test_robots_at_ports_are_offered_where_a_person_can_place_them(folder):
     assert PORT.port in offered(platform_choices(folder, "robot", [PORT]))
     assert "scribbler" not in offered(platform_choices(folder, "target"))
-    assert list(offered(port_choices([PORT], "emulator://s2"))) == [PORT.port, "emulator://s2"]
+    assert list(offered(port_choices([PORT]))) == [PORT.port]
 
 
 def test_controllers_are_random_or_champions(folder):

@@ -50,6 +50,9 @@ def test_student_joins_drives_a_round_and_is_on_the_board(lab, student, visit):
     student.fill("#who", "  ")
     student.get_by_role("button", name="Join").click()
     expect(student.get_by_role("alert")).to_have_text("Enter a name, then press Join.")
+    student.fill("#who", "n" * 31)  # as a paste; nothing is cut without notice
+    student.get_by_role("button", name="Join").click()
+    expect(student.get_by_role("alert")).to_have_text("At most 20 letters. You entered 31.")
     student.fill("#who", NAME)
     student.get_by_role("button", name="Join").click()
     expect(student.locator("#name")).to_have_text(NAME)

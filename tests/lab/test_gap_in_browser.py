@@ -14,6 +14,16 @@ from .conftest import enter, expect
 pytestmark = pytest.mark.slow
 
 
+TEXTS_ARE_WITHIN = """() => [...document.querySelectorAll('.lab-scatter svg')].every((svg) => {
+  const box = svg.getBoundingClientRect();
+  const texts = [...svg.querySelectorAll('text')].map((it) => it.getBoundingClientRect());
+  const isIn = (low, [a, b], high) => low - 1 <= a && b <= high + 1;
+  return texts.length > 6 && texts.every((it) => isIn(box.left, [it.left, it.right], box.right)
+    && isIn(box.top, [it.top, it.bottom], box.bottom));
+})"""
+"""Whether all names and numbers of axes are within their figure."""
+
+
 def measure(page, **fields: str) -> None:
     for label, value in fields.items():
         enter(page, label.replace("_", " "), value)
@@ -53,6 +63,10 @@ def test_gap_is_measured_with_its_progress_and_mistakes_are_shown_at_their_field
     scatter = page.locator(".lab-scatter svg")
     words = page.locator(".lab-scatter .lab-curves-words")
     expect(scatter.locator("rect")).to_have_count(10)
+    for width in (390, 1440):
+        page.set_viewport_size({"width": width, "height": 900})
+        expect(page.locator(".lab-scatter svg text").first).to_be_visible()
+        page.wait_for_function(TEXTS_ARE_WITHIN)
     scatter.locator("rect").nth(4).hover()
     words.get_by_text(
         re.compile(r".+: \d\.\d{3} \[\d\.\d{3}, \d\.\d{3}\] on sim \(SIM\), .* on jyro \(SIM\)")
@@ -87,6 +101,14 @@ def test_gap_is_closed_by_a_button_and_its_report_shows_both_gaps(lab, visit):
     report.get_by_text("before and after a calibration with 20 trials").first.wait_for()
     expect(report.locator(".motion .rg-player")).to_have_count(2)
     assert page.get_by_role("button", name="Close the gap").count() == 0
+    expect(page.locator(".lab-scatter svg")).to_have_count(2)  # before and after, on the same axes
+    page.wait_for_function(TEXTS_ARE_WITHIN)
+    page.get_by_text("coverage on sim with fit (SIM)").wait_for()
+    ticks = page.locator(".lab-scatter").evaluate_all(
+        "all => all.map((it) => [...it.querySelectorAll('[text-anchor=end]')].map((tick) => tick.textContent).join())"
+    )
+    assert ticks[0] == ticks[1]
+    page.get_by_role("link", name="first-closed", exact=True).wait_for()  # without a reload
     assert (lab.root / "gaps" / "first-closed" / "fit.toml").is_file()
 
 

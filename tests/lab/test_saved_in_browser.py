@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from datetime import date
 
 import pytest
 
@@ -30,14 +31,16 @@ def test_saved_trials_are_listed_corrected_voided_and_annotated(lab, visit):
             ledger.append(replace(trial(number), purpose="controller", cells=(13, 14)))
     page = visit("gap")
     page.get_by_role("link", name="Saved trials").click()
-    page.get_by_text("the twin worn, 3 trials", exact=True).wait_for()
+    page.get_by_text(f"the twin worn, 3 trials, {date.today()}", exact=True).wait_for()
     page.get_by_role("link", name="gaps/first one.sqlite").click()
-    page.get_by_text("the twin worn, 3 trials", exact=True).wait_for()
+    page.get_by_text("the twin worn, 3 trials").wait_for()
     page.get_by_text("TWIN", exact=True).wait_for()
     row = page.get_by_role("row").nth(2)
     row.get_by_role("checkbox").click()
     page.get_by_role("button", name="Save cells").click()
-    page.get_by_text("Enter your name first").wait_for()
+    named = page.locator(".lab-field", has=page.get_by_label("Your name"))
+    named.locator(".lab-problem", has_text="Enter your name first").wait_for()
+    expect(named.locator("input")).to_be_focused()
     page.get_by_label("Your name").fill("anna")
     page.wait_for_function("() => document.cookie.includes('anna')")
     page.get_by_role("button", name="Save cells").click()
@@ -51,7 +54,7 @@ def test_saved_trials_are_listed_corrected_voided_and_annotated(lab, visit):
     expect(page.get_by_role("button", name="Void trial")).to_be_disabled()
     with open_ledger(file) as ledger:  # a command that drives
         ledger.append(replace(trial(3), purpose="controller", cells=(13, 14)))
-    page.get_by_text("the twin worn, 4 trials", exact=True).wait_for()
+    page.get_by_text("the twin worn, 4 trials").wait_for()
     expect(row.get_by_role("checkbox")).to_be_checked()
     with open_ledger(file, writable=False) as log:
         assert [each.state for each in log.trials()] == ["scored", "void", "scored", "scored"]

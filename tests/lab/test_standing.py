@@ -14,6 +14,7 @@ from realitygap.lab._messages import StudyProgress
 from realitygap.lab._standing import standing_of
 from realitygap.lab._studies import Studies, StudyState
 from realitygap.records import ResultsFolder
+from realitygap.study import run_study
 from tests.study.physical import drive, small_study
 
 ROW = {"condition": "a", "label": "SIM", "n": 6, "line_median": 0.25, "line_low": None, "line_high": None}
@@ -50,7 +51,7 @@ PROGRESS = StudyProgress(n_done=6, n_runs=8, n_computed=4, seconds=2.0)
             state(4, used_by="process 1 on here"),
             job(is_over=False, progress=PROGRESS),
             "Running",
-            "6/8 runs · 2 runs/s · 1 s left",
+            "4/8 runs · 2 runs/s · 2 s left",
         ),
         (state(4), job(is_over=False, progress=None), "Running", "4/8 runs"),
         (state(4, used_by="process 1 on here"), None, "In use", "4/8 runs"),
@@ -75,6 +76,14 @@ def test_study_has_the_label_of_the_robot_that_drove_it(tmp_path):
     assert Studies(tmp_path).state("small").labels == ()
     drive(study, tmp_path / "small")
     assert Studies(tmp_path).state("small").labels == ("EMULATED",)
+
+
+def test_all_counts_of_a_study_are_one(tmp_path):
+    """The list, the header, and the table of conditions counted at different moments."""
+    run_study("paper", tmp_path / "paper", replicates=3)
+    state = Studies(tmp_path).state("paper")
+    assert [(each.n_done, each.n_runs, each.label) for each in state.conditions] == 9 * [(3, 3, "SIM")]
+    assert sum(each.n_done for each in state.conditions) == state.n_all_done == state.n_all == 27
 
 
 def test_durations_have_the_unit_that_fits():

@@ -67,6 +67,7 @@ def test_complete_study_never_seems_empty_while_its_figures_are_drawn(lab, visit
     page.locator(".lab-curves polyline").first.wait_for()
     page.locator(".lab-figure img").nth(4).wait_for()
     check_generations(page)
+    check_picker(page)
     check_touch(page)
     seen = [json.loads(each) for each in json.loads(page.evaluate("sessionStorage.seen"))]
     assert {waiting for _, _, waiting in seen} <= {"", "Drawing figures"}
@@ -87,6 +88,29 @@ def check_generations(page) -> None:
     slider.fill("0")
     expect(words).to_have_text(re.compile(r"generation 0: coverage 0\.\d{3}"))
     assert paths.last.get_attribute("points") != last
+
+
+def check_picker(page) -> None:
+    """Check that all figures that show one condition show the best one, then the one that is chosen."""
+    best = page.locator(".lab-table tbody tr").first.locator(".lab-choose-row").inner_text()
+    assert best.startswith("novelty"), "the best one is first"
+    captions = page.locator(".lab-figure + .lab-hint")
+    for condition in (best, "coverage-10"):
+        if condition != best:
+            page.get_by_role("combobox", name="Condition").first.click()
+            page.get_by_role("option", name=condition, exact=True).click()
+        for part in (
+            "Best trial of the typical run of",
+            "Path of highest coverage",
+            "best one of the first run of",
+        ):
+            page.get_by_text(re.compile(f"{part}.*{condition}")).wait_for()
+        page.get_by_text(re.compile(f"Share of each species .* {condition}, run")).wait_for()
+        others = {"novelty-10", "novelty-50", "novelty-80", "coverage-10"} - {condition}
+        for text in captions.all_inner_texts():
+            assert not text.startswith(("Path", "Share", "The archive")) or not any(
+                f"{other}, run" in text for other in others
+            ), text
 
 
 def check_touch(page) -> None:

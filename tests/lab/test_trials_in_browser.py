@@ -102,7 +102,7 @@ def test_only_the_current_step_is_open_and_its_action_is_in_view(lab, visit, siz
     page.get_by_role("button", name="Start trial").click()
     check("Drive", "Stop robot" if size == PHONE else "Abort trial", [])
     start_trial(page, 2)
-    page.get_by_text("is full").wait_for()
+    page.get_by_text("Score the trials").wait_for()
     check("Score", "Save score", ["Score"])
     assert covered(page.get_by_role("button", name="Stop robot")) == []
     for number in (1, 2):
@@ -139,7 +139,7 @@ def test_taps_survive_a_reload_and_a_killed_lab(lab, visit):
     begin_sitting(page)
     start_trial(page, 1)
     start_trial(page, 2)
-    page.get_by_text("is full").wait_for()
+    page.get_by_text("Score the trials").wait_for()
     tap(page, 0, 1, 2)
     page.get_by_text("3 of 72 cells").wait_for()
     page.reload()
@@ -268,7 +268,7 @@ def test_a_void_trial_needs_a_reason_and_is_driven_again(lab, visit):
     begin_sitting(page)
     start_trial(page, 1)
     start_trial(page, 2)
-    page.get_by_text("is full").wait_for()
+    page.get_by_text("Score the trials").wait_for()
     page.get_by_text("Note or void").click()
     page.get_by_role("button", name="Void trial").click()
     page.get_by_text("Give a reason.").wait_for()

@@ -46,6 +46,12 @@ def close_until(folder: Path, moment: str) -> None:
     close("killed", tell=die)
 
 
+def test_other_sensors_are_refused_before_the_gap_is_measured(folder):
+    with pytest.raises(RealityGapError, match="7 range sensors"):
+        close_gap("sim", "sim:thymio", out="other", n_controllers=6, trials=2)
+    assert not (folder / "other").exists()
+
+
 def test_the_same_controllers_and_trials_of_the_target_are_measured_before_and_after(folder):
     closed = close("closed")
     before, after = closed.before.study, closed.after.study

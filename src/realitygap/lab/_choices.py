@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Literal
 
+from realitygap._wording import platform_in_words
 from realitygap.platforms import (
     Platform,
     built_in_platforms,
@@ -14,8 +15,7 @@ from realitygap.platforms import (
     platform_names,
     split_spec,
 )
-from realitygap.robot_families import find_family
-from realitygap.robots import PortGuess, split_port
+from realitygap.robots import PortGuess
 from realitygap.study import named_studies
 from realitygap.world import robot_names
 
@@ -46,23 +46,20 @@ def platform_choices(root: Path, use: Use, ports: Sequence[PortGuess] = ()) -> C
             groups["Simulators"][model.name] = _words(model)
     groups |= _files(root, [model for model in models if model.is_simulator or use != "simulator"])
     if use in ("target", "robot"):
-        groups["Emulated robots"] = {spec: _emulated(spec) for spec in emulated_robots()}
+        groups["Emulated robots"] = {spec: _named(spec, "EMULATED") for spec in emulated_robots()}
     if use == "robot":
         groups[_PORTS] = {guess.port: f"{guess.port}: {guess.seems}" for guess in ports}
     if use == "study":
         groups["Robots"] = {model.name: _words(model) for model in models if model.is_physical}
-    groups["Other robots"] = {f"sim:{name}": f"{name}, simulated" for name in _shipped_robots()}
+    groups["Other robots"] = {f"sim:{name}": _named(f"sim:{name}") for name in _shipped_robots()}
     known = {model.name for model in models}
     groups["Other packages"] = {name: name for name in platform_names() if name not in known}
     return groups
 
 
-def port_choices(ports: Sequence[PortGuess], emulated: str) -> Choices:
-    """Return the ports of this computer, and an emulated robot."""
-    return {
-        _PORTS: {guess.port: f"{guess.port}: {guess.seems}" for guess in ports},
-        "Emulated robots": {emulated: _emulated(emulated)},
-    }
+def port_choices(ports: Sequence[PortGuess]) -> Choices:
+    """Return the ports of this computer."""
+    return {_PORTS: {guess.port: f"{guess.port}: {guess.seems}" for guess in ports}}
 
 
 def controller_choices(studies: Sequence[str]) -> Choices:
@@ -84,7 +81,7 @@ def model_choices(root: Path) -> Choices:
     """Return the robots that a calibration can start from."""
     files = _files(root, [model for model in built_in_platforms() if model.is_simulator])
     named = {
-        title: {split_spec(spec)[1]: words for spec, words in listed.items()}
+        title: {split_spec(spec)[1]: Path(split_spec(spec)[1]).stem for spec in listed}
         for title, listed in files.items()
     }
     return named | {"Robots": {name: name for name in robot_names()}}
@@ -94,9 +91,8 @@ def _words(model: type[Platform]) -> str:
     return f"{model.name}: {model.summary.partition(':')[0]}"
 
 
-def _emulated(port: str) -> str:
-    family = find_family(split_port(port)[0])
-    return port if family is None else f"{family.noun}, emulated"
+def _named(spec: str, label: str = "") -> str:
+    return platform_in_words(spec, label).removeprefix("the ")
 
 
 def _shipped_robots() -> list[str]:
@@ -113,5 +109,6 @@ def _files(root: Path, models: Sequence[type[Platform]]) -> dict[str, dict[str, 
         for model in models:
             if model.rest and (kind := model.kind_of_file(path)):
                 title = f"{kind.capitalize()}s in this folder"
-                groups.setdefault(title, {})[f"{model.name}:{path.name}"] = path.stem
+                spec = f"{model.name}:{path.name}"
+                groups.setdefault(title, {})[spec] = _named(spec)
     return groups

@@ -26,6 +26,7 @@ from realitygap.runs import Condition
 from realitygap.study import advise, design_report
 from realitygap.world import Arena
 
+from ._mistakes import refuse_unnamed
 from ._scoring_files import (
     FOLDER,
     Draft,
@@ -48,6 +49,7 @@ class CountedTrial:
         trial: As the ledger has it.
         title: What to call it; its code where counting is blind.
         pen: The color that it was drawn with.
+        label: Label of the robot that drives its condition; empty before one was met.
         first, second: Who counted it; empty where nobody has.
         is_corrected: Whether a correction was entered after its generation was closed.
         notes: What was noted of it.
@@ -56,6 +58,7 @@ class CountedTrial:
     trial: Trial
     title: str
     pen: str
+    label: str
     first: str
     second: str
     is_corrected: bool
@@ -207,6 +210,7 @@ class Counts:
     def _read(self, ledger: Ledger) -> list[CountedTrial]:
         scores = [row for row in ledger.scores() if row["undone"] is None]
         who = {(row["trial"], row["role"]): row["who"] for row in scores}
+        labels = {name: each["label"] or "" for name, each in ledger.conditions().items()}
         notes: dict[int, list[str]] = {}
         for note in ledger.notes():
             notes.setdefault(note["trial"], []).append(f"{note['who']}: {note['text']}")
@@ -215,6 +219,7 @@ class Counts:
                 trial=trial,
                 title=trial.code if self.is_blind and not trial.is_closed else trial.name,
                 pen=self._pens[trial.pen % len(self._pens)],
+                label=labels.get(trial.condition, ""),
                 first=who.get((trial.trial, "score"), ""),
                 second=who.get((trial.trial, "second"), ""),
                 is_corrected=(trial.trial, "correction") in who,
@@ -239,7 +244,7 @@ class Counts:
         Raises:
             LedgerError: The ledger does not allow it: the text says why.
         """
-        who = _named(who)
+        who = refuse_unnamed(who)
         seen = {number: self._proposal(number, draft.proposal) for number, draft in drafts.items()}
         scores = {
             number: Score(sorted(draft.cells), who)
@@ -299,7 +304,7 @@ class Counts:
     def note(self, number: int | None, text: str, who: str) -> None:
         """Save a note about a trial."""
         with self._writing() as ledger:
-            ledger.note(text[:LONGEST_NOTE], _named(who), number)
+            ledger.note(text[:LONGEST_NOTE], refuse_unnamed(who), number)
 
     @contextlib.contextmanager
     def _writing(self) -> Iterator[Ledger]:
@@ -307,12 +312,6 @@ class Counts:
         with Ledger.open(self._folder / LEDGER_NAME) as ledger:
             yield ledger
         self.look()
-
-
-def _named(who: str) -> str:
-    if not who.strip():
-        raise LedgerError("Who are you? Give a name first: the ledger keeps it with what you enter.")
-    return who.strip()
 
 
 def _changed(folder: Path) -> int:

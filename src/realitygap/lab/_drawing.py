@@ -63,6 +63,8 @@ FIGURES: dict[str, Callable[..., Drawing | list[Drawing]]] = {
     "species": draw_species,
     "archive": draw_archive,
 }
+OF_ONE = ("paths", "networks", "species", "archive")
+"""Figures that show one condition, which is the last part of their names."""
 _COLUMNS = list(messages.SummaryRow.__annotations__)
 _ROWS = TypeAdapter(list[messages.SummaryRow])
 IDLE_S = 600.0
@@ -209,7 +211,7 @@ def _grant(channel: Channel, wish: DrawingWish, wishes: _Wishes) -> None:
                 channel.say(messages.ReportWritten(wish.folder))
     except (RealityGapError, ValueError, TypeError, OSError) as error:
         match wish:
-            case messages.FiguresWish():
+            case messages.FiguresWish() if not wish.condition:
                 channel.say(messages.FiguresDrawn(wish.folder, 0.0))
             case messages.ReplayWish() | messages.RunWish() | messages.TouchWish():
                 channel.say(messages.ReplayRefused(wish.folder, wish.key, str(error)))
@@ -227,7 +229,10 @@ def _rows(tally: Tally) -> list[messages.SummaryRow]:
 
 
 def _draw_all(channel: Channel, wish: messages.FiguresWish, pause: Callable[[], None]) -> None:
-    """Summarize the published runs, and draw their figures; `pause` is called between figures."""
+    """Summarize the published runs, and draw their figures; `pause` is called between figures.
+
+    All are of one look at the folder, so that their numbers of runs agree.
+    """
     folder, began = Path(wish.folder), time.process_time()
     rows: list[messages.SummaryRow] = []
     curves: list[messages.Curve] = []
@@ -237,16 +242,18 @@ def _draw_all(channel: Channel, wish: messages.FiguresWish, pause: Callable[[], 
         figures[name] = figure
         channel.say(messages.FigureDrawn(wish.folder, name, figure))
 
-    with contextlib.suppress(RealityGapError):  # the figures state why there is nothing to show
-        tally = read_tally(folder, with_uncounted=True)
+    tally = read_tally(folder, with_uncounted=True)
+    if not wish.condition:
         rows, curves = _rows(tally), curves_of(tally)
         channel.say(messages.StudySummary(wish.folder, rows, curves))
-    for name, draw in FIGURES.items():
+    condition = wish.condition or _best(rows) or tally.conditions[0]["name"]
+    for kind, draw in FIGURES.items():
         pause()
-        if wish.names and name not in wish.names:
+        if wish.names and kind not in wish.names:
             continue
+        name, options = (f"{kind}-{condition}", {"condition": condition}) if kind in OF_ONE else (kind, {})
         try:
-            drawn = draw(folder)
+            drawn = draw(folder if kind == "scores" else tally.counted_only(), **options)
         except (RealityGapError, ValueError) as error:
             tell(name, {"text": str(error)})
             continue
@@ -263,7 +270,8 @@ def _draw_all(channel: Channel, wish: messages.FiguresWish, pause: Callable[[], 
         with contextlib.suppress(RealityGapError, ValueError):
             keep_thumbnail(folder, _thumbnail(folder, rows))
         keep_figures(folder, wish.done, rows, curves, figures)
-    channel.say(messages.FiguresDrawn(wish.folder, time.process_time() - began))
+    if not wish.condition:
+        channel.say(messages.FiguresDrawn(wish.folder, time.process_time() - began))
 
 
 def curves_of(tally: Tally) -> list[messages.Curve]:
@@ -301,11 +309,14 @@ def _point(values: np.ndarray[Any, np.dtype[np.float64]]) -> messages.CurvePoint
 
 def _thumbnail(folder: Path, rows: list[messages.SummaryRow]) -> str:
     """Return the path of the typical run of the condition with the highest median, as SVG."""
-    medians = {row["condition"]: row["line_median"] for row in rows}
-    known = {condition: median for condition, median in medians.items() if median is not None}
-    best = max(known, key=lambda condition: known[condition]) if known else None
-    trial = choose_moving([folder], condition=best)[1][0]
+    trial = choose_moving([folder], condition=_best(rows))[1][0]
     return picture_of(trial).to_svg(240.0)
+
+
+def _best(rows: list[messages.SummaryRow]) -> str | None:
+    """Return the condition with the highest median; None if no median is known."""
+    known = {row["condition"]: median for row in rows if (median := row["line_median"]) is not None}
+    return max(known, key=known.__getitem__) if known else None
 
 
 def _paths_of_run(folder: Path, wish: messages.RunWish) -> messages.Replay:

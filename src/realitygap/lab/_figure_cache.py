@@ -18,6 +18,8 @@ from ._messages import Curve, Figure, SummaryRow
 from ._scoring_files import FOLDER, read_json, write_json
 
 _FIGURES, _SUMMARY, _THUMBNAIL = "figures.json", "summary.json", "thumbnail.svg"
+_FORM = 2
+"""Number of the form of these files; files of another form are not read."""
 _LONGEST_THUMBNAIL = 500_000
 """Size above which a thumbnail is not shown [bytes]."""
 _ROWS = TypeAdapter(list[SummaryRow])
@@ -103,4 +105,4 @@ def _kept(folder: Path, name: str, done: Sequence[int]) -> dict[str, Any]:
 
 
 def _origin(done: Sequence[int]) -> list[Any]:
-    return [__version__, RESULTS_VERSION, *done]
+    return [__version__, RESULTS_VERSION, _FORM, *done]

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import itertools
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 from urllib.parse import parse_qsl
@@ -158,6 +158,7 @@ class GapJob(MeasuringJob):
         measures: Name and value of each measure of the last report.
         intervals: Trials of each controller, and the RMS gap with its interval, of each report that has one.
         pairs: Scores of each controller on both sides, as `pairs_of` returns them; None before the first report.
+        before: The same before a calibration; None if the gap is not closed.
         n_reports: Number of reports so far.
     """
 
@@ -176,6 +177,7 @@ class GapJob(MeasuringJob):
         self.measures: list[tuple[str, str]] = []
         self.intervals: list[tuple[int, float, float, float]] = []
         self.pairs: ScorePairs | None = None
+        self.before: ScorePairs | None = None
         self.n_reports = 0
         super().__init__(GapWork(order.message(), str(page), closes), order.target, root, changed)
 
@@ -183,6 +185,15 @@ class GapJob(MeasuringJob):
     def can_close(self) -> bool:
         """True if a calibration may close the gap that was measured."""
         return self.is_complete and self.order.can_close
+
+    @property
+    def can_explain(self) -> bool:
+        """True if the parts of a calibrated simulator may explain the gap that was measured."""
+        order = self.order
+        is_fit = order.sim.startswith("sim:") and not (
+            order.why or order.noise or order.task not in (None, "coverage")
+        )
+        return self.is_complete and is_fit and order.trials > 1
 
     @property
     def has_met(self) -> bool:
@@ -239,7 +250,8 @@ class GapJob(MeasuringJob):
                     self._pace = Pace()  # trials of another phase take another time
                 self._pace.note(self.share)
             case GapMeasured():
-                self.verdict, self.measures, self.pairs = message.verdict, message.measures, message.pairs
+                self.verdict, self.measures = message.verdict, message.measures
+                self.pairs, self.before = message.pairs, message.before
                 if message.rms is not None:
                     self.intervals = [*self.intervals, (message.trials, *message.rms)]
                 self.n_reports += 1
@@ -266,18 +278,26 @@ def measure(channel: Channel, work: GapWork) -> None:
         closing = order.to_order(CloseOrder, out=page.with_suffix(""))
         closed = close_gap(closing, pulse=pulses.tell, tell=tell)
         write_closed_gap(closed, page)
-        measured = _measured(closed.after.study, order.trials)
+        pairs, before = pairs_of(closed.after.study), pairs_of(closed.before.study)
         channel.say(
-            GapMeasured(order.trials, closed.verdict, closed.main_measures, measured.rms, measured.pairs)
+            GapMeasured(order.trials, closed.verdict, _titled(closed.main_measures), None, pairs, before)
         )
         channel.say(GapDone())
         return
-    # a locked design has one number of trials
-    for trials in (order.trials,) if order.lock or order.blind else rounds(order.trials):
+    # a locked design has one number of trials, and an explanation needs them all
+    is_once = order.lock or order.blind or order.why
+    for trials in (order.trials,) if is_once else rounds(order.trials):
         gap = gap_between(order.model_copy(update={"trials": trials}), pulse=pulses.tell, tell=tell)
         write_gap_report(gap, page)
         channel.say(_measured(gap.study, trials))
     channel.say(GapDone())
+
+
+def _titled(measures: Sequence[tuple[str, str]]) -> list[tuple[str, str]]:
+    """Return measures with the names, and in the order, of the page of a gap; others come last."""
+    titles = [shown.title for shown in SHOWN]
+    named = [(name[:1].upper() + name[1:], words) for name, words in measures]
+    return sorted(named, key=lambda row: titles.index(row[0]) if row[0] in titles else len(titles))
 
 
 def _measured(study: GapStudy, trials: int) -> GapMeasured:
@@ -300,7 +320,7 @@ def pairs_of(gap: GapStudy) -> ScorePairs:
     sides = (gap.source, gap.target)
     ends = [side.intervals() for side in sides]
     return {
-        "sides": [f"{platform_in_words(side.name, side.label)} ({side.label})" for side in sides],
+        "sides": [f"{side.in_words} ({side.label})" for side in sides],
         "score": gap.result.score,
         "points": [
             {

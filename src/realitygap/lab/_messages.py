@@ -370,11 +370,13 @@ class FiguresWish(Wish):
         folder: Folder of the study.
         done: Number of complete runs: simulated, and driven.
         names: Figures to draw; None for all, which are saved.
+        condition: Condition of those figures that show one. Default: the one with the highest median.
     """
 
     folder: str
     done: Sequence[int]
     names: list[str] | None = None
+    condition: str = ""
 
 
 class ThumbnailWish(Wish):
@@ -715,6 +717,7 @@ class GapMeasured(Report):
     measures: list[tuple[str, str]]
     rms: tuple[float, float, float] | None
     pairs: ScorePairs
+    before: ScorePairs | None = None
 
 
 class GapDone(Report):

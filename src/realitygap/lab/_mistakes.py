@@ -37,6 +37,17 @@ class FormError(StudyError):
         self.problems = dict(problems)
 
 
+def refuse_unnamed(who: str) -> str:
+    """Return the name of a visitor without space around it.
+
+    Raises:
+        FormError: It is empty.
+    """
+    if not who.strip():
+        raise FormError({"who": "Enter your name first. It is saved with each entry. Nothing was saved."})
+    return who.strip()
+
+
 class Mistakes:
     """Collects what is wrong in the fields of a form.
 

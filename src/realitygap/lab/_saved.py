@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from datetime import date
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from realitygap.study import advise_ledger, design_report
 from realitygap.world import Arena
 
 from ._files import plain_files
+from ._mistakes import refuse_unnamed
 
 LONGEST_TEXT = 1000
 """Largest length of a reason or note [letters]."""
@@ -53,6 +55,7 @@ class SavedTrials:
         arena: Arena of the trials.
         trials: The trials.
         notes: Notes on each trial, by its number.
+        changed: Day on which the file was last changed.
         looks: What the trials show of a comparison that is planned in the file, and its locked design with all
             deviations, a line each; empty if there is none.
     """
@@ -62,6 +65,7 @@ class SavedTrials:
     arena: Arena
     trials: tuple[Trial, ...]
     notes: Mapping[int, str]
+    changed: date
     looks: tuple[str, ...] = ()
 
     def trial(self, number: int | None) -> Trial | None:
@@ -90,7 +94,8 @@ class SavedFile:
                 for trial in trials
             }
             head = ledger.head()
-            return SavedTrials(head.target, head.label, ledger.arena, trials, notes, _looks(ledger))
+            changed = date.fromtimestamp(self._path.stat().st_mtime)
+            return SavedTrials(head.target, head.label, ledger.arena, trials, notes, changed, _looks(ledger))
 
     def _open(self, *, writable: bool = True) -> Ledger:
         """Open the trials. Lines of JSON are converted before they are changed; then the new file has them."""
@@ -104,7 +109,7 @@ class SavedFile:
 
     def score(self, number: int, cells: Sequence[int], who: str) -> None:
         """Enter the cells of a trial in place of those of before."""
-        who = _named(who)
+        who = refuse_unnamed(who)
         with self._open() as ledger:
             if ledger.trial(number).state == "scored":
                 ledger.undo(number)
@@ -112,14 +117,14 @@ class SavedFile:
 
     def void(self, number: int, reason: str, who: str) -> None:
         """Declare a trial void; its command drives it again."""
-        who = _named(who)
+        who = refuse_unnamed(who)
         with self._open() as ledger:
             ledger.void(number, reason[:LONGEST_TEXT])
             ledger.note("void", who, number)
 
     def note(self, number: int, text: str, who: str) -> None:
         """Save a note about a trial."""
-        who = _named(who)
+        who = refuse_unnamed(who)
         with self._open() as ledger:
             ledger.note(text[:LONGEST_TEXT], who, number)
 
@@ -134,9 +139,3 @@ def _looks(ledger: Ledger) -> tuple[str, ...]:
         return (*looks, report.line, f"SHA-256 of the locked design: {report.design.sha256}.")
     except RealityGapError as error:
         return (str(error),)
-
-
-def _named(who: str) -> str:
-    if not who.strip():
-        raise RecordError("Enter your name first. It is saved with each entry.")
-    return who.strip()

@@ -18,7 +18,7 @@ class Standing:
     """A study at one moment.
 
     Attributes:
-        state: What is in its folder, with the runs that its job has published since.
+        state: What is in its folder.
         word: Its state.
         message: Why it failed, or which program uses it; empty otherwise.
         rate: Runs per second; 0 if unknown.
@@ -35,7 +35,7 @@ class Standing:
     def steady(self) -> Standing:
         """The same without what changes all the time while it runs: numbers of runs and trials, and the rate."""
         n_done, n_driven_done = min(self.state.n_done, 1), min(self.state.n_driven_done, 1)
-        state = replace(self.state, n_done=n_done, n_driven_done=n_driven_done, trials={})
+        state = replace(self.state, n_done=n_done, n_driven_done=n_driven_done, trials={}, conditions=())
         return replace(self, state=state, rate=0.0)
 
     @property
@@ -70,7 +70,6 @@ def standing_of(state: StudyState, job: StudyJob | None) -> Standing:
     word, message = _word(state, job)
     progress, rate = None if job is None else job.progress, 0.0
     if word == "Running" and progress is not None:
-        state = replace(state, n_done=max(state.n_done, progress.n_done))
         rate = progress.n_computed / progress.seconds if progress.seconds > 0 else 0.0
     return Standing(state, word, message, rate, is_asking=job is not None and job.ask is not None)
 

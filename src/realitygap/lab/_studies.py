@@ -34,6 +34,16 @@ _LONGEST_HOLDER = 1000
 
 
 @dataclass(frozen=True)
+class ConditionState:
+    """A condition at one moment: its runs, those that are complete, and its label, empty if unknown."""
+
+    name: str
+    n_runs: int
+    n_done: int
+    label: str = ""
+
+
+@dataclass(frozen=True)
 class StudyState:
     """A study's folder at one moment.
 
@@ -43,6 +53,7 @@ class StudyState:
         n_runs, n_done: Simulated runs in all, and those published.
         n_driven_runs, n_driven_done: Runs of conditions that a robot drives, and those complete.
         replicates: Runs of each condition.
+        conditions: The conditions, in the order of the study.
         trials: How many trials of the ledger are in each state.
         used_by: The program that writes to it now, as it calls itself; empty where none does.
         labels: Labels of its conditions, such as SIM; that of a robot from its first trial on.
@@ -61,6 +72,7 @@ class StudyState:
     n_driven_runs: int = 0
     n_driven_done: int = 0
     replicates: int = 1
+    conditions: tuple[ConditionState, ...] = ()
     trials: dict[str, int] = field(default_factory=dict)
     used_by: str = ""
     labels: tuple[str, ...] = ()
@@ -246,11 +258,13 @@ def _state(name: str, folder: ResultsFolder) -> StudyState:
     replicates = int(described["replicates"])
     driven = [each["name"] for each in described["conditions"] if _is_driven(each)]
     simulated = [each["name"] for each in described["conditions"] if not _is_driven(each)]
-    missing = sum(len(gap) for each in simulated for gap in folder.missing(each, replicates))
+    n_each = {each: replicates - sum(map(len, folder.missing(each, replicates))) for each in simulated}
     ledger = _read_ledger(folder.path / LEDGER_NAME, driven, replicates)
     labels = {each.get("label") for each in described["conditions"]} | ledger.labels
-    n_done = replicates * len(simulated) - missing
-    rows = read_rows(folder.path, (n_done, ledger.n_complete))
+    n_done = sum(n_each.values())
+    n_each |= ledger.n_complete
+    n_driven_done = sum(ledger.n_complete.values())
+    rows = read_rows(folder.path, (n_done, n_driven_done))
     return StudyState(
         name=name,
         title=str(described.get("title") or name),
@@ -258,8 +272,14 @@ def _state(name: str, folder: ResultsFolder) -> StudyState:
         n_runs=replicates * len(simulated),
         n_done=n_done,
         n_driven_runs=replicates * len(driven),
-        n_driven_done=ledger.n_complete,
+        n_driven_done=n_driven_done,
         replicates=replicates,
+        conditions=tuple(
+            ConditionState(
+                each["name"], replicates, n_each.get(each["name"], 0), str(each.get("label") or "")
+            )
+            for each in described["conditions"]
+        ),
         trials=ledger.trials,
         used_by=used_by(folder.path),
         labels=tuple(sorted(set(LABELS).intersection(labels))),
@@ -275,9 +295,9 @@ def _is_driven(condition: dict[str, Any]) -> bool:
 
 @dataclass(frozen=True)
 class _LedgerState:
-    """Complete runs of a ledger, its trials in each state, and the labels of robots that drove."""
+    """Complete runs of a ledger by condition, its trials in each state, and the labels of robots that drove."""
 
-    n_complete: int = 0
+    n_complete: dict[str, int] = field(default_factory=dict)
     trials: dict[str, int] = field(default_factory=dict)
     labels: frozenset[str | None] = frozenset()
 
@@ -287,7 +307,7 @@ def _read_ledger(path: Path, conditions: list[str], replicates: int) -> _LedgerS
         return _LedgerState()
     with Ledger.open(path, writable=False) as ledger:
         return _LedgerState(
-            sum(run < replicates for name in conditions for run in complete_runs(ledger, name)),
+            {name: sum(run < replicates for run in complete_runs(ledger, name)) for name in conditions},
             dict(Counter(trial.state for trial in ledger.trials())),
             frozenset(condition["label"] for condition in ledger.conditions().values()),
         )

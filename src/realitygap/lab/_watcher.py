@@ -12,7 +12,7 @@ from typing import TypedDict
 from realitygap.drawing import themed_file
 
 from . import _messages as messages
-from ._drawing import Drawer, DrawingWish
+from ._drawing import OF_ONE, Drawer, DrawingWish
 from ._figure_cache import read_figures
 
 LEAST_S = 1.0
@@ -29,8 +29,9 @@ MOST_REPLAYS = 64
 
 
 class PackedFigure(TypedDict, total=False):
-    """A `Figure` with its drawings packed by gzip, as they are served."""
+    """A `Figure` with its drawings packed by gzip, as they are served; another drawing has another `version`."""
 
+    version: int
     caption: str
     alt: str
     wide: bytes
@@ -72,6 +73,8 @@ class Watcher:
         self._not_before = 0.0
         self._is_drawing = False
         self._typical: set[str] = set()
+        self._drawn_of: dict[str, tuple[int, int, bool] | None] = {}
+        self._version = 0
         self._thumbnail: tuple[int, int] | None = None
 
     def look(self, done: tuple[int, int], *, is_running: bool = False) -> None:
@@ -88,12 +91,23 @@ class Watcher:
         if self._stamp is None and (kept := read_figures(self._folder, done)) is not None:
             self._stamp = stamp
             self.rows, self.curves, figures = kept
-            self.figures = {name: _packed(figure) for name, figure in figures.items()}
+            for name, figure in figures.items():
+                self._put(name, figure)
             self.n_drawn += 1
             self._changed()
             return
         self._stamp, self._is_drawing = stamp, True
         self._want(messages.FiguresWish(str(self._folder), done, list(LIVE) if is_running else None))
+
+    def want_figures_of(self, condition: str) -> None:
+        """Have the figures that show one condition drawn for this one, once after each drawing of all figures."""
+        if not self._is_drawing and self._drawn_of.get(condition) != self._stamp:
+            self._drawn_of[condition] = self._stamp
+            self._want(messages.FiguresWish(str(self._folder), (), list(OF_ONE), condition))
+
+    def _put(self, name: str, figure: messages.Figure) -> None:
+        self._version += 1
+        self.figures[name] = {**_packed(figure), "version": self._version}
 
     def want_thumbnail(self, done: tuple[int, int]) -> None:
         """Have the small picture and the summary of these runs saved in the study's folder, once."""
@@ -165,7 +179,7 @@ class Watcher:
     def _hear(self, message: messages.Message) -> None:
         match message:
             case messages.FigureDrawn():
-                self.figures[message.name] = _packed(message.figure)
+                self._put(message.name, message.figure)
             case messages.FiguresDrawn():
                 self.n_drawn += 1
                 self._is_drawing = False
@@ -181,6 +195,9 @@ class Watcher:
                 self.report_stamp += 1
             case messages.Ended():
                 self._typical.intersection_update(self.replays)
+                for condition in list(self._drawn_of):
+                    if not any(name.endswith(f"-{condition}") for name in list(self.figures)):
+                        del self._drawn_of[condition]
                 if self._is_drawing:  # it ended before it had drawn what was asked for
                     self._stamp, self._is_drawing = None, False
                     self._not_before = time.monotonic() + RETRY_S

@@ -27,13 +27,18 @@ _N_COMMON = 3
 
 
 def draw_networks(
-    folder: Results, structures: Sequence[Structures] | None = None, *, name: str = "networks"
+    folder: Results,
+    structures: Sequence[Structures] | None = None,
+    *,
+    condition: str | None = None,
+    name: str = "networks",
 ) -> Drawing:
     """Networks of the last generation: the first objective run's best, and the most common structures.
 
     Args:
         folder: Results of a study, or the path to them.
         structures: Result of `count_structures`. Default: computed.
+        condition: Condition. Default: the first one that selects by coverage.
         name: First part of the ids in the drawing.
 
     Raises:
@@ -42,8 +47,10 @@ def draw_networks(
     """
     tally = read_tally(folder)
     structures = count_structures(tally) if structures is None else structures
-    condition = _first_objective(tally)
-    group = next(each for each in structures if condition in each.conditions)
+    condition = tally.name_of(condition) if condition else _first_objective(tally)
+    group = next((each for each in structures if condition in each.conditions), None)
+    if group is None:
+        raise ValueError(f"Condition {condition!r} has no networks yet.")
     replicate = int(tally.replicates(condition)[0])
     first = _best_of_last(tally, condition, replicate)
     pictures: list[tuple[str, str, Picture]] = [

@@ -97,6 +97,24 @@ class Tally:
     uncounted: tuple[str, ...] = ()
     _whole_runs: dict[tuple[str, int], pl.DataFrame] = field(default_factory=dict, repr=False, compare=False)
 
+    def counted_only(self) -> Tally:
+        """Return the tally without the conditions whose cells were not counted.
+
+        Raises:
+            RecordError: none is left.
+        """
+        uncounted = _uncounted(self.best)
+        best = self.best.filter(~pl.col("condition").is_in(list(uncounted)))
+        if best.is_empty():
+            raise RecordError(
+                f"Nobody counted the cells of {', '.join(uncounted)} in {self.folder.path}, and a report shows "
+                "coverage. The scores of the task are printed at the end of a study; in Python: "
+                "realitygap.report.summarize_tasks(FOLDER)."
+            )
+        conditions = [each for each in self.conditions if each["name"] not in uncounted]
+        description: Any = {**self.description, "conditions": conditions}
+        return Tally(self.folder, description, best, self.driven, uncounted)
+
     @property
     def conditions(self) -> list[DescribedCondition]:
         """The conditions as the description has them."""
@@ -268,19 +286,10 @@ def read_tally(folder: Results, *, with_uncounted: bool = False) -> Tally:
     driven = read_driven(folder)
     if best.is_empty():
         raise no_trials(folder, driven)
-    uncounted = () if with_uncounted else _uncounted(best)
-    best = best.filter(~pl.col("condition").is_in(list(uncounted)))
-    if best.is_empty():
-        raise RecordError(
-            f"Nobody counted the cells of {', '.join(uncounted)} in {folder.path}, and a report shows coverage. The "
-            "scores of the task are printed at the end of a study; in Python: "
-            "realitygap.report.summarize_tasks(FOLDER)."
-        )
     description: Any = folder.description
-    description["conditions"] = [
-        _labeled(each, driven) for each in conditions_of(description) if each["name"] not in uncounted
-    ]
-    return Tally(folder, description, best, driven, uncounted)
+    description["conditions"] = [_labeled(each, driven) for each in conditions_of(description)]
+    tally = Tally(folder, description, best, driven)
+    return tally if with_uncounted else tally.counted_only()
 
 
 def largest(rows: pl.DataFrame, column: str) -> int:

@@ -13,9 +13,10 @@ from realitygap.orders import ORDER_FILE, CalibrateOrder, CloseOrder, GapOrder, 
 from realitygap.platforms import class_of, open_target, platform_of
 from realitygap.records import refuse_links, sees, write_whole
 from realitygap.trials import Pulse
-from realitygap.world import Calibration, load_arena, read_calibration
+from realitygap.world import Calibration, load_arena, load_robot, read_calibration
 
 from ._calibrate.kinds import KINDS
+from ._calibrate.one import refuse_other_sensors
 from ._calibrate.ordered import make_calibration
 from ._gap.between import GapBetween, Say, gap_between
 from ._gap.study import Tell
@@ -151,6 +152,7 @@ def _with_observe(order: CloseOrder) -> CloseOrder:
     with open_target(order.target, load_arena(order.arena), witness=order.witness, processes=1) as target:
         observe = order.observe or ("track" if sees(target.observes, "track") else "cells")
         refuse_more_than_is_seen(target, observe)
+        refuse_other_sensors(load_robot(_base_of(order)), target)
     if observe not in known:
         raise StudyError(
             f"{observe} alone does not identify {order.what}. Record more (--observe {' or '.join(known)})."
@@ -188,12 +190,16 @@ def _adopt(folder: Path, order: CloseOrder) -> None:
     write_whole(path, order.to_toml().encode(), within=folder)
 
 
+def _base_of(order: CloseOrder) -> str:
+    """Return the robot on whose numbers the calibration builds."""
+    return order.sim.partition(":")[2] or class_of(order.target).base_robot
+
+
 def _calibrated(
     order: CloseOrder, fit: Path, pulse: Pulse | None, tell: Tell | None, say: Say | None
 ) -> Calibration:
     """Return the calibration: the one in the file if the same order made it, otherwise a new one."""
-    base = order.sim.partition(":")[2] or class_of(order.target).base_robot
-    wanted = order.to_order(CalibrateOrder, robot=order.target, out=fit, base=base)
+    wanted = order.to_order(CalibrateOrder, robot=order.target, out=fit, base=_base_of(order))
     made = read_calibration(fit) if fit.exists() else None
     if made is not None and made.order == wanted.record():
         return made

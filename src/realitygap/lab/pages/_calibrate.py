@@ -40,7 +40,7 @@ _KINDS = {
 _FIELDS = {field.name: field for field in CalibrateOrder.fields() if field.face.label}
 _OF_ROBOT = ("robot", "name")
 """Fields of the first step."""
-_STEPS = ("Robot", "What", "Run", "Result")
+_STEPS = ("Robot", "Part", "Run", "Result")
 _BAR = """
 <q-td :props="props"><svg viewBox="0 0 100 12" width="120" height="14" aria-hidden="true" preserveAspectRatio="none">
   <rect x="0" y="5" width="100" height="2" class="lab-bar-prior" />
@@ -156,7 +156,7 @@ class _Page:
     def _fold_form(self) -> None:
         """Show the form unless a calibration runs or its result is shown."""
         step = self._step()
-        self._form_box.set_visibility(step in ("Robot", "What"))
+        self._form_box.set_visibility(step in ("Robot", "Part"))
         self._again.set_visibility(step == "Result")
 
     def _look(self) -> None:
@@ -182,7 +182,6 @@ class _Page:
         self._form = form = Form()
         form.summary()
         with ui.element("div").classes("lab-form") as self._robot_box:
-            section("Robot")
             form.text_of(
                 _FIELDS["robot"],
                 "sim",
@@ -193,11 +192,11 @@ class _Page:
             form.text("name", "Name", "my-robot", parse=needed, explanation="Name of the calibration file.")
             ui.button("Next", on_click=self._go_to_kinds).props("unelevated no-caps")
         with ui.element("div").classes("lab-form") as self._kind_box:
-            section("What to calibrate")
+            section("Part to calibrate")
             with (
                 ui.element("div")
                 .classes("lab-kinds")
-                .props('role="radiogroup" aria-label="What to calibrate"')
+                .props('role="radiogroup" aria-label="Part to calibrate"')
             ):
                 self._cards = {kind: self._show_card(kind) for kind in _KINDS}
             hint(
@@ -230,12 +229,12 @@ class _Page:
         problems = {key: text for key, text in found.items() if key in _OF_ROBOT}
         self._form.show_problems(problems)
         if not problems:
-            self._show_stage("What")
+            self._show_stage("Part")
 
     def _show_stage(self, stage: str) -> None:
         self._stage = stage
         self._robot_box.set_visibility(stage == "Robot")
-        self._kind_box.set_visibility(stage == "What")
+        self._kind_box.set_visibility(stage == "Part")
         self._steps.look()
 
     def _show_card(self, kind: str) -> ui.element:

@@ -183,9 +183,8 @@ class Counting:
         with ui.card().classes("lab-card").props(f'data-counting="{each.number}"'):
             with ui.row().classes("lab-row no-wrap"):
                 ui.element("span").classes("lab-pen").style(f"background: {ink_of(each.pen)}")
-                ui.label(f"Trial {each.number}: the {each.pen} line on sheet {each.trial.sheet}").classes(
-                    "lab-section"
-                )
+                sheet = "" if each.label == "EMULATED" else f" on sheet {each.trial.sheet}"
+                ui.label(f"Trial {each.number}: the {each.pen} line{sheet}").classes("lab-section")
             hint(f"{each.title}. {_ROLES[role]}")
             for one in proposals:
                 self._show_proposal(each, role, one, is_chosen=one is chosen)
@@ -272,8 +271,6 @@ class Counting:
             self._counts.score(each.number, draft, self._who(), role)
 
         said = f"Trial {each.number}: {counted(len(draft.cells), 'cell')} saved."
-        if not self._who():
-            ui.run_javascript("document.querySelector('[data-who] input').focus()")
         if await attempt(enter, said, type="positive"):
             self._chosen, self._corrects = None, False
         self._lab.changed()

@@ -287,11 +287,13 @@ class Scatter(Element, component="scatter.js"):
 
     Args:
         pairs: The scores.
+        beside: Scores in the next figure, which has the same axes.
     """
 
-    def __init__(self, pairs: ScorePairs) -> None:
+    def __init__(self, pairs: ScorePairs, beside: ScorePairs | None = None) -> None:
         super().__init__()
         self._props |= {"points": pairs["points"], "sides": pairs["sides"], "score": pairs["score"]}
+        self._props["beside"] = [] if beside is None else beside["points"]
 
 
 class Player(Element, component="player.js"):

@@ -109,17 +109,23 @@ class _Page:
             parts[-1].show()
         parts.append(unfinished)
         ui.link("Saved trials", "/saved")
-        if self._reports:
-            section("Saved reports")
-        for name in self._reports:
-            ui.link(name, f"/gaps/{name}", new_tab=True)
+        parts.append(Part(lambda: self._reports, self._show_reports))
+        with ui.column().classes("lab-cards"):
+            parts[-1].show()
 
-        def look() -> None:
+        async def look() -> None:
+            self._reports = await run.io_bound(self._lab.gap_reports) or []
             for part in parts:
                 part.look()
 
         watching(self._lab, look)
         ui.timer(LOOK_S, lambda: silence.look(0.0 if self._lab.gap is None else self._lab.gap.silent_s))
+
+    def _show_reports(self, reports: list[str]) -> None:
+        if reports:
+            section("Saved reports")
+        for name in reports:
+            ui.link(name, f"/gaps/{name}", new_tab=True)
 
     # form
 
@@ -136,8 +142,8 @@ class _Page:
             _FIELDS["target"],
             "jyro",
             self._choices.get("target"),
-            explanation="Robot, twin, or simulator that counts as reality. An emulator in another program also needs "
-            "its witness.",
+            explanation="Robot, twin, or simulator that counts as reality. For an emulator in another program, also "
+            "enter its witness in Advanced.",
         )
         self._platforms = (simulator, self._target)
         self._free_name = free_name(self._lab.root, *map(text_of, self._platforms))
@@ -153,7 +159,7 @@ class _Page:
         with ui.expansion("Advanced").classes("lab-expansion"):
             self._margin = form.number_of(_FIELDS["margin"])
             for key, field in _FIELDS.items():
-                if key not in ("sim", "target", "margin", *_NUMBERS):
+                if key not in ("sim", "target", "margin", "why", *_NUMBERS):
                     form.field_of(field, self._choices.get(key))
         self._plan = ui.label("").classes("lab-plan").props('role="status"')
         hint(
@@ -244,10 +250,15 @@ class _Page:
                 ui.button("Resume", on_click=lambda: attempt(lambda: self._resume(job))).props(
                     "outline no-caps"
                 )
-            elif job.can_close and not job.closes:
-                ui.button("Close the gap", on_click=lambda: attempt(lambda: self._close(job))).props(
-                    "outline no-caps"
-                )
+            elif not job.closes:
+                if job.can_close:
+                    ui.button("Close the gap", on_click=lambda: attempt(lambda: self._close(job))).props(
+                        "outline no-caps"
+                    )
+                if job.can_explain:
+                    ui.button("Explain the gap", on_click=lambda: attempt(lambda: self._explain(job))).props(
+                        "outline no-caps"
+                    )
         if not work.is_over:
             ui.linear_progress(work.share, show_value=False).props(
                 f'aria-label="{100 * work.share:.0f} % of the trials"'
@@ -256,6 +267,10 @@ class _Page:
     def _resume(self, job: GapJob) -> None:
         values = job.order.model_dump(exclude={"results"})
         self._lab.measure_gap(job.name, values, self._visitor, closes=job.closes)
+
+    def _explain(self, job: GapJob) -> None:
+        values = job.order.model_dump(exclude={"results"}) | {"why": True}
+        self._lab.measure_gap(job.name, values, self._visitor)
 
     def _close(self, job: GapJob) -> None:
         values = job.order.model_dump(exclude={"results"})
@@ -277,13 +292,20 @@ class _Page:
                 with ui.element("dd"):
                     ui.label(words)
         with ui.element("div").classes("lab-panels-two"):
-            with ui.column().classes("lab-panel"):
-                section("Controllers on both platforms")
-                Scatter(pairs)
-                hint(
-                    "Crosses are 95 % intervals of the means. Circles are champions, squares random networks. "
-                    "On the line there is no gap."
-                )
+            titles = {"Controllers on both platforms": (pairs, None)}
+            if job.before is not None:
+                titles = {
+                    "Before the calibration": (job.before, pairs),
+                    "After the calibration": (pairs, job.before),
+                }
+            for title, both in titles.items():
+                with ui.column().classes("lab-panel"):
+                    section(title)
+                    Scatter(*both)
+                    hint(
+                        "Crosses are 95 % intervals of the means. Circles are champions, squares random networks. "
+                        "On the line there is no gap."
+                    )
             if len(job.intervals) > 1:
                 with ui.column().classes("lab-panel"):
                     _show_intervals(job.intervals)

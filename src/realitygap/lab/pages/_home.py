@@ -212,7 +212,7 @@ def _show_actions(lab: Lab, standing: Standing, address: str) -> None:
     if state.n_all:
         ui.button("Open", on_click=lambda: ui.navigate.to(address)).props(other if needs_robot else main)
     if state.has_robot:
-        text = "Answer" if standing.is_asking else "Open trials"
+        text = "Answer question" if standing.is_asking else "Open trials"
         ui.button(text, on_click=lambda: ui.navigate.to(f"{address}/trials")).props(
             main if needs_robot else other
         )

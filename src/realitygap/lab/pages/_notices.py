@@ -9,11 +9,14 @@ from weakref import WeakKeyDictionary
 from nicegui import Client, run, ui
 
 from realitygap.errors import RealityGapError
+from realitygap.lab._mistakes import FormError
 
 WRONG = (RealityGapError, ValueError, TypeError, OSError)
 """Errors that a visitor can correct."""
 _errors: WeakKeyDictionary[Client, ui.notification] = WeakKeyDictionary()
 """The error that each page shows."""
+_forms: WeakKeyDictionary[Client, Callable[[FormError], None]] = WeakKeyDictionary()
+"""How each page shows mistakes at its fields, if it has fields outside forms with a button."""
 
 
 def notify(message: str, **options: Any) -> None:
@@ -29,9 +32,17 @@ def notify(message: str, **options: Any) -> None:
 def show_error(error: Exception) -> None:
     """Show an error until the visitor closes it, or acts again."""
     forget_error()
+    if isinstance(error, FormError) and (show := _forms.get(ui.context.client)) is not None:
+        show(error)
+        return
     close = {"label": "Close", "color": "white", "noCaps": True}
     options: Any = {"type": "negative", "multi_line": True, "timeout": 0, "actions": [close]}
     _errors[ui.context.client] = ui.notification(str(error), position="top", **options)
+
+
+def show_at_fields(show: Callable[[FormError], None]) -> None:
+    """Have mistakes in fields of this page be shown there."""
+    _forms[ui.context.client] = show
 
 
 def forget_error() -> None:

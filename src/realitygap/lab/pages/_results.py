@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
-from nicegui import ui
+from typing import Any
+from urllib.parse import quote
+
+from nicegui import events, ui
 
 from realitygap._wording import Basis, counted, highest, highest_median, undecided_highest
+from realitygap.lab._drawing import OF_ONE
 from realitygap.lab._messages import Curve, Replay, ReplayRefused, SummaryRow
 from realitygap.lab._standing import Standing
+from realitygap.lab._studies import ConditionState
 from realitygap.lab._watcher import PackedFigure, Watcher
 from realitygap.stats import runs_for_a_claim
 
 from ._elements import Curves, Generations, Player
+from ._fields import Form
 from ._frame import hint, section
 from ._part import Part
 
@@ -30,11 +36,10 @@ _CONDITION = """
 <q-td :props="props">
   <q-btn flat dense no-caps align="left" class="lab-choose-row" :label="props.value"
          :aria-pressed="String(props.row.chosen)" @click.stop="$parent.$emit('choose', props.value)" />
+  <span v-if="props.row.best" class="lab-state">{{ props.row.best }}</span>
 </q-td>
 """
-"""Name of a condition in the table: a press shows this condition alone."""
-_COLUMNS_AT_END = '["condition", "median", "n", "label"]'
-_ALL_COLUMNS = '["condition", "median", "n", "progress", "label"]'
+"""Name of a condition in the table: a press shows this condition in all figures."""
 _ROW = "(event, row) => emit(row)"
 
 
@@ -49,8 +54,8 @@ class Results:
 
     def __init__(self, standing: Standing, watcher: Watcher, conditions: list[str]) -> None:
         self._standing, self._watcher, self._conditions = standing, watcher, conditions
-        self._replicates = standing.state.replicates
         self._chosen = ""
+        self._offered: dict[str, str] = {}
         self._shown_curves: list[Curve] | None = None
         self._shown_run: Replay | None = None
 
@@ -60,8 +65,10 @@ class Results:
         self._finding.show()
         self._waiting = Part(self._waiting_for, self._show_waiting)
         self._waiting.show()
-        self._filtered = Part(lambda: self._chosen, self._show_filter)
-        self._filtered.show()
+        with ui.row().classes("lab-row") as self._picking:
+            self._picker = Form().choice("condition", "Condition", {}, None)
+            self._picker.on_value_change(self._pick)
+            self._all = ui.button("Compare all", on_click=lambda: self._choose("")).props("flat no-caps")
         with ui.element("div").classes("lab-panels-two") as self._panels:
             with ui.column().classes("lab-panel"):
                 section("Best path")
@@ -78,14 +85,11 @@ class Results:
         self._table: ui.table | None = None
         self._gallery = ui.column().classes("lab-cards")
         self._images: dict[str, _Image] = {}
-        self._n_drawn = 0
         self._renew()
 
     def put(self, standing: Standing) -> None:
         """Show what has changed since."""
         self._standing = standing
-        if not standing.state.problem:
-            self._replicates = standing.state.replicates
         self._renew()
 
     def _rows(self) -> list[_Row]:
@@ -140,16 +144,45 @@ class Results:
         watcher = self._watcher
         for part in (self._waiting, self._finding):
             part.look()
-        is_new = self._n_drawn != watcher.n_drawn
-        self._n_drawn = watcher.n_drawn
+        self._renew_picker()
         self._renew_panels()
+        condition, rows = self._condition(), self._rows()
+        if rows and condition != rows[0].condition and self._standing.word not in GROWING:
+            watcher.want_figures_of(condition)
+        shown = {}
         for name in self._drawn():
-            if name not in self._images:
+            kind, _, of = name.partition("-")
+            if kind not in OF_ONE or of == condition:
+                shown[kind if kind in OF_ONE else name] = name
+        for key, name in shown.items():
+            if key not in self._images:
                 with self._gallery:
-                    self._images[name] = _Image(name, watcher.figures[name])
-                self._images[name].load(self._standing.state.name, self._n_drawn)
-            elif is_new:
-                self._images[name].load(self._standing.state.name, self._n_drawn)
+                    self._images[key] = _Image(_TITLES[key.partition("-")[0]])
+            self._images[key].load(self._standing.state.name, name, watcher.figures[name])
+        for key, image in self._images.items():
+            image.box.set_visibility(key in shown)
+
+    def _renew_picker(self) -> None:
+        """Offer the conditions, the best one first."""
+        known = [row.condition for row in self._rows()]
+        offered = {name: name for name in (*known, *(each for each in self._conditions if each not in known))}
+        if known and len(offered) > 1:
+            offered[known[0]] += f" ({self._best})"
+        if offered != self._offered or self._picker.value != self._condition():
+            self._offered = offered
+            self._picker.set_options(offered, value=self._condition())
+        self._picking.set_visibility(len(offered) > 1 and bool(known))
+        self._all.set_visibility(bool(self._chosen))
+
+    @property
+    def _best(self) -> str:
+        """The mark of the condition with the highest median."""
+        return "best so far" if self._standing.state.share < 1 else "best"
+
+    def _condition(self) -> str:
+        """The condition of all figures that show one: the best one unless the visitor has chosen another."""
+        rows = self._rows()
+        return self._chosen or next(iter([row.condition for row in rows] or self._conditions), "")
 
     def _renew_panels(self) -> None:
         """Update the two panels and the table of conditions."""
@@ -177,42 +210,50 @@ class Results:
         self._evolution_box.set_visibility(self._shown_run is not None)
 
     def _renew_table(self) -> None:
+        known, state = {row.condition: row for row in self._rows()}, self._standing.state
+        names = [*known, *(each.name for each in state.conditions if each.name not in known)]
+        conditions = sorted(state.conditions, key=lambda each: names.index(each.name))
         rows = [
             {
-                "condition": row.condition,
-                "median": row.estimate,
-                "n": row.n,
-                "progress": f"{100 * row.n / self._replicates:.0f} %",
-                "label": row.label,
-                "chosen": row.condition == self._chosen,
+                "condition": each.name,
+                "state": _word(each, is_growing=self._standing.word in GROWING),
+                "n": f"{each.n_done:,} of {each.n_runs:,}"
+                if each.n_done < each.n_runs
+                else f"{each.n_runs:,}",
+                "median": known[each.name].estimate if each.name in known else "",
+                "label": known[each.name].label if each.name in known else each.label,
+                "chosen": each.name == self._chosen,
+                "best": self._best if each.name == names[0] and len(names) > 1 else "",
             }
-            for row in self._rows()
+            for each in conditions
         ]
         if self._table is None:
             with self._table_box:
                 section("Conditions")
                 self._table = self._make_table()
                 hint(
-                    "Choose a condition to show it alone. Best coverage of a run, along the robot's path. Brackets: "
-                    "95 % interval of the median."
+                    "Choose a condition to show it in all figures. Best coverage of a run, along the robot's path. "
+                    "Brackets: 95 % interval of the median."
                 )
-        is_growing = self._standing.state.share < 1
-        columns = _ALL_COLUMNS if is_growing else _COLUMNS_AT_END
-        if (
-            self._table.props.get(":visible-columns") != columns
-        ):  # each change draws the buttons in the rows again
-            self._table.props[":visible-columns"] = columns
+                self._drawn_of = hint("")
         if self._table.rows != rows:
             self._table.rows = rows
+        n_drawn, n_done = sum(row.n for row in known.values()), state.n_all_done
+        self._drawn_of.text = (
+            f"Medians and figures use the first {n_drawn:,} of {counted(n_done, 'run')}. They are drawn again "
+            "as runs finish."
+            if n_drawn < n_done and state.share < 1
+            else ""
+        )
 
     def _make_table(self) -> ui.table:
         columns = [
             {"name": key, "label": label, "field": key, "align": align, "sortable": True}
             for key, label, align in (
                 ("condition", "Condition", "left"),
-                ("median", "Median best coverage", "left"),
+                ("state", "State", "left"),
                 ("n", "Runs", "right"),
-                ("progress", "Progress", "right"),
+                ("median", "Median best coverage", "left"),
                 ("label", "Label", "left"),
             )
         ]
@@ -225,27 +266,19 @@ class Results:
         return table
 
     def _choose(self, condition: object) -> None:
-        """Show one condition alone in both panels; all if it was chosen already."""
-        names = [row.condition for row in self._rows()]
-        is_new = condition in names and condition != self._chosen
-        self._chosen = str(condition) if is_new else ""
+        """Show one condition in all figures; an empty one compares all, and shows the best where one is shown."""
+        self._chosen = str(condition) if condition in self._conditions else ""
         self._curves.choose(self._chosen)
-        self._filtered.look()
-        self._renew_panels()
+        self._renew()
 
-    def _show_filter(self, chosen: str) -> None:
-        if chosen:
-            with ui.row().classes("lab-row"):
-                ui.label(f"Showing {chosen}.").props('role="status"')
-                ui.button("Show all", on_click=lambda: self._choose("")).props("flat no-caps")
+    def _pick(self, event: events.ValueChangeEventArguments[Any]) -> None:
+        if event.value != self._condition():  # otherwise the picker has followed
+            self._choose(event.value)
 
     def _typical(self) -> tuple[str, bool, Replay | ReplayRefused | None]:
         """Condition of the path that is shown, whether there is one, and its replay; None while it is computed."""
-        rows, standing = self._rows(), self._standing
-        condition = self._chosen or (rows[0].condition if rows else "")
-        if not condition and self._drawn():
-            condition = self._conditions[0]
-        if not condition:
+        condition, standing = self._condition(), self._standing
+        if not self._rows() and not self._drawn():
             return "", False, None
         done = 0 if standing.word in GROWING else standing.state.n_all_done
         return condition, True, self._watcher.typical(condition, done)
@@ -265,22 +298,35 @@ class Results:
 
 
 class _Image:
-    """A figure in its two widths, with its caption."""
+    """The place of a figure in its two widths, with its caption."""
 
-    def __init__(self, name: str, figure: PackedFigure) -> None:
-        self._name = name
-        section(_TITLES[name.partition("-")[0]])
-        with ui.element("picture").classes("lab-figure"):
-            self._narrow = ui.element("source").props('media="(max-width: 700px)"')
-            self._wide = ui.element("img")
-            self._wide.props["alt"] = figure["alt"]
-        self._caption = hint(figure["caption"])
+    def __init__(self, title: str) -> None:
+        self._version = 0
+        with ui.column().classes("lab-cards") as self.box:
+            section(title)
+            with ui.element("picture").classes("lab-figure"):
+                self._narrow = ui.element("source").props('media="(max-width: 700px)"')
+                self._wide = ui.element("img")
+            self._caption = hint("")
 
-    def load(self, study: str, version: int) -> None:
-        """Load the drawing of this version."""
-        address = f"/figures/{study}/{self._name}"
+    def load(self, study: str, name: str, figure: PackedFigure) -> None:
+        """Load this drawing, unless it is shown already."""
+        if figure["version"] == self._version:
+            return
+        self._version = version = figure["version"]
+        address = f"/figures/{study}/{quote(name)}"
         self._narrow.props["srcset"] = f"{address}-narrow.svg?v={version}"
         self._wide.props["src"] = f"{address}-wide.svg?v={version}"
+        self._wide.props["alt"], self._caption.text = figure["alt"], figure["caption"]
+
+
+def _word(condition: ConditionState, *, is_growing: bool) -> str:
+    """Return the state of a condition in a word, as studies have them."""
+    if condition.n_done == condition.n_runs:
+        return "Complete"
+    if not condition.n_done:
+        return "Waiting" if is_growing else "Not started"
+    return "Running" if is_growing else "Paused"
 
 
 class _Row:

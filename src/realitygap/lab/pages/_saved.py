@@ -17,7 +17,7 @@ from realitygap.lab._saved import SavedFile, SavedTrials, saved_files
 from ._elements import CellGrid
 from ._fields import Form
 from ._frame import LONGEST_NAME, framed, hint, remember_who, section, text_of, visitor_of
-from ._notices import attempt, notify
+from ._notices import attempt, notify, show_at_fields
 
 _COLUMNS = {"number": "Trial", "name": "Description", "state": "State", "cells": "Cells", "notes": "Notes"}
 
@@ -58,11 +58,12 @@ def add_saved(lab: Lab) -> None:
 
 
 def _show_facts(saved: SavedTrials | None) -> None:
-    """Show the label, platform, and number of trials of a file."""
+    """Show the label, platform, number of trials, and date of a file."""
     if saved is not None:
         label = saved.label
         ui.label(label).classes(f"lab-label-{label.lower()} lab-badge")
-        ui.label(f"{platform_in_words(saved.target, label)}, {counted(len(saved.trials), 'trial')}")
+        n_trials = counted(len(saved.trials), "trial")
+        ui.label(f"{platform_in_words(saved.target, label)}, {n_trials}, {saved.changed}")
 
 
 class _Page:
@@ -84,9 +85,9 @@ class _Page:
         self._table.on_select(lambda event: self._choose([row["number"] for row in event.selection]))
         self._fill()
         with ui.element("div").classes("lab-wide").props("data-counting"):  # below the table, as is the trial
-            name = Form().text(
-                "who", "Your name", self._who, explanation="Your name is saved with each entry."
-            )
+            form = Form()
+            name = form.text("who", "Your name", self._who, explanation="Your name is saved with each entry.")
+        show_at_fields(form.refuse)
         name.props(f"debounce=400 maxlength={LONGEST_NAME}")
         name.on_value_change(lambda event: self._named(text_of(event)))
         self._card = ui.refreshable(self._show_card)

@@ -61,9 +61,11 @@ class _Shown:
                 ui.label(f"{_interrupted(question.problem)} It will be repeated.")
                 self._button("Continue")
             case messages.ScoreQuestion():
-                end = f"Sheet {question.sheet} is full." if question.is_full else "The trial has ended."
+                end = "The trial has ended. "
+                if question.is_full:
+                    end = "" if self._job.label == "EMULATED" else f"Sheet {question.sheet} is full. "
                 with ui.row().classes("lab-row no-wrap"):
-                    ui.label(f"{end} Score its trials, on this page or another. The study then continues.")
+                    ui.label(f"{end}Score the trials, on this page or another. The study then continues.")
                     self._button("Later", is_main=False)
             case messages.CloseQuestion():
                 self._show_close(question)
@@ -152,7 +154,7 @@ class Driving:
         arena, outlines = self._counts.arena(condition), self._counts.outlines(condition)
         with ui.card().classes("lab-card lab-question"):
             ui.label(f"Trial {card['trial']} is being driven").classes("lab-section").props('role="status"')
-            hint(f"{card['title']}. Pen: {card['pen']}.")
+            hint(card["title"] if self._job.label == "EMULATED" else f"{card['title']}. Pen: {card['pen']}.")
             self._bar = ui.linear_progress(0, show_value=False).props('aria-label="Steps driven"')
             self._step_words = ui.label("")
             self._silence = Silence()

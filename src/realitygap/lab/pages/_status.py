@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from nicegui import ui
 
@@ -36,17 +36,18 @@ class Progress:
             self._bar.props["aria-label"] = f"{100 * share:.0f} % done"
 
 
-def show_steps(steps: Sequence[str], current: str) -> None:
+def show_steps(steps: Sequence[str], current: str, titles: Mapping[str, str] | None = None) -> None:
     """Show the steps.
 
     Args:
         steps: Names of the steps.
         current: The current one; empty if there is none.
+        titles: Titles of steps that are not their names.
     """
     with ui.element("ol").classes("lab-steps").props('aria-label="Steps"'):
         for step in steps:
             with ui.element("li") as item:
-                ui.label(step)
+                ui.label((titles or {}).get(step, step))
             if step == current:
                 item.props('aria-current="step"')
 

@@ -17,6 +17,7 @@ from realitygap.lab._choices import port_choices
 from realitygap.lab._control import Visitor
 from realitygap.lab._counts import CountedTrial, Counts
 from realitygap.lab._lab import Lab
+from realitygap.lab._mistakes import FormError
 from realitygap.lab._photos import Photos
 from realitygap.lab._study import StudyJob, sitting_mistakes
 from realitygap.report import measure_agreement
@@ -26,8 +27,8 @@ from realitygap.robots import PortGuess, list_ports
 from ._control import show_holder
 from ._counting import Counting
 from ._fields import Form, needed
-from ._frame import LONGEST_NAME, framed, remember_who, text_of, visitor_of
-from ._notices import WRONG, attempt
+from ._frame import LONGEST_NAME, framed, hint, remember_who, text_of, visitor_of
+from ._notices import WRONG, attempt, show_at_fields
 from ._part import Part, watching
 from ._photos import SheetPhotos
 from ._sitting import Driving, show_question
@@ -48,10 +49,13 @@ _SCORERS = {
     "witness": "The emulator; only for emulated robots",
 }
 _WHEN = {"sheet": "When a sheet is full", "trial": "After each trial"}
-_TO_GRID = (
-    "setTimeout(() => document.querySelector('[data-counting]')?.scrollIntoView({block: 'start'}), 300)"
-)
-"""Bring the grid into view once its section is open."""
+_TO_GRID = "document.querySelector('[data-counting]')?.scrollIntoView({block: 'start'})"
+"""Bring the grid into view; its section must be open, or the page is not long enough."""
+_BADGE = """
+<q-td :props="props">
+  <span v-if="props.value" :class="'lab-badge lab-label-' + props.value.toLowerCase()">{{ props.value }}</span>
+</q-td>
+"""
 _NUMBER = """
 <q-td :props="props">
   <q-btn v-if="props.row.counts" outline dense no-caps padding="4px 12px" :label="String(props.value)"
@@ -106,11 +110,12 @@ class _Page:
         self._robot = Part(self._robot_stand, self._show_robot)
         self._asked = Part(self._asked_stand, self._show_asked)
         self._ending = Part(self._may_end, self._show_ending)
+        self._stepped = Part(lambda: (self._step(), self._n_waiting()), self._show_steps)
         self._steps = Part(lambda: (self._step(), self._job() is None), self._turn_to)
         with ui.element("div").classes("lab-steps-bar"):
+            self._stepped.show()
             self._steps.show()
         with ui.element("div").classes("lab-wide") as self._name_box:
-            self._name_box.props("data-who")
             self._show_name()
         self._name_box.set_visibility(not self._visitor.who)
         self._holder = Part(lambda: self._robot_stand().operator, self._show_holder)
@@ -119,6 +124,7 @@ class _Page:
             self._asked.show()
         with self._fold("Score") as self._score_fold:
             await self._counting.show()
+        self._score_fold.on("after-show", js_handler=f"() => {_TO_GRID}")
         with self._fold("Robot") as self._robot_fold:
             for part in (self._robot, self._ending):
                 part.show()
@@ -148,7 +154,8 @@ class _Page:
         )
 
     def _show_name(self) -> None:
-        name = Form().text(
+        form = Form()
+        name = form.text(
             "who",
             "Your name",
             self._visitor.who,
@@ -156,6 +163,12 @@ class _Page:
         )
         name.props(f"debounce=400 maxlength={LONGEST_NAME}")
         name.on_value_change(lambda event: self._named(text_of(event)))
+
+        def refuse(error: FormError) -> None:
+            self._name_box.set_visibility(True)
+            form.refuse(error)
+
+        show_at_fields(refuse)
 
     def _show_known(self, who: str) -> None:
         if who:
@@ -168,7 +181,7 @@ class _Page:
     def _name_folds(self) -> None:
         """Put the number of trials into the titles of the sections."""
         trials = self._counts.trials()
-        n_waiting = sum(each.trial.state == "driven" for each in trials)
+        n_waiting = self._n_waiting()
         titles = {
             self._score_fold: f"Score: {n_waiting} to score" if n_waiting else "Score",
             self._table_fold: f"All trials: {len(trials)}" if trials else "All trials",
@@ -179,14 +192,26 @@ class _Page:
                 fold.text = title
         self._photo_fold.set_visibility(bool(self._sheets.sheets()) or self._videos.has_job)
 
+    def _n_waiting(self) -> int:
+        """Number of trials that wait to be scored."""
+        return sum(each.trial.state == "driven" for each in self._counts.trials())
+
+    def _show_steps(self, at: tuple[str, int]) -> None:
+        """Show the steps, and how many trials wait to be scored in whatever step."""
+        step, n_waiting = at
+        show_steps(_STEPS, step, {"Score": f"Score: {n_waiting}"} if n_waiting else {})
+
     def _turn_to(self, at: tuple[str, bool]) -> None:
-        """Show the steps; open the section of the current one and close the others."""
+        """Open the section of the current step and close the others."""
         step, _ = at
-        show_steps(_STEPS, step)
         if self._is_shown:
+            was_open = self._score_fold.value
             self._name_box.set_visibility(not self._visitor.who)
             self._open_step(step)
-            ui.run_javascript(_TO_GRID if step == "Score" else "scrollTo(0, 0)")
+            if step != "Score":
+                ui.run_javascript("scrollTo(0, 0)")
+            elif was_open:
+                ui.run_javascript(_TO_GRID)
 
     def _open_step(self, step: str) -> None:
         is_free = self._job() is None
@@ -226,7 +251,9 @@ class _Page:
             self._is_looking = False
 
     async def _show_changes(self) -> None:
-        for part in (self._robot, self._asked, self._ending, self._steps, self._known, self._holder):
+        for part in (
+            self._robot, self._asked, self._ending, self._stepped, self._steps, self._known, self._holder,
+        ):  # fmt: skip
             part.look()
         if self._counts.trials() is not self._listed:
             self._listed = self._counts.trials()
@@ -246,9 +273,10 @@ class _Page:
     async def _look_at(self, number: int) -> None:
         """Show the grid of this trial."""
         with ui.context.client:  # the button that was pressed may be gone by then
-            self._score_fold.value = True
             await self._counting.choose(number)
-            ui.run_javascript(_TO_GRID)
+            if self._score_fold.value:
+                ui.run_javascript(_TO_GRID)
+            self._score_fold.value = True
 
     async def _named(self, who: str) -> None:
         self._visitor = Visitor(self._visitor.key, who.strip()[:LONGEST_NAME])
@@ -384,8 +412,8 @@ class _Page:
             port = form.text(
                 "port",
                 "Port",
-                last.port if last is not None and is_lost else likely[0] if likely else self._emulated,
-                choices=port_choices(found, self._emulated),
+                last.port if last is not None and is_lost else likely[0] if likely else "",
+                choices=port_choices(found),
                 parse=needed,
                 placeholder="/dev/rfcomm0 or COM3",
                 explanation="Place the robot on free floor first.",
@@ -393,7 +421,6 @@ class _Page:
             with ui.row().classes("lab-row"):
                 text = "Reconnect" if is_lost else "Connect robot"
                 ui.button(text, on_click=connect).props("unelevated no-caps").classes("lab-primary")
-                ui.button("Use an emulated robot", on_click=emulate).props("outline no-caps")
             with ui.expansion("Advanced").classes("lab-expansion"):
                 form.choice("counts", "Scored by", _SCORERS, before.counts or "page")
                 form.choice("when", "When to score", _WHEN, before.when)
@@ -409,6 +436,9 @@ class _Page:
                     before.camera,
                     explanation="Number and options of an overhead camera: 0?tag=10.",
                 )
+            with ui.row().classes("lab-row"):
+                ui.button("Use an emulated robot", on_click=emulate).props("outline no-caps")
+                hint("Drives the trials without hardware. Their label is EMULATED.")
 
     def _beginning(self) -> _Beginning | None:
         try:
@@ -438,6 +468,7 @@ class _Page:
             {
                 "number": each.number,
                 "counts": each.role_of(self._visitor.who) is not None,
+                "label": each.label,
                 "code": each.trial.code,
                 "sheet": each.trial.sheet,
                 "pen": each.pen,
@@ -451,6 +482,7 @@ class _Page:
             {"name": name, "label": label, "field": name, "align": "left"}
             for name, label in (
                 ("number", "Trial"),
+                ("label", "Label"),
                 ("code", "Code"),
                 ("sheet", "Sheet"),
                 ("pen", "Pen"),
@@ -462,6 +494,7 @@ class _Page:
         table = ui.table(rows=rows, columns=columns, row_key="number", pagination=20)
         table.classes("lab-table").props("flat bordered dense wrap-cells")
         table.add_slot("body-cell-number", _NUMBER)
+        table.add_slot("body-cell-label", _BADGE)
         table.on("choose", lambda event: self._choose(event.args))
 
     async def _choose(self, number: Any) -> None:

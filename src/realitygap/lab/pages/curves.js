@@ -84,7 +84,7 @@ export default {
     words() {
       if (!this.mark) return this.chosen ? `${this.chosen}: the band is the 95\u00a0% interval of the median.` : "Point at a line to read its values.";
       const { n, median, low, high } = this.at, interval = low === null ? "" : ` [${low.toFixed(3)}, ${high.toFixed(3)}]`;
-      return `${this.curves[this.mark.k].condition}, generation ${this.mark.g}: ${median.toFixed(3)}${interval}, n = ${n}`;
+      return `${this.curves[this.mark.k].condition}, generation ${this.mark.g}: ${median.toFixed(3)}${interval}, n = ${n.toLocaleString("en-US")}`;
     },
   },
   methods: {

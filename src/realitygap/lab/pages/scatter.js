@@ -2,6 +2,7 @@
 export default {
   props: {
     points: Array, // name, isChampion, means: two numbers, ends: the interval of each
+    beside: Array, // points of the next figure, which has the same axes
     sides: Array, // names of the platforms: across, up
     score: String,
   },
@@ -16,8 +17,8 @@ export default {
             <text :x="left - 6" :y="y(tick)" text-anchor="end" dominant-baseline="central">{{ tick.toFixed(1) }}</text>
             <text :x="x(tick)" :y="size - bottom + 18" text-anchor="middle">{{ tick.toFixed(1) }}</text>
           </g>
-          <text :x="(left + size - right) / 2" :y="size - 6" text-anchor="middle">{{ score }} on {{ sides[0] }}</text>
-          <text :transform="'translate(12 ' + (top + size - bottom) / 2 + ') rotate(-90)'" text-anchor="middle">{{ score }} on {{ sides[1] }}</text>
+          <text v-for="(line, k) in titles[0]" :key="'a' + k" :x="(left + size - right) / 2" :y="size - bottom + 34 + 15 * k" text-anchor="middle">{{ line }}</text>
+          <text v-for="(line, k) in titles[1]" :key="'u' + k" :transform="'translate(' + (12 + 15 * k) + ' ' + (top + size - bottom) / 2 + ') rotate(-90)'" text-anchor="middle">{{ line }}</text>
         </g>
         <line class="lab-curves-cross" :x1="x(ends[0])" :y1="y(ends[0])" :x2="x(ends[1])" :y2="y(ends[1])" />
         <g v-for="(each, k) in points" :key="k" :class="each.isChampion ? 'lab-scatter-champion' : 'lab-scatter-random'">
@@ -29,7 +30,7 @@ export default {
       </svg>
       <div class="lab-curves-words" role="status">{{ words }}</div>
     </div>`,
-  data() { return { size: 420, mark: null, left: 56, right: 12, top: 10, bottom: 44 }; },
+  data() { return { size: 420, mark: null, right: 12, top: 10 }; },
   mounted() {
     this.watcher = new ResizeObserver(([entry]) => { this.size = Math.min(Math.max(Math.round(entry.contentRect.width), 240), 460); });
     this.watcher.observe(this.$refs.place);
@@ -37,8 +38,14 @@ export default {
   unmounted() { this.watcher.disconnect(); },
   computed: {
     name() { return `Scatter of ${this.points.length} controllers: ${this.score} on ${this.sides[0]} and on ${this.sides[1]}.`; },
+    titles() { // of the axes, in lines that fit; a long name is broken
+      const most = Math.floor((this.size - 90) / 7.5), line = new RegExp(`\\S.{0,${most - 1}}(?=\\s|$)|\\S{1,${most}}`, "g");
+      return this.sides.map((side) => `${this.score} on ${side}`.match(line));
+    },
+    left() { return 42 + 15 * this.titles[1].length; },
+    bottom() { return 30 + 15 * this.titles[0].length; },
     ends() { // at tenths of the scale, with all intervals inside
-      const values = this.points.flatMap(({ ends }) => ends.flat());
+      const values = [...this.points, ...this.beside].flatMap(({ ends }) => ends.flat());
       return [Math.floor(Math.max(Math.min(...values), 0) * 10) / 10, Math.ceil(Math.max(...values, 0.1) * 10) / 10];
     },
     ticks() {

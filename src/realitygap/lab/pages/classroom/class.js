@@ -43,8 +43,10 @@ addEventListener("keydown", ({ key }) => key === "Escape" && stop());
 find("join").addEventListener("submit", (event) => {
   event.preventDefault();
   const name = find("who").value.trim();
-  find("problem").textContent = name ? "" : "Enter a name, then press Join.";
-  if (name) send("join", { name });
+  const most = Number(find("who").dataset.most), length = [...name].length;
+  const problem = !name ? "Enter a name, then press Join." : length > most ? `At most ${most} letters. You entered ${length}.` : "";
+  find("problem").textContent = problem;
+  if (!problem) send("join", { name });
   else find("who").focus();
 });
 

@@ -146,7 +146,7 @@ def test_a_hang_up_is_a_serial_exception_until_the_port_is_opened_again():
 @pytest.mark.parametrize(
     ("url", "says"),
     [
-        ("emulator://s3", "s1 or s2"),
+        ("emulator://s3", "Expected emulator://s1, emulator://s2"),
         ("emulator://s2?fluke=7", "none, 1, 2"),
         ("emulator://s2?flute=1", "Did you mean 'fluke'"),
         ("emulator://s2?speed=fast", "speed=fast"),

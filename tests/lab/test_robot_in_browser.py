@@ -207,7 +207,7 @@ def test_robot_stops_when_a_key_is_released_and_sensors_have_names(visit):
     drive_and_stop(page)
     for name in ("Left obstacle", "Center light", "Right line"):
         page.get_by_role("progressbar", name=name).wait_for()
-    page.get_by_text("Left obstacle (0 to 6400)").wait_for()
+    page.get_by_text("Left obstacle (0 to 6,400)").wait_for()
 
 
 def test_bars_of_sensors_are_as_wide_as_the_readings_while_the_robot_drives_into_a_wall(visit):

@@ -31,7 +31,7 @@ FAMILY = RobotFamily(
     robot="scribbler-s2-fluke2",
     additions=(("fluke1", "fluke2"), ("cardboard",)),
     range_readings={
-        3: tuple(Reading(f"{side} obstacle", "0 to 6400", 6400.0) for side in ("Left", "Center", "Right")),
+        3: tuple(Reading(f"{side} obstacle", "0 to 6,400", 6400.0) for side in ("Left", "Center", "Right")),
         2: tuple(Reading(f"{side} infrared", "0 or 1", 1.0) for side in ("Left", "Right")),
     },
     channel_readings={

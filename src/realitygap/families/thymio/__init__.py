@@ -36,7 +36,7 @@ FAMILY = RobotFamily(
     robot="thymio",
     range_readings={
         7: tuple(
-            Reading(f"{place} infrared", "0 to 4505", 4505.0)
+            Reading(f"{place} infrared", "0 to 4,505", 4505.0)
             for place in ("Left", "Center left", "Center", "Center right", "Right", "Rear left", "Rear right")
         )
     },

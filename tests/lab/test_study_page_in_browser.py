@@ -81,7 +81,7 @@ def check_generations(page) -> None:
     assert paths.last.get_attribute("class") == "lab-generations-best"
     words, slider = (
         page.locator(".lab-generations .lab-value"),
-        page.get_by_label("Generation", exact=True).first,
+        page.get_by_label("Generation of the paths"),
     )
     expect(words).to_have_text(re.compile(r"generation 4: coverage 0\.\d{3}"))
     last = paths.last.get_attribute("points")

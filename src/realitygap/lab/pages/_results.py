@@ -166,7 +166,7 @@ class Results:
         """Offer the conditions, the best one first."""
         known = [row.condition for row in self._rows()]
         offered = {name: name for name in (*known, *(each for each in self._conditions if each not in known))}
-        if known and len(offered) > 1:
+        if len(known) > 1:
             offered[known[0]] += f" ({self._best})"
         if offered != self._offered or self._picker.value != self._condition():
             self._offered = offered
@@ -223,7 +223,7 @@ class Results:
                 "median": known[each.name].estimate if each.name in known else "",
                 "label": known[each.name].label if each.name in known else each.label,
                 "chosen": each.name == self._chosen,
-                "best": self._best if each.name == names[0] and len(names) > 1 else "",
+                "best": self._best if each.name == names[0] and len(known) > 1 else "",
             }
             for each in conditions
         ]

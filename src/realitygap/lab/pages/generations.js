@@ -11,7 +11,7 @@ export default {
         </g>
       </svg>
       <label class="lab-generations-choice">
-        <input type="range" min="0" :max="generations.length - 1" :value="index" aria-label="Generation" :aria-valuetext="words" @input="choose" />
+        <input type="range" min="0" :max="generations.length - 1" :value="index" aria-label="Generation of the paths" :aria-valuetext="words" @input="choose" />
         <span class="lab-value">{{ words }}</span>
       </label>
     </div>`,

@@ -96,14 +96,15 @@ def filter_by_the_table(page) -> None:
     row = page.locator(".lab-choosable tbody tr").nth(1)
     name = row.get_by_role("button").inner_text()
     row.get_by_role("button").click()
-    page.get_by_text(f"Showing {name}.").wait_for()
+    page.get_by_role("button", name="Compare all").wait_for()
+    expect(page.get_by_role("combobox", name="Condition").first).to_have_value(name)
     page.locator(".lab-panel .rg-head", has_text=name).wait_for()
     expect(page.locator(".lab-curves g.lab-curve-off")).to_have_count(2)  # a line and its label
     page.locator(".lab-curves > svg").focus()
     page.keyboard.press("ArrowRight")
     assert page.locator(".lab-curves-words").inner_text().startswith(f"{name}, generation 0: 0.")
     row.locator("td").last.click()  # the whole row works; a second press shows all
-    page.get_by_text(f"Showing {name}.").wait_for(state="detached")
+    page.get_by_role("button", name="Compare all").wait_for(state="hidden")
 
 
 def test_report_is_written_and_works_in_its_sandbox(lab, visit):

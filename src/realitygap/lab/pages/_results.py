@@ -36,7 +36,7 @@ _CONDITION = """
 <q-td :props="props">
   <q-btn flat dense no-caps align="left" class="lab-choose-row" :label="props.value"
          :aria-pressed="String(props.row.chosen)" @click.stop="$parent.$emit('choose', props.value)" />
-  <span v-if="props.row.best" class="lab-state">{{ props.row.best }}</span>
+  <span v-if="props.row.best" class="lab-best">{{ props.row.best }}</span>
 </q-td>
 """
 """Name of a condition in the table: a press shows this condition in all figures."""
@@ -261,8 +261,8 @@ class Results:
         table.props("flat bordered dense wrap-cells")
         table.props[":table-row-class-fn"] = "(row) => row.chosen ? 'lab-chosen' : ''"
         table.add_slot("body-cell-condition", _CONDITION)
-        table.on("choose", lambda event: self._choose(event.args))
-        table.on("rowClick", lambda event: self._choose(event.args["condition"]), js_handler=_ROW)
+        table.on("choose", lambda event: self._toggle(event.args))
+        table.on("rowClick", lambda event: self._toggle(event.args["condition"]), js_handler=_ROW)
         return table
 
     def _choose(self, condition: object) -> None:
@@ -270,6 +270,9 @@ class Results:
         self._chosen = str(condition) if condition in self._conditions else ""
         self._curves.choose(self._chosen)
         self._renew()
+
+    def _toggle(self, condition: object) -> None:
+        self._choose("" if condition == self._chosen else condition)
 
     def _pick(self, event: events.ValueChangeEventArguments[Any]) -> None:
         if event.value != self._condition():  # otherwise the picker has followed

@@ -319,13 +319,16 @@ class Form:
         first = next((_control(self._fields[key].input) for key in problems if key in self._fields), "")
         ui.run_javascript(f"setTimeout(() => {{ {_focus(first, self._summary.html_id)} }}, 50)")
 
-    def refuse(self, error: FormError) -> None:
-        """Show mistakes at fields of a form without a summary, and move the focus to the last one."""
+    def refuse(self, error: FormError) -> bool:
+        """Show mistakes at fields of a form without a summary, and move the focus there; False if it lacks a field."""
+        if not set(error.problems) <= set(self._fields):
+            return False
         for key, text in error.problems.items():
             field = self._fields[key]
             self._refused[key] = (field.input.value, text)
             self._mark(field, text)
             ui.run_javascript(f"setTimeout(() => {{ {_focus(_control(field.input))} }}, 50)")
+        return True
 
     def _refused_again(self, key: str) -> str:
         """Return the message about a value that was refused and has not changed; empty if there is none."""

@@ -292,7 +292,9 @@ class _Page:
                 with ui.element("dd"):
                     ui.label(words)
         with ui.element("div").classes("lab-panels-two"):
-            titles = {"Controllers on both platforms": (pairs, None)}
+            titles: dict[str, tuple[ScorePairs, ScorePairs | None]] = {
+                "Controllers on both platforms": (pairs, None)
+            }
             if job.before is not None:
                 titles = {
                     "Before the calibration": (job.before, pairs),

@@ -15,8 +15,8 @@ WRONG = (RealityGapError, ValueError, TypeError, OSError)
 """Errors that a visitor can correct."""
 _errors: WeakKeyDictionary[Client, ui.notification] = WeakKeyDictionary()
 """The error that each page shows."""
-_forms: WeakKeyDictionary[Client, Callable[[FormError], None]] = WeakKeyDictionary()
-"""How each page shows mistakes at its fields, if it has fields outside forms with a button."""
+_forms: WeakKeyDictionary[Client, Callable[[FormError], bool]] = WeakKeyDictionary()
+"""The function of each page that shows mistakes at its fields; it returns False if the page lacks a field."""
 
 
 def notify(message: str, **options: Any) -> None:
@@ -32,15 +32,15 @@ def notify(message: str, **options: Any) -> None:
 def show_error(error: Exception) -> None:
     """Show an error until the visitor closes it, or acts again."""
     forget_error()
-    if isinstance(error, FormError) and (show := _forms.get(ui.context.client)) is not None:
-        show(error)
+    show = _forms.get(ui.context.client)
+    if isinstance(error, FormError) and show is not None and show(error):
         return
     close = {"label": "Close", "color": "white", "noCaps": True}
     options: Any = {"type": "negative", "multi_line": True, "timeout": 0, "actions": [close]}
     _errors[ui.context.client] = ui.notification(str(error), position="top", **options)
 
 
-def show_at_fields(show: Callable[[FormError], None]) -> None:
+def show_at_fields(show: Callable[[FormError], bool]) -> None:
     """Have mistakes in fields of this page be shown there."""
     _forms[ui.context.client] = show
 

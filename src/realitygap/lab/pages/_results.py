@@ -217,9 +217,7 @@ class Results:
             {
                 "condition": each.name,
                 "state": _word(each, is_growing=self._standing.word in GROWING),
-                "n": f"{each.n_done:,} of {each.n_runs:,}"
-                if each.n_done < each.n_runs
-                else f"{each.n_runs:,}",
+                "n": f"{each.n_done:,}/{each.n_runs:,}" if each.n_done < each.n_runs else f"{each.n_runs:,}",
                 "median": known[each.name].estimate if each.name in known else "",
                 "label": known[each.name].label if each.name in known else each.label,
                 "chosen": each.name == self._chosen,

@@ -164,9 +164,9 @@ class _Page:
         name.props(f"debounce=400 maxlength={LONGEST_NAME}")
         name.on_value_change(lambda event: self._named(text_of(event)))
 
-        def refuse(error: FormError) -> None:
+        def refuse(error: FormError) -> bool:
             self._name_box.set_visibility(True)
-            form.refuse(error)
+            return form.refuse(error)
 
         show_at_fields(refuse)
 

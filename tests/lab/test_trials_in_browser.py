@@ -103,7 +103,8 @@ def test_only_the_current_step_is_open_and_its_action_is_in_view(lab, visit, siz
     check("Drive", "Stop robot" if size == PHONE else "Abort trial", [])
     start_trial(page, 2)
     page.get_by_text("Score the trials").wait_for()
-    check("Score", "Save score", ["Score"])
+    check("Score: 2", "Save score", ["Score"])
+    assert re.search("pen:|sheet [0-9]", page.locator("body").inner_text(), re.IGNORECASE) is None, "no paper"
     assert covered(page.get_by_role("button", name="Stop robot")) == []
     for number in (1, 2):
         count(page, number, 0)
@@ -260,6 +261,7 @@ def test_two_people_count_and_their_agreement_is_told(lab, visit):
     count(other, 1, 0, 1, 2)
     open_fold(other, "All trials")
     other.get_by_text("1 trial counted by two people, 72 cells: 98.6 % judged alike.").wait_for()
+    other.locator(".lab-table .lab-label-emulated").first.wait_for()
 
 
 def test_a_void_trial_needs_a_reason_and_is_driven_again(lab, visit):

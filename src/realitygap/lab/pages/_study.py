@@ -213,7 +213,7 @@ class _Page:
             if standing.state.has_robot:
                 ui.button("Open trials", on_click=self._open_trials).props("outline no-caps")
             if standing.state.n_all_done:
-                ui.button("Report", on_click=self._report_now).props("outline no-caps")
+                ui.button("Open report", on_click=self._report_now).props("outline no-caps")
             if standing.word == "Complete":
                 ui.button("Add runs", on_click=self._ask_replicates).props("outline no-caps")
         if standing.word != "Complete":

@@ -21,6 +21,7 @@ from realitygap.report import write_closed_gap, write_gap_report
 from realitygap.robots import is_in_this_program
 from realitygap.stats import Estimate, controllers_for_margin, detectable_difference, spread_of_differences
 from realitygap.study import GapStudy, close_gap, gap_between
+from realitygap.world import read_calibration
 
 from ._channel import Channel, Pulses
 from ._files import check_name, platform_in
@@ -172,7 +173,7 @@ class GapJob(MeasuringJob):
         self.trials: dict[str, int] = {}
         self.totals: dict[str, int] = {}
         self._pace = Pace()
-        self.is_complete = False
+        self.is_complete = self._is_calibrated = False
         self.verdict = ""
         self.measures: list[tuple[str, str]] = []
         self.intervals: list[tuple[int, float, float, float]] = []
@@ -190,10 +191,8 @@ class GapJob(MeasuringJob):
     def can_explain(self) -> bool:
         """True if the parts of a calibrated simulator may explain the gap that was measured."""
         order = self.order
-        is_fit = order.sim.startswith("sim:") and not (
-            order.why or order.noise or order.task not in (None, "coverage")
-        )
-        return self.is_complete and is_fit and order.trials > 1
+        is_plain = order.trials > 1 and not (order.why or order.noise or order.lock or order.blind)
+        return self._is_calibrated and is_plain and order.task in (None, "coverage")
 
     @property
     def has_met(self) -> bool:
@@ -256,7 +255,7 @@ class GapJob(MeasuringJob):
                     self.intervals = [*self.intervals, (message.trials, *message.rms)]
                 self.n_reports += 1
             case GapDone():
-                self.is_complete = True
+                self.is_complete, self._is_calibrated = True, message.is_calibrated
                 self._conclude("Complete.")
             case Interrupted():
                 self._conclude(f"Stopped after {self._done_words}")
@@ -290,7 +289,8 @@ def measure(channel: Channel, work: GapWork) -> None:
         gap = gap_between(order.model_copy(update={"trials": trials}), pulse=pulses.tell, tell=tell)
         write_gap_report(gap, page)
         channel.say(_measured(gap.study, trials))
-    channel.say(GapDone())
+    is_calibrated = read_calibration(split_spec(order.sim)[1]) is not None
+    channel.say(GapDone(is_calibrated))
 
 
 def _titled(measures: Sequence[tuple[str, str]]) -> list[tuple[str, str]]:

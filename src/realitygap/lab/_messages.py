@@ -721,7 +721,9 @@ class GapMeasured(Report):
 
 
 class GapDone(Report):
-    """All trials are done, and the report is written."""
+    """All trials are done, and the report is written; `is_calibrated`: whether the simulator is a calibration."""
+
+    is_calibrated: bool = False
 
 
 class CalibrationTrials(Report):

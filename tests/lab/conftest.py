@@ -5,6 +5,7 @@ Every test also fails on any message of the console and on any request but to th
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
 import socket
@@ -258,3 +259,15 @@ def enter(page, label, text) -> None:
         return
     select.select_option(index=len(offered) - 1)
     picker.locator("input").fill(text)
+
+
+def wait_connected(page: Any, port: str) -> None:
+    """Wait until a robot is connected. If it did not answer in time, the page says so, and is told to try again."""
+    connected, retry = page.get_by_text(f"Connected to {port}"), page.get_by_role("button", name="Retry")
+    for _ in range(40):
+        connected.or_(retry).first.wait_for()
+        if connected.is_visible():
+            return
+        with contextlib.suppress(playwright.Error):  # it connects at this moment
+            retry.click(timeout=1000)
+    raise AssertionError(page.locator("main").inner_text())

@@ -14,7 +14,7 @@ from realitygap.emulator import serve_pty, serve_tcp
 from realitygap.families.scribbler.emulator import Emulator
 from realitygap.families.thymio.playground._playground import why_not
 
-from .conftest import NEW_PYTHONS, PHONE, expect, playwright
+from .conftest import NEW_PYTHONS, PHONE, expect, playwright, wait_connected
 from .page_checks import covered, wrong_bars
 
 pytestmark = pytest.mark.slow
@@ -24,7 +24,7 @@ PORT = "emulator://s2?fluke=2"
 
 def connect(page) -> None:
     page.get_by_role("button", name="Use an emulated robot").click()
-    page.get_by_text(f"Connected to {PORT}").wait_for()
+    wait_connected(page, PORT)
 
 
 def connect_to(page, port: str) -> None:
@@ -32,7 +32,7 @@ def connect_to(page, port: str) -> None:
     page.get_by_text("Another port").click()
     page.get_by_label("Port", exact=True).fill(port)
     page.get_by_role("button", name="Connect", exact=True).click()
-    page.get_by_text(f"Connected to {port}").wait_for()
+    wait_connected(page, port)
 
 
 def drive_by(page, press: Callable[[], None], let_go: Callable[[], None]) -> None:
@@ -234,7 +234,7 @@ def test_blocked_robot_is_drawn_at_the_wall_that_blocks_it(visit):
 def test_thymio_in_playground_is_driven_with_its_own_sensors(visit):
     page = visit("robot")
     page.get_by_role("button", name="Use an emulated Thymio").click()
-    page.get_by_text("Connected to thymio:emulator://playground").wait_for()
+    wait_connected(page, "thymio:emulator://playground")
     page.get_by_role("progressbar", name="Rear right infrared").wait_for()
     expect(page.get_by_role("progressbar")).to_have_count(9)  # and two ground sensors
     drive_and_stop(page)
@@ -274,7 +274,7 @@ def test_robot_on_a_listed_port_is_identified_on_request_only(lab, visit, monkey
         identify.click()
         page.get_by_text(re.compile(r"answered \(EMULATED\): model s2, .*fluke 2")).wait_for()
         page.get_by_role("button", name=f"Connect {server.name}").click()  # the port is free again
-        page.get_by_text(f"Connected to {server.name}").wait_for()
+        wait_connected(page, server.name)
 
 
 def test_port_that_does_not_answer_is_identified_as_no_robot(lab, visit):

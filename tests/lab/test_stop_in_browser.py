@@ -11,7 +11,7 @@ import pytest
 from realitygap.emulator import connect_witness
 from realitygap.study import parse_study, run_study
 
-from .conftest import PHONE, enter, expect, open_advanced
+from .conftest import PHONE, enter, expect, open_advanced, wait_connected
 from .page_checks import covered
 from .test_robot_in_browser import hold
 from .test_studies_in_browser import TINY, start
@@ -120,7 +120,7 @@ def connect(page: Any, port: str) -> None:
     page.get_by_text("Another port").click()
     page.get_by_label("Port", exact=True).fill(port)
     page.get_by_role("button", name="Connect", exact=True).click()
-    page.get_by_text(f"Connected to {port}").wait_for()
+    wait_connected(page, port)
 
 
 def point_at_stop(page: Any) -> None:
@@ -210,7 +210,7 @@ def test_motors_stop_when_the_tab_is_closed_with_a_key_down(visit, emulated, mot
         pages[-1].close()  # unless that is what was measured
         again = page.context.new_page()
         again.goto(page.url)
-        again.get_by_text(f"Connected to {emulated[0]}").wait_for()
+        wait_connected(again, emulated[0])
         pages.append(again)
 
     motors.check(press, lambda: pages[-1].close(run_before_unload=is_asked), open_again)

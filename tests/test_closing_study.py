@@ -9,8 +9,10 @@ from benchmarks.closing.analysis import (
     Results,
     analyze,
     excess_violation,
+    flagged,
     pooled_fall,
     primary,
+    square_gap,
     stratified_mean,
 )
 from benchmarks.closing.plan import FAMILIES, Arm, Plan, Twin, Unit, small_plan
@@ -39,7 +41,7 @@ def made_up(plan, gap, transfer=0.0, seed=0):
         def tried(means, trials=trials):
             return (means[:, None] + rng.normal(0, 0.05, (len(means), trials))).tolist()
 
-        head = {"plan": plan.digest, "software": "1", "seconds": 1.0, "label": "TWIN"}
+        head = {"plan": plan.digest, "code": "c", "software": "1", "seconds": 1.0, "label": "TWIN"}
         kinds = ["random"] * n + ["champion"] * n
         units[twin, Unit("coverage", "judged")] = head | {
             "kinds": kinds,
@@ -111,6 +113,28 @@ def test_a_limit_at_the_truth_is_refuted_about_as_often_as_the_level_says():
         after = before / 4 * rng.gamma(20.0, 1 / 20, 32)  # half of the root mean square
         n_refuted += pooled_fall(before, after, families, 0.5)[1] < 0.05
     assert n_refuted <= 24
+
+
+def test_a_calibration_that_leaves_no_gap_meets_its_goals():
+    """The mean squares after it are noise about 0, in part negative."""
+    results = made_up(plan_of(), {"plain": 0.2, "prior": 0.2, "cells": 0.0, "track": 0.0}, transfer=0.1)
+    rows = primary(results)
+    assert [row["verdict"] for row in rows] == ["met"] * 8
+
+
+def test_there_is_no_verdict_before_all_units_exist():
+    results = made_up(plan_of(), {"plain": 0.2, "prior": 0.2, "cells": 0.05, "track": 0.02}, transfer=0.1)
+    del results.units[Twin("worn", 7), Unit("coverage", "track")]
+    assert {row["verdict"] for row in primary(results)} == {"none: 1 units are missing"}
+
+
+def test_an_arm_whose_fit_failed_scores_as_plain():
+    results = made_up(plan_of(), {"plain": 0.2, "prior": 0.2, "cells": 0.05, "track": 0.02})
+    twin = Twin("worn", 7)
+    results.units[twin, Unit("coverage", "track")] |= {"failed": "no", "scores": [], "champions": []}
+    (row,) = [row for row in flagged(results) if (row["family"], row["arm"]) == ("worn", "track")]
+    assert (row["failed"], row["rejected"]) == (1, 0)
+    assert square_gap(results, twin, "track", "random") == square_gap(results, twin, "plain", "random")
 
 
 def test_a_perfect_simulator_has_no_excess_of_rank_violations():

@@ -3,6 +3,7 @@
     python -m benchmarks.closing run results/closing-2              # hours; interrupt it, and run it again to resume
     python -m benchmarks.closing fit results/closing-2 cma-es       # outside calibrators: fits of all driven twins
     NPE/bin/python -m benchmarks.closing.npe results/closing-2      # in an environment with sbi and realitygap
+    python -m benchmarks.closing run results/closing-2              # again: what evolves in these fits
     python -m benchmarks.closing analyze results/closing-2 --out docs/data/closing-2
 
 `run --small` uses a small plan on other twins, and takes minutes. `docs/data/closing-2/plan.toml` is the plan.

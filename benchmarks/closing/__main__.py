@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import importlib.util
 import multiprocessing
 import time
 from concurrent.futures import ProcessPoolExecutor, as_completed
@@ -39,6 +40,10 @@ def main() -> None:
     options = parser.parse_args()
     plan = small_plan() if options.small else read_plan()
     if options.command == "analyze":
+        if not options.small and importlib.util.find_spec("statsmodels") is None:
+            raise SystemExit(
+                "The mixed model needs statsmodels: uv run --with statsmodels,pandas python -m ..."
+            )
         analyze(plan, options.folder, options.out)
         return
     for part in ("twins", "units", "fits", "trials"):

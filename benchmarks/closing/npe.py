@@ -23,6 +23,7 @@ from torch.utils.tensorboard.writer import SummaryWriter
 
 from realitygap.calibration import numbers_of, ranges_of, scribbler_prior, values_of
 from realitygap.platforms import SimEnsemble, SimPlatform
+from realitygap.records import write_whole
 
 from .outside import MOST_SETS, write_outside
 from .plan import read_plan, small_plan
@@ -119,7 +120,10 @@ def main() -> None:
     for twin in plan.names():
         one = TwinOfStudy(plan, twin, options.folder)
         if one.trials_path(plan.budget).exists() and not one.fit_path(plan.arm[ARM]).exists():
-            fit(one, MOST_SETS if not options.small else 1000)
+            try:
+                fit(one, MOST_SETS if not options.small else 1000)
+            except (ValueError, ArithmeticError, RuntimeError) as problem:
+                write_whole(one.failure_path(plan.arm[ARM]), str(problem).encode(), within=one.folder)
             print(twin, flush=True)
 
 

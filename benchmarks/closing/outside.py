@@ -1,13 +1,15 @@
 """Point estimates by methods of others, from the trials with poses that our own fits have.
 
-Both minimize the error of whole trajectories: the commands of each trial are given to the simulated robot from the
-trial's start, without noise, and its poses and readings are compared with those observed. Neither fits noise, which has
-no place in such an error: it keeps the robot file's numbers. Each may simulate at most as many sets of numbers as our
-own fit with full effort.
+Both minimize the error of trajectories: the commands of each trial are given to the simulated robot, without noise of
+motion, and its poses and readings are compared with those observed. It begins anew at the observed pose after each
+window of `WINDOW` commands, because over whole trials of 50 s small errors grow to any size. An arc tangent limits what
+one lost window counts. Neither method fits noise, which has no place in such an error. Noise keeps the robot file's
+numbers. Each may simulate at most `MOST_SETS` sets of numbers.
 
 `cma-es`: Hansen (2016), as in the package cmaes, with its default population.
 `least-squares`: bounded least squares by trust regions (Branch, Coleman & Li 1999, in SciPy) from the robot file's
-numbers and three other starts, with differences for the derivatives, which is the method of mujoco.sysid.
+numbers and then from random starts until the sets are spent, with differences for the derivatives, which is the method
+of mujoco.sysid.
 """
 
 from __future__ import annotations
@@ -32,13 +34,14 @@ from .twin import TwinOfStudy
 
 Floats = NDArray[np.float64]
 MOST_SETS = 24_500
-"""Sets of numbers that a fit may simulate: our own fit, with full effort, has 7 rounds of 3,000, then 5,000."""
+"""Sets that a fit may simulate. The part of our own fit that simulates whole trials has 7 · 1,500 + 6 · 1,500 + 5,000,
+and its other parts simulate more, so the budgets are alike and not equal."""
 
+WINDOW = 20  # commands after which the robot is put back to where it was observed
 EVERY = 5  # steps between compared poses
 POSITION_M, HEADING_RAD, READING = 0.05, 0.2, 0.3
 """Errors that weigh the same."""
 
-STARTS = 4
 STEP = 0.02  # of a place, for derivatives: the simulation is in single precision and in steps
 NOISE = (*MOTION_NOISE, "range.drop_width", "range.burst", "range.noise_gain", "range.outlier_most")
 
@@ -71,6 +74,14 @@ class TrajectoryError:
     def _without_noise(self) -> dict[str, float]:
         return {name: 0.0 for name in MOTION_NOISE if name in self.robot.centers()}
 
+    @cached_property
+    def _anchors(self) -> Floats:
+        """Observed poses at the beginnings of windows, nan elsewhere, (k, t + 1, 3)."""
+        poses = np.stack([trial.poses for trial in self.trials])
+        anchors = np.full_like(poses, np.nan)
+        anchors[:, ::WINDOW] = poses[:, ::WINDOW]
+        return anchors
+
     def numbers(self, places: Floats) -> dict[str, Floats]:
         """Return the robot's numbers (m,) at places (m, p)."""
         return numbers_of(self.parameters, values_at(self.parameters, np.atleast_2d(places)), self.robot)
@@ -83,7 +94,7 @@ class TrajectoryError:
         found = self._ensemble.replay(
             [trial.poses[0] for trial in self.trials],
             [trial.commands for trial in self.trials],
-            numbers, self.seed, keep=("poses", "readings"), same_noise=True,
+            numbers, self.seed, anchors=self._anchors, keep=("poses", "readings"), same_noise=True,
         )  # fmt: skip
         poses = np.stack([trial.poses for trial in self.trials])
         readings = np.stack([trial.readings for trial in self.trials])
@@ -115,22 +126,29 @@ def by_least_squares(error: TrajectoryError) -> Floats:
     """Return the best places, (p,)."""
     p = len(error.own)
     rng = np.random.default_rng(error.seed)
-    starts = [error.own, *rng.uniform(0.1, 0.9, (STARTS - 1, p))]
-    most = MOST_SETS // (STARTS * (p + 1))
+    best, least, spent, start = error.own, np.inf, 0, error.own
+
+    def residuals(place: Floats) -> Floats:
+        nonlocal spent
+        spent += 1
+        return error.residuals(place)[0]
 
     def jacobian(place: Floats) -> Floats:
+        nonlocal spent
+        spent += p + 1
         step = np.where(place + STEP <= 1.0, STEP, -STEP)
         found = error.residuals(np.vstack([place, place + np.diag(step)]))
         return ((found[1:] - found[0]) / step[:, None]).T
 
-    fits = [
-        scipy.optimize.least_squares(
-            lambda place: error.residuals(place)[0], start, jac=jacobian, bounds=(0.0, 1.0), max_nfev=most,
-            xtol=1e-4, ftol=1e-4,
+    while spent < MOST_SETS:
+        most = max(1, (MOST_SETS - spent) // (p + 2))
+        fit = scipy.optimize.least_squares(
+            residuals, np.clip(start, 0.01, 0.99), jac=jacobian, bounds=(0.0, 1.0), max_nfev=most
         )
-        for start in np.clip(starts, 0.01, 0.99)
-    ]  # fmt: skip
-    return min(fits, key=lambda fit: fit.cost).x
+        if fit.cost < least:
+            best, least = fit.x, float(fit.cost)
+        start = rng.uniform(0.1, 0.9, p)
+    return best
 
 
 METHODS: dict[str, Callable[[TrajectoryError], Floats]] = {
@@ -147,22 +165,33 @@ def fit_outside(twin: TwinOfStudy, method: str) -> None:
         error = TrajectoryError(
             trials, twin.condition("coverage", "x").on.robot, target.arena, plan.seed_of(twin.twin, method)
         )
-    place = METHODS[method](error)
+    try:
+        place = METHODS[method](error)
+    except (ValueError, ArithmeticError) as problem:
+        write_whole(twin.failure_path(plan.arm[method]), str(problem).encode(), within=twin.folder)
+        return
+    own, least = np.square(error.residuals(np.vstack([error.own, place]))).sum(axis=1)
     values = {name: float(each[0]) for name, each in values_at(error.parameters, place[None]).items()}
+    numbers = {name: float(each[0]) for name, each in error.numbers(place).items()}
     write_outside(
-        twin, method, {name: float(each[0]) for name, each in error.numbers(place).items()}, {}, values
+        twin, method, numbers, {}, values, f"error {own:.4f} with the robot file's numbers, {least:.4f} here"
     )
 
 
 def write_outside(
-    twin: TwinOfStudy, arm: str, numbers: dict[str, float], draws: dict[str, Floats], values: dict[str, float]
+    twin: TwinOfStudy,
+    arm: str,
+    numbers: dict[str, float],
+    draws: dict[str, Floats],
+    values: dict[str, float],
+    note: str = "",
 ) -> None:
     """Write the calibration of an outside arm: the robot's numbers, draws if there are any, and the parameters."""
     robot = twin.condition("coverage", "x").on.robot
     priors = {parameter.name: parameter for parameter in scribbler_prior(robot)}
     made = Calibration(
         kind="all", robot=robot.name, target=f"twin:{twin.twin}", label="TWIN", observe="track",
-        trials=twin.plan.budget, date="", method=arm, numbers=numbers,
+        trials=twin.plan.budget, date="", method=arm, numbers=numbers, notes=(note,) if note else (),
         draws={name: tuple(map(float, each)) for name, each in draws.items()},
         fitted=tuple(
             Fitted(

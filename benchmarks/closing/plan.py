@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import hashlib
+import subprocess
 import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
 from realitygap.records import Observe
 
 HERE = Path(__file__).parent
-PLAN_FILE = HERE.parent.parent / "docs" / "data" / "closing-2" / "plan.toml"
+ROOT = HERE.parent.parent
+PLAN_FILE = ROOT / "docs" / "data" / "closing-2" / "plan.toml"
 COMMIT_FILE = PLAN_FILE.with_name("commit.txt")
 FAMILIES = ("close", "worn", "slippery", "delayed")
 """Families that the goals are about. Twins of the others are reported apart."""
@@ -116,23 +118,39 @@ def read_plan(path: Path = PLAN_FILE) -> Plan:
     """Return the plan that was committed.
 
     Raises:
-        SystemExit: No commit has fixed it.
+        SystemExit: No commit has fixed it, or another plan.
     """
     if not COMMIT_FILE.exists():
         raise SystemExit(
             f"{COMMIT_FILE} does not exist: commit the plan, and write the hash of the commit to it."
         )
-    content = path.read_bytes()
+    content, commit = path.read_bytes(), COMMIT_FILE.read_text().strip()
+    where = path.relative_to(ROOT).as_posix()
+    committed = subprocess.run(
+        ["git", "show", f"{commit}:{where}"], cwd=ROOT, capture_output=True, check=False
+    )
+    if committed.stdout != content:
+        raise SystemExit(f"Commit {commit!r} of {COMMIT_FILE} does not have this plan. Nothing was run.")
     values = tomllib.loads(content.decode())
     return Plan(
         digest=hashlib.sha256(content).hexdigest(),
-        commit=COMMIT_FILE.read_text().strip(),
+        commit=commit,
         twins=values["twins"],
         arms=tuple(Arm(**arm) for arm in values["arm"]),
         tasks={name: tuple(each) for name, each in values["tasks"].items()},
         goals=values["primary"],
         **{name: values[name] for name in NUMBERS},
     )
+
+
+@cache
+def code_digest() -> str:
+    """Return the SHA-256 of the package and of the study, which each result holds."""
+    found = hashlib.sha256()
+    for folder in (ROOT / "src" / "realitygap", HERE):
+        for path in sorted(folder.rglob("*.py")):
+            found.update(path.relative_to(ROOT).as_posix().encode() + b"\0" + path.read_bytes() + b"\0")
+    return found.hexdigest()
 
 
 NUMBERS = (

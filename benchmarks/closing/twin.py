@@ -33,7 +33,7 @@ from realitygap.tasks import score_observed
 from realitygap.trials import NoiseKey, Target, TellTrial, TrialPlan
 from realitygap.world import Calibration, load_calibration
 
-from .plan import HERE, Arm, Plan, Twin, Unit
+from .plan import HERE, Arm, Plan, Twin, Unit, code_digest
 
 Scores = NDArray[np.float64]
 CALIBRATING, JUDGING, AGAIN, CHAMPIONS = 1_000_000, 2_000_000, 3_000_000, 4_000_000
@@ -93,7 +93,12 @@ class TwinOfStudy:
 
     def _can(self, unit: Unit) -> bool:
         arm = self.plan.arm.get(unit.what)
-        return arm is None or arm.fit != "outside" or self.fit_path(arm).exists()
+        return (
+            arm is None
+            or arm.fit != "outside"
+            or self.fit_path(arm).exists()
+            or self.failure_path(arm).exists()
+        )
 
     def path(self, unit: Unit) -> Path:
         """Return the file of a unit's result."""
@@ -102,6 +107,10 @@ class TwinOfStudy:
     def fit_path(self, arm: Arm) -> Path:
         """Return the file of an arm's calibration."""
         return self.folder / "fits" / f"{self.twin}-{arm.name}.toml"
+
+    def failure_path(self, arm: Arm) -> Path:
+        """Return the file of the message of an outside fit that failed."""
+        return self.fit_path(arm).with_suffix(".failed.txt")
 
     def trials_path(self, budget: int, kind: str = "all") -> Path:
         """Return the file of the trials that calibrate."""
@@ -121,7 +130,8 @@ class TwinOfStudy:
                     "task": unit.task,
                     "what": unit.what,
                 }
-                result |= {"plan": self.plan.digest, "software": __version__, "label": target.label}
+                result |= {"plan": self.plan.digest, "code": code_digest(), "software": __version__}
+                result["label"] = target.label
                 result["seconds"] = round(time.perf_counter() - since, 1)
                 write_whole(self.path(unit), json.dumps(result).encode(), within=self.folder)
 
@@ -229,6 +239,8 @@ class TwinOfStudy:
         if arm.fit == "none":
             return None
         path = self.fit_path(arm)
+        if arm.fit == "outside" and not path.exists():
+            raise StudyError(self.failure_path(arm).read_text())
         if not path.exists():
             made = self._prior() if arm.fit == "prior" else self._fitted(target, arm)
             write_whole(path, made.to_toml().encode(), within=self.folder)

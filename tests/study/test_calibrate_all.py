@@ -175,3 +175,12 @@ def test_parameters_at_an_end_of_their_prior_are_named():
     at_end, inside = (Fitted(estimate=at, identified=False, advice="Record.", **wide) for at in (50.1, 200.0))
     assert at_end.advice.startswith("The estimate is at an end of its prior")
     assert inside.advice == "Record."
+
+
+def test_trials_without_poses_give_a_calibration():
+    """They have no patterns of residuals."""
+    found = calibrate_all(
+        SimTarget(SimPlatform(), ARENA, key=3), observe="cells", budget=2, effort="least", threads=1
+    )
+    assert 0 <= found.misspecification_p <= 1
+    assert found.trials == 2

@@ -211,7 +211,7 @@ class Ledger(LedgerReader):
         """Add an event of a design with its hash and that of the event before it."""
         design = self.design()
         previous = "" if design is None else str(design.events[-1].details["sha256"])
-        content = json.loads(canonical_json({**details, "previous": previous}))
+        content = parse_json(canonical_json({**details, "previous": previous}))
         self._run(
             "INSERT INTO events (time, trial, what, details) VALUES (?, NULL, ?, ?)",
             *(_now(), what, canonical_json({**content, "sha256": event_hash(content)})),

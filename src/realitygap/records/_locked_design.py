@@ -15,6 +15,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
+from realitygap._limits import parse_json
+
 LOCKED: Final = "design locked"
 RESUMED: Final = "design resumed"
 AMENDED: Final = "design amended"
@@ -120,7 +122,7 @@ def lock_details(
 ) -> dict[str, Any]:
     """Return the content of the event that locks a design, blind if there is a secret."""
     return {
-        "design": json.loads(canonical_json(design)),
+        "design": parse_json(canonical_json(design)),
         "who": who,
         "version": version,
         "time": time,

@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal
 
+from realitygap._limits import parse_json
 from realitygap._version import __version__
 from realitygap._wording import counted
 from realitygap.errors import RecordError, StudyError, did_you_mean
@@ -229,7 +230,7 @@ def last_session(locked: LockedDesign) -> dict[str, Any]:
 
 
 def _plain(value: Any) -> Any:
-    return json.loads(json.dumps(value, default=str))
+    return parse_json(json.dumps(value, default=str))
 
 
 def _refuse_differences(file: Ledger, locked: Mapping[str, Any], design: Mapping[str, Any]) -> None:
@@ -346,7 +347,7 @@ def _value(text: str) -> Any:
     if text == "":
         return None
     try:
-        value = json.loads(text)
+        value = parse_json(text)
     except ValueError:
         return text
     return value if isinstance(value, bool | int | float | list | None) else text

@@ -398,7 +398,9 @@ def _percent(share: float) -> str:
 
 def _smallest_p(found: Sequence[Misfit], patterns: Sequence[Pattern]) -> float:
     """Return the smallest p over kinds of observation, and of the strongest pattern, times their number."""
-    values = [misfit.p for misfit in found] + [min(pattern.p for pattern in patterns)] * bool(patterns)
+    values = [misfit.p for misfit in found]
+    if patterns:
+        values.append(min(pattern.p for pattern in patterns))
     return min(1.0, len(values) * min(values))
 
 

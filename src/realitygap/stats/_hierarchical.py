@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -94,12 +95,7 @@ def _restricted_maximum(seen: Values, noise: Values) -> float:
         trace = weights.sum() - (weights**2).sum() / weights.sum()
         return float((weights**2) @ (seen - mean) ** 2 - trace)
 
-    if slope(0.0) <= 0:
-        return 0.0
-    most = float(seen.var(ddof=1) + noise.max())
-    while slope(most) > 0:
-        most *= 2
-    return float(scipy.optimize.brentq(slope, 0.0, most, xtol=most * _CLOSE))
+    return _root(slope, float(seen.var(ddof=1) + noise.max()))
 
 
 def _profile(seen: Values, noise: Values, quantile: float) -> float:
@@ -110,12 +106,16 @@ def _profile(seen: Values, noise: Values, quantile: float) -> float:
         mean, weights = _weighted_mean(seen, noise, square)
         return float(weights @ (seen - mean) ** 2) - wanted
 
-    if above(0.0) <= 0:
+    return _root(above, float(seen.var(ddof=1) + noise.max()))
+
+
+def _root(of: Callable[[float], float], most: float) -> float:
+    """Return where a function falls below 0; 0 if it begins there. The search doubles `most` as often as needed."""
+    if of(0.0) <= 0:
         return 0.0
-    most = float(seen.var(ddof=1) + noise.max())
-    while above(most) > 0:
+    while of(most) > 0:
         most *= 2
-    return float(scipy.optimize.brentq(above, 0.0, most, xtol=most * _CLOSE))
+    return float(scipy.optimize.brentq(of, 0.0, most, xtol=most * _CLOSE))
 
 
 def _drawn_in(seen: Values, noise: Values, square: float, mean: float, within: Range) -> tuple[Estimate, ...]:

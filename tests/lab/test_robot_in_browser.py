@@ -35,25 +35,25 @@ def connect_to(page, port: str) -> None:
     wait_connected(page, port)
 
 
-def drive_by(page, press: Callable[[], None], let_go: Callable[[], None]) -> None:
-    """Press until the robot drives: a page that is drawn at this moment, or a robot that is silent, drops a press."""
+def drive_by(shown: playwright.Locator, press: Callable[[], None], let_go: Callable[[], None]) -> None:
+    """Press until something is shown: a robot that was silent is stopped, and waits for the next press."""
     for _ in range(24):
         press()
         with contextlib.suppress(playwright.TimeoutError):
-            page.get_by_text("Driving", exact=True).wait_for(timeout=5000)
+            shown.first.wait_for(timeout=5000)
             return
         let_go()
     raise AssertionError("the robot does not drive")
 
 
-def hold_key(page) -> None:
-    """Focus the pad, and hold the key for ahead until the robot drives."""
+def hold_key(page, until: str = "Driving") -> None:
+    """Focus the pad, and hold the key for ahead until the page shows what the robot does."""
 
     def press() -> None:
         page.locator(".lab-pad").focus()
         page.keyboard.down("ArrowUp")
 
-    drive_by(page, press, lambda: page.keyboard.up("ArrowUp"))
+    drive_by(page.get_by_text(until, exact=True), press, lambda: page.keyboard.up("ArrowUp"))
 
 
 def drive_and_stop(page) -> None:
@@ -63,8 +63,8 @@ def drive_and_stop(page) -> None:
     page.get_by_text("Standing", exact=True).wait_for()
 
 
-def hold(page) -> None:
-    """Pull the handle to its upper end, and hold it until the robot drives."""
+def hold(page, until: str | re.Pattern[str] = re.compile(r"^Driving$")) -> None:
+    """Pull the handle to its upper end, and hold it until the page shows what the robot does."""
 
     def press() -> None:
         box = page.locator(".lab-pad").bounding_box()
@@ -72,7 +72,7 @@ def hold(page) -> None:
         page.mouse.down()
         page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] * 0.15, steps=3)
 
-    drive_by(page, press, page.mouse.up)
+    drive_by(page.get_by_text(until), press, page.mouse.up)
 
 
 def test_it_drives_while_the_handle_is_held_and_stands_when_it_is_let_go(visit):
@@ -96,7 +96,8 @@ def test_hand_driving_fits_one_screen_of_a_phone_and_counts_cells(visit):
     hold(page)
     box = page.locator(".lab-pad").bounding_box()
     page.mouse.move(box["x"] + box["width"] / 2, box["y"] - 200, steps=5)
-    page.get_by_text(re.compile(r"([2-9]|\d\d) of 72 cells")).wait_for()
+    page.mouse.up()
+    hold(page, until=re.compile(r"([2-9]|\d\d) of 72 cells"))
     assert page.evaluate("() => scrollY") == 0
     page.mouse.up()
     # the robot may cross one more cell while the page is read, so both numbers are read at once
@@ -222,8 +223,7 @@ def test_bars_of_sensors_are_as_wide_as_the_readings_while_the_robot_drives_into
 def test_blocked_robot_is_drawn_at_the_wall_that_blocks_it(visit):
     page = visit("robot")
     connect(page)
-    hold_key(page)
-    page.get_by_text("Driving, blocked", exact=True).wait_for()
+    hold_key(page, until="Driving, blocked")
     page.keyboard.up("ArrowUp")
     robot, grid = page.locator(".lab-robot polygon").bounding_box(), page.locator(".lab-wall").all()
     right = max(wall.bounding_box()["x"] for wall in grid)

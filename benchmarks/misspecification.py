@@ -1,6 +1,6 @@
 """The check of a fit on twins that `sim` cannot express, and on twins that it can, as lines of JSON.
 
-`python benchmarks/misspecification.py final --out FILE` calibrates the 20 hand-made twins of `FINAL` and 40 twins of
+`python benchmarks/misspecification.py again --out FILE` calibrates the 20 hand-made twins of `FINAL` and 40 twins of
 the families close, worn, delayed, and slippery. Each has 20 trials with poses (`--observe cells`: without). The call
 prints whether the check flags them. Twins in the file are not measured again. With `--seconds N`, it ends after that
 time.
@@ -11,6 +11,10 @@ intervals.
 
 The rule, set before the first run of `final`: at least 18 of the 20 hand-made twins are flagged with poses, and at most
 2 of the 40 others. Results with cells are reported without a goal. No twin is left out, and none is replaced.
+
+`final` missed the second part of the rule. After it, the check changed: wheels count away from walls only, turns at
+walls have a limit of their own, and differences of motion may go with the last stall. `again` has the same faults and
+the same rule, on twins and trials of other seeds. The rule and the seeds were set before its first run, too.
 """
 
 from __future__ import annotations
@@ -55,7 +59,7 @@ INSIDE = ("close", "worn", "delayed", "slippery")
 """Families of twins that should not be flagged."""
 N_INSIDE = 10
 """Twins of each of them."""
-FIRST_SEEDS = {"development": (7700, 7800), "final": (43_001, 43_101)}
+FIRST_SEEDS = {"development": (7700, 7800), "final": (43_001, 43_101), "again": (61_001, 61_101)}
 """Seed of the first hand-made twin, and of the first twin of each family."""
 GOALS = (18, 2)
 """Least number of hand-made twins to flag, of 20, and largest number of others, of 40."""
@@ -211,7 +215,7 @@ FINAL = {
 }
 """The hand-made twins of the rule."""
 
-SETS = {"development": DEVELOPMENT, "final": FINAL}
+SETS = {"development": DEVELOPMENT, "final": FINAL, "again": FINAL}
 Key = tuple[str, str, str, int, str]
 
 

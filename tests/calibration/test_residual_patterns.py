@@ -59,6 +59,24 @@ def test_a_turn_that_grows_in_a_trial_goes_with_time_and_has_its_side(trials: li
     assert "right" in largest.message
 
 
+def test_a_robot_that_is_slow_after_a_stall_goes_with_stalls(trials: list[TrialRecord]) -> None:
+    """For two seconds after each stall, a third of the way ahead is missing."""
+
+    def slow(trial: TrialRecord) -> TrialRecord:
+        recent = np.array([trial.stalled[max(0, t - 20) : t + 1].any() for t in range(len(trial.commands))])
+        moved = np.diff(trial.poses, axis=0)
+        moved[recent, :2] *= 0.67
+        return replace(trial, poses=np.vstack([trial.poses[:1], trial.poses[0] + np.cumsum(moved, axis=0)]))
+
+    assert any(trial.stalled.any() for trial in trials)
+    largest = next(
+        pattern for pattern in patterns_of([slow(trial) for trial in trials]) if pattern.kind == "ahead"
+    )
+    assert largest.goes_with == "stall"
+    assert largest.is_too_large
+    assert "slower just after a stall" in largest.message
+
+
 def test_readings_that_come_late_go_with_memory(trials: list[TrialRecord]) -> None:
     late = [replace(trial, readings=np.roll(trial.readings, 3, axis=0)) for trial in trials]
     (largest, *_) = patterns_of(late)

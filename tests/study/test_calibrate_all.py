@@ -12,6 +12,8 @@ from realitygap.calibration import (
     scribbler_prior,
     values_of,
 )
+from realitygap.calibration._predictive import misfits
+from realitygap.calibration._shots import shots_of
 from realitygap.evolution import Genome
 from realitygap.platforms import SimEnsemble, SimPlatform, SimTarget
 from realitygap.study import calibrate_all
@@ -69,13 +71,41 @@ def test_observed_and_simulated_vectors_have_the_same_length(observe, groups):
     with SimTarget(platform, ARENA) as target:
         trials = target.carry_out(all_plans(ARENA, platform.robot, 2), observe)
     genomes = [Genome.from_json(trial.genome) if trial.genome else None for trial in trials]
-    evidence = evidence_of(trials, genomes, ARENA.grid.n_cells)
+    evidence = evidence_of(trials, genomes, platform.robot, ARENA)
     ensemble = SimEnsemble(platform, ARENA, threads=1)
     assert len(evidence) == groups
     for one in evidence:
         made = ensemble.summarize(one.play, {"drive.lag": [0.0, 0.1]}, 1, one.of, keep=one.keep)
         assert made.shape == (2, len(one.seen))
         assert one.finest.shape == one.seen.shape == one.trial.shape == one.step.shape
+
+
+def test_with_poses_wheels_count_only_where_no_wall_can_stop_them():
+    platform = SimPlatform()
+    with SimTarget(platform, ARENA, key=3) as target:
+        trials = target.carry_out(all_plans(ARENA, platform.robot, 3), "track")
+    near = shots_of(trials, platform.robot, ARENA).touching
+    assert 0 < near.sum() < near.size
+
+    def stopped(trial, near):
+        ways = np.where(near[:, None], 0.0, np.diff(trial.wheels, axis=0))
+        return replace(trial, wheels=np.vstack([np.zeros(2), np.cumsum(ways, axis=0)]))
+
+    ensemble = SimEnsemble(platform, ARENA, threads=1)
+    shares = [
+        {
+            misfit.kind: misfit.share
+            for misfit in misfits(
+                evidence_of(some, [None] * 3, platform.robot, ARENA),
+                lambda one, numbers, key: ensemble.summarize(one.play, numbers, key, one.of, keep=one.keep),
+                {"drive.track": np.full(20, platform.robot.numbers()["drive.track"])},
+                key=5,
+            )
+        }
+        for some in (trials, [stopped(*each) for each in zip(trials, near, strict=True)])
+    ]
+    assert shares[0] == pytest.approx(shares[1], abs=1e-6)
+    assert {"wheels", "turn", "turn at walls"} <= set(shares[0])
 
 
 @pytest.mark.long
@@ -93,7 +123,7 @@ def test_intervals_of_robots_from_the_prior_cover_as_often_as_they_say(observe):
         with SimTarget(SimPlatform(set=truth), ARENA, key=k) as target:
             trials = target.carry_out(all_plans(ARENA, platform.robot, 20, k), observe)
         genomes = [Genome.from_json(trial.genome) if trial.genome else None for trial in trials]
-        evidence = evidence_of(trials, genomes, ARENA.grid.n_cells)
+        evidence = evidence_of(trials, genomes, platform.robot, ARENA)
         places = fit_all(
             evidence,
             lambda one, some, key: ensemble.summarize(one.play, some, key, one.of, keep=one.keep),

@@ -12,7 +12,7 @@ Each vector is a fixed function of the observations. So a correct simulator give
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import groupby
 from typing import TypeVar
@@ -23,6 +23,9 @@ from numpy.typing import NDArray
 from realitygap.evolution import Genome
 from realitygap.platforms import Play, Rehearsal
 from realitygap.records import Observe, TrialRecord
+from realitygap.world import Arena, RobotModel
+
+from ._shots import shots_of
 
 Vectors = NDArray[np.float32]
 
@@ -61,6 +64,7 @@ class Evidence:
         kinds: (d,) kind of each entry, a key of `FINEST`.
         trial: (d,) index of the observed trial of each entry.
         step: (d,) at which step; -1 for what is of the whole trial.
+        at_walls: (d,) True if the robot was near a wall then; all False if its poses are not known.
     """
 
     play: Play
@@ -70,6 +74,7 @@ class Evidence:
     kinds: NDArray[np.str_]
     trial: NDArray[np.int64]
     step: NDArray[np.int64]
+    at_walls: NDArray[np.bool_]
 
     @property
     def finest(self) -> Vectors:
@@ -121,14 +126,15 @@ def _steps_of(shape: tuple[int, ...], per_step: int) -> NDArray[np.int64]:
 
 
 def evidence_of(
-    trials: Sequence[TrialRecord], genomes: Sequence[Genome | None], n_cells: int
+    trials: Sequence[TrialRecord], genomes: Sequence[Genome | None], robot: RobotModel, arena: Arena
 ) -> list[Evidence]:
     """Return the evidence of trials, grouped by their number of steps.
 
     Args:
         trials: Recorded trials.
         genomes: Controller of each trial; None if its commands were given.
-        n_cells: Number of cells of the arena's grid.
+        robot: Robot of the trials.
+        arena: Arena of the trials.
     """
     numbered = [
         (k, trial, genome)
@@ -143,15 +149,19 @@ def evidence_of(
 
     evidence: list[Evidence] = []
     for (_, observe, is_driven, _), group in groupby(sorted(numbered, key=alike), key=alike):
-        evidence += _of_group(list(group), observe, is_driven, n_cells)
+        evidence += _of_group(list(group), observe, is_driven, robot, arena)
     return evidence
 
 
 def _of_group(
-    group: list[tuple[int, TrialRecord, Genome | None]], observe: Observe, is_driven: bool, n_cells: int
+    group: list[tuple[int, TrialRecord, Genome | None]],
+    observe: Observe,
+    is_driven: bool,
+    robot: RobotModel,
+    arena: Arena,
 ) -> list[Evidence]:
     number = np.array([k for k, _, _ in group])
-    seen = _as_rehearsal([trial for _, trial, _ in group], n_cells)
+    seen = _as_rehearsal([trial for _, trial, _ in group], arena.grid.n_cells)
     starts = np.array([t.poses[0] if len(t.poses) else t.start for _, t, _ in group])
     commands = np.array([trial.commands for _, trial, _ in group])
     steps = commands.shape[1]
@@ -160,7 +170,9 @@ def _of_group(
         anchors = np.array([trial.poses for _, trial, _ in group])
         put_back = Play(starts, steps, commands, anchors=anchors)
         keep = ("poses", "readings", "stalled", "wheels")[: 4 if seen.wheels.shape[2] else 3]
-        made = [_evidence(put_back, keep, partial(_shooting, anchors), seen, number)]
+        one = _evidence(put_back, keep, partial(_shooting, anchors), seen, number)
+        near = shots_of([trial for _, trial, _ in group], robot, arena).touching
+        made = [replace(one, at_walls=near[np.searchsorted(number, one.trial), one.step])]
     elif is_driven:
         driven = Play(starts, steps, genomes=tuple(genome for _, _, genome in group if genome is not None))
         made = [
@@ -189,6 +201,7 @@ def _evidence(
         columns.kinds,
         number[columns.trial],
         columns.step,
+        np.zeros(len(columns.step), np.bool_),
     )
 
 

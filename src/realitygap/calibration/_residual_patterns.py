@@ -2,8 +2,8 @@
 
 A share of the variance is small if a fault acts rarely, or if the fit counts it as noise. But noise goes with nothing.
 So the differences of single commands are regressed on the time in the trial, the number of the trial, the heading, the
-place, and the command. The same regressions of robots from the posterior, in the same trials, show what chance alone
-makes of them.
+place, the command, and the last stall. The same regressions of robots from the posterior, in the same trials, show what
+chance alone makes of them.
 
 Source: posterior predictive checks with chosen discrepancies, Gelman, Meng & Stern, Statistica Sinica 6 (1996); the
 largest of several statistics, each in units of its spread, against the largest of each simulated robot, Westfall &
@@ -43,6 +43,7 @@ LEAST_SPREAD = {"ahead": 3e-4, "turn": 2e-3, "reading": 0.05}
 MOST_OFF = 4.0  # standard deviations: a larger difference counts as this one
 LEAST_COMMANDS = 100
 FLAT = 1e-6  # of the largest direction of a design: directions below it are left out
+STALL_S = 2.0  # after a stall, what it leaves falls to 1/e
 LATEST = 5  # commands ago whose reading a late reading may resemble
 
 
@@ -80,6 +81,7 @@ class _Situation(NamedTuple):
         number: Number of the trial, -1 for the first to 1 for the last.
         heading: Heading [rad].
         x, y: Place, in standard deviations from the mean place.
+        after_stall: 1 at a stall, less after it, and 0 if there was none.
         move, turn: The command.
         move_before, turn_before: The command before it.
     """
@@ -89,6 +91,7 @@ class _Situation(NamedTuple):
     heading: Floats
     x: Floats
     y: Floats
+    after_stall: Floats
     move: Floats
     turn: Floats
     move_before: Floats
@@ -142,9 +145,9 @@ def residual_patterns(
     which = np.linspace(0, m - 1, N_SIMULATED).astype(int)
     some = {name: np.asarray(value)[which] for name, value in numbers.items()}
     moved, readings = _simulated(shots, ensemble, some, key)
-    situation = _situation_of(shots)
-    at = _Situation(*(column[free] for column in situation))
     step_s = float(trials[0].step_s) or ensemble.platform.step_s
+    situation = _situation_of(shots, step_s)
+    at = _Situation(*(column[free] for column in situation))
     found: dict[tuple[str, str], _Found] = {}
     for kind, column in (("ahead", 0), ("turn", 2)):
         seen = shots.moved[free][:, column]
@@ -174,16 +177,20 @@ def _simulated(
     return made[..., :3], made[..., 3:]
 
 
-def _situation_of(shots: Shots) -> _Situation:
+def _situation_of(shots: Shots, step_s: float) -> _Situation:
     commands = shots.play.commands
     k, t = commands.shape[:2]
     before = np.concatenate([np.zeros((k, 1, 2)), commands[:, :-1]], axis=1)
     time = np.broadcast_to(np.linspace(-1.0, 1.0, t), (k, t))
     number = np.broadcast_to(np.linspace(-1.0, 1.0, k)[:, None], (k, t))
     x, y = (_standard(shots.poses[:, :-1, axis]) for axis in (0, 1))
+    step = np.arange(t)
+    last = np.maximum.accumulate(np.where(shots.stalled, step, -np.inf), axis=1)
+    after_stall = np.exp((last - step) * step_s / STALL_S)
+    heading, both = shots.poses[:, :-1, 2], (commands, before)
     return _Situation(
-        time, number, shots.poses[:, :-1, 2], x, y, commands[..., 0], commands[..., 1], before[..., 0], before[..., 1]
-    )  # fmt: skip
+        time, number, heading, x, y, after_stall, *(each[..., axis] for each in both for axis in (0, 1))
+    )
 
 
 def _standard(values: Floats) -> Floats:
@@ -202,6 +209,10 @@ def _by_time(kind: str, at: _Situation) -> list[Floats]:
 
 def _by_number(kind: str, at: _Situation) -> list[Floats]:
     return [at.number * column for column in _main(kind, at)]
+
+
+def _by_stall(kind: str, at: _Situation) -> list[Floats]:
+    return [at.after_stall * column for column in _main(kind, at)]
 
 
 def _by_lateness(kind: str, at: _Situation) -> list[Floats]:
@@ -233,6 +244,7 @@ MOTION_THINGS: dict[str, Callable[[str, _Situation], list[Floats]]] = {
     "time": _by_time,
     "delay": _by_lateness,
     "trial": _by_number,
+    "stall": _by_stall,
     "heading": _by_heading,
     "place": _by_place,
     "command": _by_command,
@@ -324,17 +336,17 @@ def _message(kind: str, thing: str, found: _Found, at: _Situation, step_s: float
         return f"Commands take effect {how} at the end of a trial than at its beginning."
     if thing == "heading":
         return _message_of_heading(kind, found, scale, unit)
-    early, late = {
-        "time": ("at its beginning", "at the end of a trial"),
-        "trial": ("in the first trial", "in the last trial"),
+    field, first, early, late = {
+        "time": ("time", -1.0, "at its beginning", "at the end of a trial"),
+        "trial": ("number", -1.0, "in the first trial", "in the last trial"),
+        "stall": ("after_stall", 0.0, "otherwise", "just after a stall"),
     }[thing]
-    field = "time" if thing == "time" else "number"
     columns = MOTION_THINGS[thing]
 
     def change(move: float, turn: float) -> float:
         ends = [
             np.stack(columns(kind, _at(move, turn, **{field: end})), axis=1) @ found.weights
-            for end in (-1.0, 1.0)
+            for end in (first, 1.0)
         ]
         return float((ends[1] - ends[0])[0]) * scale
 

@@ -12,7 +12,6 @@ from realitygap.calibration import PREDICTED, Evidence, Fit, Floats, Vectors, ev
 from realitygap.evolution import Genome
 from realitygap.platforms import SimEnsemble
 from realitygap.records import TrialRecord
-from realitygap.world import Arena
 
 from .hold_out import FITTED, NOMINAL, POSTERIOR, Compared
 
@@ -70,7 +69,7 @@ def compare_on_trials(
     if not any(held):
         return parts
     unseen = [trial for trial, is_held in zip(trials, held, strict=True) if is_held]
-    evidence, every = evidence_in(ensemble.arena, unseen), evidence_in(ensemble.arena, trials)
+    evidence, every = evidence_in(ensemble, unseen), evidence_in(ensemble, trials)
     try:
         estimate, draws = fit([trial for trial, is_held in zip(trials, held, strict=True) if not is_held])
     except ValueError as error:
@@ -122,10 +121,10 @@ def _mean_error(errors: Iterable[float]) -> float:
     return float(np.exp(np.mean(np.log(np.maximum(list(errors), LEAST_ERROR)))))
 
 
-def evidence_in(arena: Arena, trials: Sequence[TrialRecord]) -> list[Evidence]:
+def evidence_in(ensemble: SimEnsemble, trials: Sequence[TrialRecord]) -> list[Evidence]:
     """Return the information in recorded trials."""
     genomes = [Genome.from_json(trial.genome) if trial.genome else None for trial in trials]
-    return evidence_of(trials, genomes, arena.grid.n_cells)
+    return evidence_of(trials, genomes, ensemble.platform.robot, ensemble.arena)
 
 
 def simulate_evidence(

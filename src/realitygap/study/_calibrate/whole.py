@@ -193,7 +193,7 @@ class _Fitter:
         self.simulate = partial(simulate_evidence, self.ensemble)
 
     def evidence(self, trials: Sequence[TrialRecord]) -> list[Evidence]:
-        return evidence_in(self.arena, trials)
+        return evidence_in(self.ensemble, trials)
 
     def posterior(self, trials: Sequence[TrialRecord], effort: Effort) -> Posterior:
         """Return the part of the prior that remains."""
@@ -314,7 +314,7 @@ class _Fitter:
         start = plan.start or self.arena.start
         x, y, heading = start
         trial = TrialRecord((x, y, heading), 0.0, commands, np.zeros((n, s)), np.zeros(n, np.bool_), ())
-        return evidence_of([trial], [plan.genome], self.arena.grid.n_cells)
+        return evidence_of([trial], [plan.genome], self.robot, self.arena)
 
     def _as_it_is(self) -> Fit:
         """Return the calibration without trials: the robot's own numbers."""
@@ -383,7 +383,7 @@ def _patterns_in_words(patterns: Sequence[Pattern]) -> list[str]:
             largest.setdefault(pattern.kind, pattern)
     if patterns and not largest:
         return [
-            "What the fit leaves goes with no time, trial, heading, place, or command by more than expected."
+            "What the fit leaves goes with no time, trial, heading, place, command, or stall by more than expected."
         ]
     return [
         f"{pattern.message} {_percent(pattern.share)} of the variance of {pattern.kind} goes with {pattern.goes_with}, "

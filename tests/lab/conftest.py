@@ -224,24 +224,21 @@ def emulated() -> Iterator[tuple[str, str]]:
 
 
 def open_advanced(page, field) -> None:
-    """Open the section Advanced, if there is one, so that a field is seen: a click may come before the page listens."""
+    """Open the section Advanced, if there is one, so that a field is seen."""
     advanced = page.get_by_text("Advanced", exact=True)
-    for _ in range(60):
-        advanced.or_(field).first.wait_for()
-        if field.is_visible():
-            return
+    advanced.or_(field).first.wait_for()
+    if not field.is_visible():
         advanced.first.click()
-        page.wait_for_timeout(1000)
+        field.wait_for()
 
 
 def open_fold(page, title) -> None:
-    """Open a section of the page Trials: a click may come before the page listens, so click until it is open."""
+    """Open a section of the page Trials, unless it is open."""
     fold = page.locator(f'[data-fold="{title}"]')
-    for _ in range(60):
-        if fold.locator(".q-expansion-item__content").first.is_visible():
-            return
+    fold.wait_for()
+    if "q-expansion-item--expanded" not in (fold.get_attribute("class") or ""):
         fold.locator(".lab-fold").click()
-        page.wait_for_timeout(1000)
+    expect(fold.locator(".q-expansion-item__content").first).to_be_visible()
 
 
 def enter(page, label, text) -> None:

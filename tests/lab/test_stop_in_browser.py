@@ -99,7 +99,7 @@ class Motors:
         return bool(self._witness.motors() == (0.0, 0.0))
 
     def _turn(self, begin: Any, end: Any) -> None:
-        """Begin until they turn: a page that is drawn at this moment, or a robot that is silent, drops a press."""
+        """Begin until they turn: while a robot is silent, its pad is off."""
         for _ in range(24):
             begin()
             for _ in range(500):

@@ -18,6 +18,7 @@ from realitygap.lab._lab import Lab
 from realitygap.settings import shown
 
 from ._control import Stop, show_request
+from ._late_presses import serve_late_presses
 from ._notices import show_error
 
 WHO = "realitygap_who"
@@ -41,6 +42,7 @@ def framed(
         is_wide: Whether the page is a dashboard, which is wider than a form.
     """
     ui.on_exception(_show_mistake)
+    serve_late_presses(ui.context.client)
     ui.page_title(f"{title} – realitygap lab")
     for sheet in ("lab-tokens/tokens.css", "lab-files/lab.css", "lab-player/player.css"):
         ui.add_head_html(f'<link rel="stylesheet" href="/{sheet}">')

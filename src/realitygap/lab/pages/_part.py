@@ -19,8 +19,8 @@ T = TypeVar("T")
 class Part(Generic[T]):
     """A part of a page.
 
-    What is under a finger stays: a tap on a button that is taken away in that moment is lost. So each part has its own
-    state, and is drawn from a single look at it, by which the next look is compared.
+    What is under a finger stays, and keeps the focus. So each part has its own state, and is drawn from a single look
+    at it, by which the next look is compared. `serve_late_presses` serves presses that arrive after a drawing.
 
     Args:
         stand: What there is to show: something that can be compared.

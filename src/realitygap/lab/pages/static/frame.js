@@ -30,6 +30,29 @@
     probe();
   };
 
+  // A control that is drawn again, or moved, between press and release gets no click. So what the server sends meanwhile
+  // waits for the click. `Stop robot` acts when it is pressed, and the drive pad shows what happens while it is held.
+  const CONTROLS = "a, button, label, summary, .q-item, [role=button], [role=tab], [role=checkbox], [role=radio], [role=option]";
+  const LIVE = "select, input[type=range], [role=slider], [role=application]";
+  const MOST_MS = 10000, CLICK_MS = 300; // a release outside of the window may never arrive; a click follows a touch later
+  const waiting = [];
+  let receive = null, press = null;
+  const goOn = () => {
+    press = null;
+    waiting.splice(0).forEach(receive);
+  };
+  const waitFor = (ms) => {
+    clearTimeout(press);
+    press = setTimeout(goOn, ms);
+  };
+  const isPress = ({ target }) => target instanceof Element && target.closest(CONTROLS) && !target.closest(LIVE) && !isStop({ target });
+  addEventListener("pointerdown", (event) => { if (event.button === 0 && isPress(event)) waitFor(MOST_MS); }, true);
+  addEventListener("keydown", (event) => {
+    if (isPress(event) && !event.repeat && [" ", "Enter"].includes(event.key)) waitFor(MOST_MS);
+  }, true);
+  for (const end of ["pointerup", "pointercancel", "keyup"]) addEventListener(end, () => { if (press) waitFor(CLICK_MS); }, true);
+  addEventListener("click", () => { if (press) waitFor(0); }, true);
+
   // A value is checked when its field is left, such as by pressing a button. A message would move that button away from the
   // pointer before it is released, and the click would be lost. So the check waits for the release.
   let isHeld = false;
@@ -103,7 +126,9 @@
     if (answer && answer.status === 403) location.reload();
   };
   const listen = () => {
-    if (!window.socket) return setTimeout(listen, 200);
+    if (!window.socket) return setTimeout(listen, 20);
+    receive = window.socket.onevent.bind(window.socket);
+    window.socket.onevent = (packet) => (press ? waiting.push(packet) : receive(packet));
     window.socket.on("connect_error", reloadIfRefused);
     window.socket.on("connect_error", () => setOffline(true));
     window.socket.on("disconnect", () => setOffline(true));

@@ -42,7 +42,7 @@ EVERY = 5  # steps between compared poses
 POSITION_M, HEADING_RAD, READING = 0.05, 0.2, 0.3
 """Errors that weigh the same."""
 
-STEP = 0.02  # of a place, for derivatives: the simulation is in single precision and in steps
+STEP = 0.005  # of a place, for derivatives: the simulation is in single precision and in steps
 NOISE = (*MOTION_NOISE, "range.drop_width", "range.burst", "range.noise_gain", "range.outlier_most")
 
 

@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from realitygap.errors import RealityGapError
+from realitygap.errors import RealityGapError, RecordError, StudyError
 from realitygap.gap import GapSide, measure_change
 from realitygap.orders import CloseOrder, read_order
 from realitygap.records import read_observations, trial_to_dict
 from realitygap.report import write_closed_gap
-from realitygap.study import close_gap
+from realitygap.study import amend_design, close_gap, design_report
 from tests.forks import fork_context
 
 pytestmark = pytest.mark.slow
@@ -122,6 +122,25 @@ def test_another_margin_uses_the_same_trials(folder):
     assert stored("closed") == trials
     assert again.after.study.result.rms == first.after.study.result.rms
     assert again.after.study.result.equivalence != first.after.study.result.equivalence
+
+
+def test_a_locked_design_holds_all_three_parts_until_it_is_amended(folder):
+    def notes(out: str, **more: object) -> tuple[str, ...]:
+        return close(out, n_controllers=2, **more).after.study.result.notes
+
+    locked = notes("closed", lock=True)
+    assert "Deviations from the locked plan: none." in locked
+    report = design_report("closed")
+    assert report.design.design["command"] == "close"
+    assert any(report.design.sha256 in note for note in locked)
+    assert notes("closed") == locked
+    with pytest.raises(StudyError, match=r"margin is 0\.5"):
+        notes("closed", margin=0.5)
+    amend_design("closed", "a margin that matters", {"margin": "0.5"})
+    assert any("a margin that matters" in note for note in notes("closed", margin=0.5))
+    assert not any("locked" in note for note in notes("plain"))
+    with pytest.raises(RecordError, match="before the first one"):
+        notes("plain", lock=True)
 
 
 def stored(folder: str) -> list[dict[str, object]]:

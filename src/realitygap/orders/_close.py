@@ -9,6 +9,7 @@ from realitygap.robot_families import port_platforms
 
 from ._field import argument, option
 from ._shared import (
+    Lock,
     PairOrder,
     Processes,
     Seed,
@@ -26,6 +27,9 @@ class CloseOrder(PairOrder):
     The same controllers run on the target, in the simulator, and in the calibrated simulator. The calibration has other
     trials and other controllers, so both gaps are of trials that no fit has seen. The folder has all trials of the
     target, the calibration (fit.toml), and the page (report.html). Run the same command again to resume.
+
+    With --lock, the design of all three parts is locked in design.sqlite. The controllers still take turns in a fixed
+    order, which is random for `gap --lock`.
 
     Example: realitygap close sim twin:worn-1.toml
 
@@ -67,6 +71,7 @@ class CloseOrder(PairOrder):
     out: Path | None = folder_option("results/close")
     processes: Processes = None
     witness: Witness = None
+    lock: Lock = False
     seed: Seed = seed_option()
 
     @property

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from realitygap._limits import MOST_TABLE_BYTES, parse_toml, read_file
@@ -18,6 +18,8 @@ from realitygap.world import Calibration, load_arena, load_robot, read_calibrati
 from ._calibrate.kinds import KINDS
 from ._calibrate.one import refuse_other_sensors
 from ._calibrate.ordered import make_calibration
+from ._design import DESIGN_NAME, design_of, hold_folder_to_design
+from ._deviations import check_unblinded
 from ._gap.between import GapBetween, Say, gap_between
 from ._gap.study import Tell
 from ._targets import refuse_more_than_is_seen
@@ -94,11 +96,10 @@ def close_gap(
             another order.
         RealityGapError: The robot failed, or files cannot be read or written.
     """
-    order = _with_observe(_checked(order))
+    order = _adopted(_checked(order), say)
     folder = order.folder
-    _adopt(folder, order)
     fit, trials = folder / "fit.toml", folder / "fit.trials.sqlite"
-    gap = order.to_order(GapOrder, results=trials)
+    gap = order.to_order(GapOrder, results=trials, lock=False)
     before = gap_between(gap, pulse=pulse, allow_code=allow_code, tell=tell, say=say)
     calibration = _calibrated(order, fit, pulse, tell, say)
     shown = before.study.shown
@@ -111,7 +112,14 @@ def close_gap(
         shown=None if shown is None else shown.controller,
     )
     change = measure_change(before.study.source, after.study.source, after.study.target, seed=order.seed)
+    design = folder / DESIGN_NAME
+    after = _with_notes(after, check_unblinded(design if design.exists() else None))
     return ClosedGap(before, after, change, calibration, order)
+
+
+def _with_notes(gap: GapBetween, notes: tuple[str, ...]) -> GapBetween:
+    result = gap.study.result
+    return replace(gap, study=replace(gap.study, result=replace(result, notes=(*result.notes, *notes))))
 
 
 def _checked(order: CloseOrder) -> CloseOrder:
@@ -142,22 +150,27 @@ def _checked(order: CloseOrder) -> CloseOrder:
     return order
 
 
-def _with_observe(order: CloseOrder) -> CloseOrder:
-    """Return the order with its observation level.
+def _adopted(order: CloseOrder, say: Say | None) -> CloseOrder:
+    """Return the order with its observation level, and make its folder.
 
     Raises:
-        StudyError: The target or the calibration does not support it.
+        StudyError: The target or the calibration does not support it, or the folder belongs to another order.
+        RecordError: The folder cannot be written, or has trials of before the lock.
     """
     known = KINDS[order.what].observes
     with open_target(order.target, load_arena(order.arena), witness=order.witness, processes=1) as target:
         observe = order.observe or ("track" if sees(target.observes, "track") else "cells")
         refuse_more_than_is_seen(target, observe)
         refuse_other_sensors(load_robot(_base_of(order)), target)
-    if observe not in known:
-        raise StudyError(
-            f"{observe} alone does not identify {order.what}. Record more (--observe {' or '.join(known)})."
-        )
-    return order.model_copy(update={"observe": observe})
+        if observe not in known:
+            raise StudyError(
+                f"{observe} alone does not identify {order.what}. Record more (--observe {' or '.join(known)})."
+            )
+        order = order.model_copy(update={"observe": observe})
+        _adopt(order.folder, order)
+        design = design_of(order, target, score=order.task or "coverage")
+        hold_folder_to_design(order.folder, target, design, lock=order.lock, say=say or (lambda _: None))
+    return order
 
 
 def _adopt(folder: Path, order: CloseOrder) -> None:
@@ -177,7 +190,7 @@ def _adopt(folder: Path, order: CloseOrder) -> None:
         now = order.record()
         other = sorted(
             name
-            for name in {*stored, *now} - {"version", "processes", "margin"}  # which change no trial
+            for name in {*stored, *now} - {"version", "processes", "margin", "lock"}  # which change no trial
             if stored.get(name) != now.get(name)
         )
         if other:
@@ -199,7 +212,7 @@ def _calibrated(
     order: CloseOrder, fit: Path, pulse: Pulse | None, tell: Tell | None, say: Say | None
 ) -> Calibration:
     """Return the calibration: the one in the file if the same order made it, otherwise a new one."""
-    wanted = order.to_order(CalibrateOrder, robot=order.target, out=fit, base=_base_of(order))
+    wanted = order.to_order(CalibrateOrder, robot=order.target, out=fit, base=_base_of(order), lock=False)
     made = read_calibration(fit) if fit.exists() else None
     if made is not None and made.order == wanted.record():
         return made

@@ -190,7 +190,7 @@ def hold_folder_to_design(
     path = folder / DESIGN_NAME
     if not path.exists() and not lock:
         return
-    if not path.exists() and any(folder.glob("*/*.sqlite")):
+    if not path.exists() and any(folder.rglob("*.sqlite")):
         raise RecordError(
             f"{folder} has trials, and a design is locked before the first one. Nothing was changed. Name another "
             "folder, or drive on without a lock."

@@ -42,9 +42,8 @@ def simulate(one, numbers, key):
 
 def evidence_with(seen):
     n = len(seen)
-    return Evidence(
-        SimpleNamespace(), (), lambda _: seen, seen, np.full(n, "reading"), np.zeros(n, int), np.arange(n)
-    )
+    kinds, trial, at_walls = np.full(n, "reading"), np.zeros(n, int), np.zeros(n, bool)
+    return Evidence(SimpleNamespace(), (), lambda _: seen, seen, kinds, trial, np.arange(n), at_walls)
 
 
 def observed(rng):

@@ -154,6 +154,7 @@ def sensors_of(
 WITH_SLIP = {
     "drive.gain": -1.0,
     "drive.asymmetry": -1.0,
+    "drive.rise": 1.0,
     "stall.share": 1.0,
     "drive.travel_noise_per_m": 0.5,
     "drive.heading_noise_per_m": 0.5,

@@ -13,7 +13,7 @@ Measuring takes an hour, by hand:
     uv run python benchmarks/calibration.py sensors --n 12 --first-seed 1000 $data
     uv run python benchmarks/calibration.py flags --n 30 --first-seed 1001 $data
     uv run python benchmarks/calibration.py same --n 30 --first-seed 1001 $data
-    uv run python benchmarks/misspecification.py final --out docs/data/misspecification.jsonl
+    uv run python benchmarks/misspecification.py again --out docs/data/misspecification.jsonl
 """
 
 from __future__ import annotations
@@ -189,24 +189,17 @@ def flagged(rows: Sequence[Row], closing: Row) -> str:
 def checked(rows: Sequence[Row]) -> str:
     """How many twins the check flags: all of it, and its shares of the variance alone."""
     lines = [
-        "| twins (TWIN) | observed | flagged | 95 % interval | by the share of the variance alone |",
+        "| check | twins (TWIN) | flagged | 95 % interval | by the share of the variance alone |",
         "|---|---|---|---|---|",
     ]
-    for observe in OBSERVED:
+    for name, check in (("final", "first"), ("again", "present")):
         for what, is_outside in (("made by hand", True), ("of the families", False)):
-            some = [
-                row
-                for row in rows
-                if row["observe"] == observe and (row["family"] == "outside") == is_outside
-            ]
-            if some:
-                part = exact_share_interval(sum(row["flagged"] for row in some), len(some))
-                alone = sum(
-                    any(share > TOLERATED[kind] for kind, share in row["misfit"].items()) for row in some
-                )
-                lines.append(
-                    f"| {what} | `{observe}` | {count(part)} of {part.n} | {bounds(part)} | {alone} of {len(some)} |"
-                )
+            some = [row for row in rows if row["set"] == name and (row["family"] == "outside") == is_outside]
+            part = exact_share_interval(sum(row["flagged"] for row in some), len(some))
+            alone = sum(any(share > TOLERATED[kind] for kind, share in row["misfit"].items()) for row in some)
+            lines.append(
+                f"| {check} | {what} | {count(part)} of {part.n} | {bounds(part)} | {alone} of {len(some)} |"
+            )
     return "\n".join(lines) + "\n"
 
 
@@ -220,7 +213,7 @@ def each_checked(rows: Sequence[Row]) -> str:
             " ".join(note for note in row["notes"] if "goes with" in note or _is_beyond(note, row["misfit"])),
         ]
         for row in rows
-        if row["family"] == "outside" and row["observe"] == "track"
+        if row["family"] == "outside" and row["set"] == "again"
     ]
     return _csv(lines)
 

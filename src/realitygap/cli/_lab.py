@@ -32,6 +32,19 @@ def lab(
             help="Add a class: students scan a code and drive emulated robots from their phones, without the token.",
         ),
     ] = False,
+    robot: Annotated[
+        str,
+        typer.Option(
+            metavar="PORT",
+            help="Robot that the students of --class drive in turns. Without it, each drives an emulated robot.",
+        ),
+    ] = "",
+    witness: Annotated[
+        str,
+        typer.Option(
+            metavar="HOST:PORT", help="Witness of --robot, if it is an emulator in another program."
+        ),
+    ] = "",
     allow_code: Annotated[
         bool,
         typer.Option(
@@ -54,6 +67,8 @@ def lab(
 
     Example: realitygap lab class --class
 
+    Example: realitygap lab class --class --robot /dev/rfcomm0
+
     In Python: realitygap.lab.open_lab("results")
     """
     realitygap.lab.open_lab(
@@ -64,6 +79,8 @@ def lab(
         tell=_say,
         allow_code=allow_code,
         classroom=classroom,
+        robot=robot,
+        witness=witness,
     )
 
 

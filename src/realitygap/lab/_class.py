@@ -12,10 +12,11 @@ from typing import Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from realitygap.errors import StudyError
+from realitygap.robots import Label
 from realitygap.world import paper_arena
 
 from ._class_results import Drive, clean_name, read_drives, save_drives
-from ._class_robot import ClassRobot
+from ._class_robot import ClassRobot, StudentRobot
 from ._job import MOST_POINTS
 
 Phase = Literal["practice", "round", "over"]
@@ -62,14 +63,14 @@ class Student:
     def __init__(self, key: str) -> None:
         self.key = key
         self.name = ""
-        self.robot: ClassRobot | None = None
+        self.robot: StudentRobot | None = None
         self.pages: set[asyncio.Event] = set()
         self.n_heard = self.n_stops = self.n_words = 0
         self.seen = self.began = 0.0
 
 
 class Classroom:
-    """The class of a lab. All methods are called in the event loop.
+    """The class of a lab, in which each student has an emulated robot. All methods are called in the event loop.
 
     Args:
         root: Folder of the lab.
@@ -110,6 +111,16 @@ class Classroom:
         self.problem = ""
         self._due: dict[tuple[int, str], Drive] = {}
 
+    @property
+    def label(self) -> Label:
+        """Label of the robots."""
+        return "EMULATED"
+
+    @property
+    def is_observed(self) -> bool:
+        """True if the cells of a drive are observed; otherwise the lecturer counts them."""
+        return True
+
     # students
 
     def enter(self, key: str) -> tuple[Student, asyncio.Event]:
@@ -148,17 +159,26 @@ class Classroom:
     def hear(self, student: Student, word: Word) -> bool:
         """Do what a page says; return False if it says too much."""
         student.n_words += 1
-        robot, drive = student.robot, self.drive_of(student)
+        robot = student.robot
         if word.kind == "join":
             self._join(student, word.name)
         elif robot is not None and word.kind != "drive":
             student.n_stops += word.kind == "stop"
             robot.release()
-        elif robot is not None and (drive is None or not drive.is_over):
+        elif robot is not None and self.may_drive(student):
             student.n_heard = word.n
             if word.stops == student.n_stops:
                 robot.pull(word.move, word.turn)
         return student.n_words <= MOST_WORDS
+
+    def may_drive(self, student: Student) -> bool:
+        """Return True if the student's pad drives."""
+        drive = self.drive_of(student)
+        return drive is None or not drive.is_over
+
+    def words_for(self, student: Student) -> str:
+        """Return the words that replace those of a student's page; empty if none do."""
+        return ""
 
     def _join(self, student: Student, name: str) -> None:
         name = clean_name(name)
@@ -177,8 +197,8 @@ class Classroom:
         return next(each for each in names if each not in taken)
 
     def _switch_on(self, student: Student) -> None:
-        student.robot = ClassRobot(int(student.key[:6], 16), self._clock())
-        self.arena = student.robot.arena
+        student.robot = robot = ClassRobot(int(student.key[:6], 16), self._clock())
+        self.arena = robot.arena
 
     def drive_of(self, student: Student) -> Drive | None:
         """Return the student's drive in this round; None if there is none."""
@@ -187,7 +207,7 @@ class Classroom:
     def n_cells(self, student: Student) -> int:
         """Return the number of cells of a student's drive, in practice those of the robot."""
         if (drive := self.drive_of(student)) is not None:
-            return len(drive.cells)
+            return drive.n_cells
         return 0 if student.robot is None else len(student.robot.cells)
 
     def seconds_left(self, student: Student) -> float:
@@ -246,7 +266,7 @@ class Classroom:
     def drives(self) -> list[Drive]:
         """Return the drives of this round that are not removed, best first; of equal ones, the earlier one."""
         drives = [each for each in self._drives.values() if each.round == self.round and not each.is_removed]
-        return [] if self.phase == "practice" else sorted(drives, key=lambda drive: -len(drive.cells))
+        return [] if self.phase == "practice" else sorted(drives, key=lambda drive: -drive.n_cells)
 
     # time
 
@@ -260,7 +280,7 @@ class Classroom:
                 await asyncio.sleep(0)  # other pages do not wait for all robots
             for page in student.pages:
                 page.set()
-        if self.phase == "round" and all(drive.is_over for drive in self.drives()):
+        if self.phase == "round" and self._is_round_over():
             self.phase = "over"
         if self._due:
             due, self._due = self._due, {}
@@ -269,7 +289,10 @@ class Classroom:
             if self.problem:
                 self._due = due | self._due
 
-    def _advance(self, student: Student, robot: ClassRobot, now: float) -> None:
+    def _is_round_over(self) -> bool:
+        return all(drive.is_over for drive in self.drives())
+
+    def _advance(self, student: Student, robot: StudentRobot, now: float) -> None:
         drive = self.drive_of(student)
         if drive is None or drive.is_over:
             robot.advance(now)
@@ -279,6 +302,12 @@ class Classroom:
                 self._switch_off(student)
             return
         robot.advance(min(now, student.began + self.round_s))
+        self._note_drive(student, robot, now)
+
+    def _note_drive(self, student: Student, robot: StudentRobot, now: float) -> None:
+        """Note the cells of a drive, and end it after its time."""
+        if (drive := self.drive_of(student)) is None:
+            return
         drive.seconds = min(now - student.began, self.round_s)
         if (cells := list(robot.cells)) != drive.cells:
             drive.cells = cells

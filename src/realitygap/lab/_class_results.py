@@ -29,7 +29,8 @@ class Drive(BaseModel):
         student: Digest of the key of the student's browser.
         name: Name that the student chose.
         label: Label of the robot.
-        cells: Cells in the order of first visits.
+        cells: Cells in the order of first visits; empty if nobody observes the robot.
+        counted: Number of cells that the lecturer counted on the paper; None if nobody did.
         seconds: Driven time [s].
         path: Poses x [m], y [m], heading [rad] at equal times; empty until the drive is over.
         is_over: True if the drive has ended.
@@ -43,12 +44,18 @@ class Drive(BaseModel):
     name: str = Field(max_length=_LONGEST_SAVED)
     label: Label = "EMULATED"
     cells: list[int] = Field(default=[], max_length=100_000)
+    counted: int | None = Field(default=None, ge=0, le=100_000)
     seconds: float = 0.0
     path: list[Annotated[list[float], Field(min_length=3, max_length=3)]] = Field(
         default=[], max_length=10_000
     )
     is_over: bool = False
     is_removed: bool = False
+
+    @property
+    def n_cells(self) -> int:
+        """Number of cells."""
+        return len(self.cells) if self.counted is None else self.counted
 
 
 def clean_name(text: str, longest: int = LONGEST_NAME) -> str:
@@ -71,7 +78,7 @@ def read_drives(root: Path) -> list[Drive]:
 
 def save_drives(root: Path, drives: list[Drive]) -> str:
     """Append drives to the file, those that are over onto the disk; return the problem, empty if there is none."""
-    text = "".join(drive.model_dump_json() + "\n" for drive in drives)
+    text = "".join(drive.model_dump_json(exclude_none=True) + "\n" for drive in drives)
     try:
         refuse_links(root, root / FILE)
         with (root / FILE).open("ab+") as file:

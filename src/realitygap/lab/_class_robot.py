@@ -2,12 +2,32 @@
 
 from __future__ import annotations
 
+from typing import Protocol
+
 from realitygap.emulator import Witness
 from realitygap.robot_families import default_family
 from realitygap.robots import open_on
 from realitygap.world import Pose
 
 from ._hand import DEAD_MAN_S, wheels_of
+
+
+class StudentRobot(Protocol):
+    """A robot that a student drives; `ClassRobot` explains its parts."""
+
+    path: list[Pose]
+    n_starts: int
+
+    @property
+    def cells(self) -> tuple[int, ...]: ...
+    @property
+    def is_blocked(self) -> bool: ...
+    def put_at_start(self) -> None: ...
+    def forget_path(self) -> None: ...
+    def pull(self, move: float, turn: float) -> None: ...
+    def release(self) -> None: ...
+    def advance(self, now: float) -> None: ...
+    def close(self) -> None: ...
 
 
 class ClassRobot:

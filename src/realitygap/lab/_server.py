@@ -45,6 +45,8 @@ def open_lab(
     tell: Callable[[str], None] = print,
     allow_code: bool = False,
     classroom: bool = False,
+    robot: str = "",
+    witness: str = "",
 ) -> None:
     """Serve the page of the studies in a folder until Ctrl-C.
 
@@ -57,16 +59,28 @@ def open_lab(
         tell: Takes the lines for whoever started it.
         allow_code: Whether studies may run Python files of tasks, which are in the folder.
         classroom: Whether there is a class: students drive emulated robots from their phones, without the token.
+        robot: Port of a robot that the students of the class drive in turns, such as /dev/rfcomm0; empty if each
+            student has an emulated one.
+        witness: HOST:PORT of that robot's witness, if it is an emulator in another program.
 
     Raises:
-        StudyError: The folder cannot be made, or is the folder of one study.
+        StudyError: The folder cannot be made, or is the folder of one study; a robot without a class, or at a port
+            that the lab does not open.
         RealityGapError: The address cannot be had, or the extra `lab` is not installed.
         ValueError: A port that there is not.
     """
     from_extra("nicegui", "lab")
     host = host or ("0.0.0.0" if classroom else "127.0.0.1")
     port = whole_number("port", port, 0, 65535)
+    if (robot or witness) and not (robot and classroom):
+        raise StudyError(
+            f"{'--robot' if robot else '--witness'} needs {'--class' if robot else '--robot'}. Add it."
+        )
     root = _root(Path(folder))
+    if robot:
+        from ._files import refuse_port
+
+        refuse_port(root, robot)
     listener = _listen(host, port)
     token = secrets.token_urlsafe(16)
     with contextlib.closing(listener), contextlib.ExitStack() as while_served:
@@ -77,7 +91,13 @@ def open_lab(
             addresses = [address.replace("/?", "/class/board?") for address in addresses]
         students = addresses[0].partition("/board")[0] if classroom else ""
         lab, server = _prepare(
-            root, token, port, is_local=is_local, allow_code=allow_code, students=students
+            root,
+            token,
+            port,
+            is_local=is_local,
+            allow_code=allow_code,
+            students=students,
+            robot=(robot, witness),
         )  # takes some seconds
         _tell_addresses(root, addresses, is_local, tell, students)
         if show:
@@ -169,7 +189,14 @@ def _qr_code(text: str) -> str:
 
 
 def _prepare(
-    root: Path, token: str, port: int, *, is_local: bool, allow_code: bool, students: str = ""
+    root: Path,
+    token: str,
+    port: int,
+    *,
+    is_local: bool,
+    allow_code: bool,
+    students: str = "",
+    robot: tuple[str, str] = ("", ""),
 ) -> tuple[Any, Any]:
     """The lab, and what will serve it."""
     import uvicorn
@@ -178,13 +205,15 @@ def _prepare(
     from nicegui import run, ui
 
     from ._class import Classroom
+    from ._class_turns import SharedRobot, Turns
     from ._connections import Strangers, guarded_protocol, most_strangers
     from ._lab import Lab
     from .pages import add_pages
 
     lab = Lab(root, allow_code=allow_code)
     if students:
-        lab.classroom = Classroom(root, students)
+        shared = SharedRobot(lab.robot, *robot) if robot[0] else None
+        lab.classroom = Classroom(root, students) if shared is None else Turns(root, students, shared)
     run.thread_pool = ThreadPoolExecutor(THREADS)
     nicegui_app.config.quasar_config["loadingBar"]["skipHijack"] = (
         True  # pages show by themselves how far an upload is

@@ -23,6 +23,8 @@ from realitygap.errors import StudyError
 from realitygap.lab._access import CLASS_SOCKET, VISITOR
 from realitygap.lab._class import PERIOD_S, Classroom, Student, Word
 from realitygap.lab._class_evolution import NAME, Evolved, begin_evolution, evolved_controller
+from realitygap.lab._class_results import Drive
+from realitygap.lab._class_turns import Turns
 from realitygap.lab._lab import Lab
 from realitygap.platforms import platform_class
 from realitygap.playback import MovingTrial, RobotShape, pack_scene, pack_trials
@@ -39,6 +41,7 @@ _POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; connect-src 'self' ws: wss:; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
+_OWN_ROBOT = "You get an emulated robot of your own."
 _FILES = resources.files(__package__)
 
 
@@ -48,9 +51,12 @@ def add_class(lab: Lab) -> None:
     if room is None:
         return
     page = _Class(lab, room)
+    app.on_startup(page.connect)
     app.on_startup(page.keep)
     app.on_startup(page.evolve)
     page_html = (_FILES / "classroom" / "class.html").read_text("utf-8")
+    if isinstance(room, Turns):
+        page_html = page_html.replace(_OWN_ROBOT, "You drive a robot in turns.")
     for name in ("class.js", "class.css"):
         app.add_static_file(local_file=str(_FILES / "classroom" / name), url_path=f"/class/{name}")
     app.add_static_file(local_file=str(_FILES / "drive_pad.js"), url_path="/class/drive_pad.js")
@@ -76,6 +82,12 @@ class _Class:
         self.evolved: Evolved | None = None
         self.problem = ""
         self._shape = RobotShape.of(platform_class(default_family().name)())
+
+    async def connect(self) -> None:
+        """Connect the robot that the students drive in turns, if there is one."""
+        if isinstance(self.room, Turns):
+            with contextlib.suppress(StudyError):  # the board shows why
+                await asyncio.to_thread(self.room.shared.connect)
 
     async def keep(self) -> None:
         """Move the robots."""
@@ -143,7 +155,7 @@ class _Class:
                 "pose": [round(part, 4) for part in path[-1]],
                 "stalled": robot.is_blocked,
                 "left": math.ceil(room.seconds_left(student)),
-                "n_cells": room.n_cells(student),
+                "n_cells": room.n_cells(student) if room.is_observed else None,
                 "heard": student.n_heard,
                 "stops": student.n_stops,
             }
@@ -170,9 +182,12 @@ class _Class:
             "kind": "class",
             "phase": phase,
             "name": student.name,
-            "place": 0 if drive is None else 1 + sum(len(each.cells) > len(drive.cells) for each in board),
+            "place": 0 if drive is None else 1 + sum(each.n_cells > drive.n_cells for each in board),
             "n": len(board),
-            "may_drive": drive is None or not drive.is_over,
+            "may_drive": room.may_drive(student),
+            "words": room.words_for(student),
+            "watches": isinstance(room, Turns) and not room.may_drive(student),
+            "is_observed": room.is_observed,
             "evolution": "" if evolved is None else counted(int(np.median(evolved.cells)), "cell"),
             "compares": evolved is not None and drive is not None and drive.is_over,
         }
@@ -183,9 +198,9 @@ class _Class:
         path = drive.path if compares and drive and drive.path else [list(self.room.arena.start)]
         poses, rays = np.array(path), np.full((len(path), len(self._shape.mounts)), np.nan)
         stalled = np.zeros(len(path), np.bool_)
-        title = f"You, {counted(len(drive.cells), 'cell')}" if drive else ""
+        title = f"You, {counted(drive.n_cells, 'cell')}" if drive else ""
         own = MovingTrial.of_rows(
-            title, "EMULATED", self.room.arena, self._shape, PERIOD_S, poses, rays, stalled
+            title, self.room.label, self.room.arena, self._shape, PERIOD_S, poses, rays, stalled
         )
         if compares and self.evolved:
             trials = [own, self.evolved.trial] if drive and drive.path else [self.evolved.trial]
@@ -243,6 +258,20 @@ class _Board:
             room.shows_evolution,
             self._page.evolved is not None,
             self._problem,
+            self._turns(),
+        )
+
+    def _turns(self) -> tuple[Any, ...]:
+        """Return a value that changes with what the buttons of the turns show."""
+        room = self._room
+        if not isinstance(room, Turns):
+            return ()
+        names = tuple(student.name for student in room.queue)
+        return (
+            room.driver and room.driver.name,
+            names,
+            room.shared.problem,
+            room.uncounted and room.uncounted.name,
         )
 
     @property
@@ -264,12 +293,51 @@ class _Board:
             evolution.props("outline no-caps").set_enabled(
                 self._page.evolved is not None and room.phase == "over"
             )
+        if why := _why_off(room):
+            hint(why)
+        if isinstance(room, Turns):
+            self._show_turns(room)
         if self._problem:
             ui.label(self._problem).classes("lab-problem").props('role="alert"')
         elif self._page.evolved is None:
             hint("Evolution is running. Its result is ready in about ten seconds.")
         elif room.phase != "over":
             hint("The result of evolution is ready. You can show it after a round.")
+
+    def _show_turns(self, room: Turns) -> None:
+        """Show whose turn it is, and the buttons that start and end a turn."""
+        if problem := room.shared.problem:
+            ui.label(problem).classes("lab-problem lab-lines").props('role="status"')
+            if not room.shared.has_process:
+                ui.button("Connect robot", on_click=self._page.connect).props("outline no-caps")
+        else:
+            with ui.row().classes("lab-row"):
+                ui.label(room.label).classes(f"lab-badge lab-label-{room.label.lower()}")
+                ui.label("All students drive this robot, in turns.")
+        if (drive := room.uncounted) is not None:
+            self._show_count(room, drive)
+        if room.driver is not None:
+            ui.label(f"{room.driver.name} is driving.").props('role="status"')
+        elif room.queue:
+            ui.label(f"Next: {room.queue[0].name}. Put the robot at its start.").props('role="status"')
+        if room.driver is not None or room.queue:
+            with ui.row().classes("lab-row"):
+                if room.driver is None:
+                    turn = ui.button("Start turn", on_click=lambda: try_now(room.start_turn))
+                    turn.props("unelevated no-caps")
+                words = "End turn" if room.driver is not None else f"Skip {room.queue[0].name}"
+                ui.button(words, on_click=room.skip).props("outline no-caps")
+        waiting = room.queue[room.driver is None :]
+        if waiting:
+            hint(f"Then: {', '.join(student.name for student in waiting)}")
+
+    def _show_count(self, room: Turns, drive: Drive) -> None:
+        """Ask for the cells of a drive that nobody observed."""
+        with ui.row().classes("lab-row"):
+            cells = ui.number(f"Cells of {drive.name}", min=0, max=room.arena.grid.n_cells, step=1)
+            ui.button("Save cells", on_click=lambda: try_now(lambda: room.count(drive, cells.value))).props(
+                "unelevated no-caps"
+            )
 
     def _toggle(self) -> None:
         self._room.shows_evolution = not self._room.shows_evolution
@@ -284,7 +352,7 @@ class _Board:
                 ui.button(name, on_click=lambda key=key: self._room.remove(key)).props("outline no-caps")
 
     def _rows(self) -> list[_Row]:
-        rows = [_Row(drive.name, len(drive.cells)) for drive in self._room.drives()]
+        rows = [_Row(drive.name, drive.n_cells, drive.label) for drive in self._room.drives()]
         evolved = self._page.evolved
         if evolved is not None and self._room.shows_evolution:
             low, middle, high = np.percentile(evolved.cells, [0, 50, 100]).astype(int).tolist()
@@ -299,6 +367,11 @@ class _Board:
         room = self._room
         drives = room.drives()
         rests = [room.rest_of(drive) for drive in drives if not drive.is_over]
+        if isinstance(room, Turns) and room.phase == "round":
+            driver = room.driver
+            turn = "no student is driving" if driver is None else f"{driver.name} is driving, "
+            left = "" if driver is None else f"{math.ceil(room.seconds_left(driver))} s left"
+            return f"Round {room.round}: {turn}{left}"
         left = f"{math.ceil(min(rests, default=0.0))} s left"  # of those who began first
         if 0 < len(rests) < len(drives):
             left = f"{counted(len(rests), 'student')} still driving, {left}"
@@ -323,6 +396,15 @@ class _Board:
             for row in rows
         ]
         return f'<ol class="class-rows">{"".join(items)}</ol>'
+
+
+def _why_off(room: Classroom) -> str:
+    """Return why one of the buttons of the round is off."""
+    return {
+        "practice": "Reset is off: no round has started.",
+        "round": "Start round is off: a round is running. Wait for its end, or press Reset.",
+        "over": "",
+    }[room.phase]
 
 
 def _code(address: str) -> str:

@@ -57,18 +57,18 @@ const WORDS = {
   cut: "The lab was restarted during your drive. Your cells until then count.",
 };
 function takeClass(news) {
-  const { phase, name, place, n, evolution, scene, trials, live } = news;
+  const { phase, name, place, n, evolution, scene, trials, live, words } = news;
   main.dataset.phase = name ? phase : "joining";
-  main.dataset.compares = news.compares;
+  Object.assign(main.dataset, { compares: news.compares, watches: news.watches, observed: news.is_observed });
   find("name").textContent = name || "realitygap";
   find("place").textContent = place ? `${place} of ${n}` : "";
-  find("words").textContent = WORDS[phase] + (evolution ? ` Evolution (SIM): ${evolution}. Can you beat it?` : "");
+  find("words").textContent = (words || WORDS[phase]) + (evolution ? ` Evolution (SIM): ${evolution}. Can you beat it?` : "");
   setPad(!name || !news.may_drive);
   if (scene) show(scene, trials, live);
 }
 function takeNow({ left, cells, n_cells, stops, begins, ...now }) {
   find("clock").textContent = left;
-  find("cells").textContent = n_cells;
+  find("cells").textContent = n_cells ?? "–";
   find("seconds").textContent = left === 1 ? "second" : "seconds";
   find("unit").textContent = n_cells === 1 ? "cell" : "cells";
   pad.stops = stops;

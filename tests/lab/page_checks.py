@@ -57,6 +57,17 @@ _WATCH = """() => {
   new MutationObserver(look).observe(document.body, { subtree: true, childList: true, characterData: true });
   look();
 }"""
+_ALIKE = """() => {
+  const kinds = "button, input:not([type=file]), select, textarea, [role=button], [role=tab], [role=radio]";
+  const textOf = (id) => document.getElementById(id)?.textContent ?? "";
+  const textsOf = (it) => (it.getAttribute("aria-labelledby") || "").split(" ").map(textOf).join(" ");
+  const labelOf = (it) => it.getAttribute("aria-label") || textsOf(it) || it.labels?.[0]?.textContent;
+  const groupOf = (it) => it.closest("[role=group][aria-label]")?.ariaLabel ?? "";
+  const nameOf = (it) => [groupOf(it), (labelOf(it) || it.textContent).trim()].join(" ").trim();
+  const all = [...document.querySelectorAll(kinds)].filter((it) => it.checkVisibility());
+  return all.filter((it, index) => all.findIndex((other) => nameOf(other) === nameOf(it)) !== index)
+    .map((it) => `another control is named "${nameOf(it)}": ${it.outerHTML.slice(0, 120)}`);
+}"""
 _MISSED = """() => [...document.querySelectorAll(
   "a[href], button, input, textarea, select, [tabindex='0']")].filter((it) => it.checkVisibility() && !it.disabled
   && it.tabIndex >= 0 && it.getAttribute("aria-disabled") !== "true" && it.type !== "file"
@@ -167,6 +178,12 @@ def broad(page: Any) -> list[str]:
     return found
 
 
+def alike(page: Any) -> list[str]:
+    """Return the controls of a page whose accessible name another one of the same group has, too."""
+    found: list[str] = page.evaluate(_ALIKE)
+    return found
+
+
 def watch_states(page: Any) -> None:
     """Watch every change of a page for `states`, until it is loaded again."""
     page.evaluate(_WATCH)
@@ -239,7 +256,7 @@ def faults(page: Any, root: Path) -> list[str]:
         if (width, height) == PHONE:
             problems += small(page)
         if (width, height) == DESKTOP:
-            problems += broad(page)
+            problems += broad(page) + alike(page)
         found += [f"{size}: {problem}" for problem in problems]
     return found
 

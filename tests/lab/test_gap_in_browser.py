@@ -8,6 +8,7 @@ import pytest
 
 from realitygap.lab._gap import rounds
 from realitygap.records import read_observations
+from realitygap.world import Calibration
 
 from .conftest import enter, expect
 
@@ -110,6 +111,22 @@ def test_gap_is_closed_by_a_button_and_its_report_shows_both_gaps(lab, visit):
     assert ticks[0] == ticks[1]
     page.get_by_role("link", name="first-closed", exact=True).wait_for()  # without a reload
     assert (lab.root / "gaps" / "first-closed" / "fit.toml").is_file()
+
+
+def test_gap_of_a_calibrated_simulator_is_explained_by_a_button(lab, visit):
+    calibration = Calibration(
+        kind="path", robot="scribbler-s2-fluke2", target="twin", label="TWIN", observe="cells", trials=10,
+        date="2026-01-01", method="known", numbers={"drive.track": 0.16},
+    )  # fmt: skip
+    (lab.root / "fit.toml").write_text(calibration.to_toml())
+    page = visit("gap")
+    page.get_by_label("Controllers", exact=True).fill("3")
+    page.get_by_label("Trials per controller").fill("2")
+    measure(page, Simulator="sim:fit.toml", Target="sim", Name="first")
+    page.get_by_role("button", name="Explain the gap").click()
+    expect(page.get_by_role("button", name="Explain the gap")).to_have_count(0)
+    page.get_by_text("Complete.", exact=True).wait_for()
+    page.frame_locator("iframe").locator("#why").wait_for(state="attached")  # in a fold of the report
 
 
 def test_reports_come_after_2_4_8_trials_and_at_the_end():

@@ -127,7 +127,7 @@ def test_a_second_count_does_not_begin_with_the_photo_by_itself(lab, visit):
     other = visit(PAGE)
     other.get_by_label("Your name").fill("ben")
     open_fold(other, "Score")
-    other.get_by_role("button", name="1, red").last.click()
+    other.get_by_role("button", name="Trial 1", exact=True).last.click()
     other.get_by_text("You do not see the first one.").wait_for()
     assert other.locator("[data-counting] .lab-marked").count() == 0
     other.get_by_role("button", name="Use its cells (photo)").click()

@@ -255,7 +255,7 @@ def test_two_people_count_and_their_agreement_is_told(lab, visit):
     other = visit(PAGE)
     other.get_by_label("Your name").fill("ben")
     other.get_by_text("To score a second time: 1").wait_for()
-    other.get_by_role("button", name="1, red").last.click()
+    other.get_by_role("button", name="Trial 1", exact=True).last.click()
     other.get_by_text("You do not see the first one.").wait_for()
     assert other.locator("[data-counting] .lab-marked").count() == 0
     count(other, 1, 0, 1, 2)

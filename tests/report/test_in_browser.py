@@ -644,6 +644,16 @@ def test_the_page_without_a_script_says_so(show):
 
 
 @pytest.mark.slow
+def test_page_in_a_browser_that_cannot_unpack_trials_says_so(show, page_file):
+    page = show()
+    page.add_init_script("delete globalThis.DecompressionStream")
+    page.goto(page_file.as_uri())
+    assert page.get_by_text("This browser cannot unpack the trials.").is_visible()
+    assert page.locator("#replay-without .rg-trail").is_visible()
+    assert not page.locator("#replay-stage").is_visible()
+
+
+@pytest.mark.slow
 def test_hostile_names_stay_text(show, tiny_study, monkeypatch, tmp_path):
     pack = _replay._pack_run
 

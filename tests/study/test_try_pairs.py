@@ -220,6 +220,7 @@ def test_gap_stores_its_rounds_and_more_trials_continue_the_looks(tmp_path):
     assert comparison.look.n == 7
     assert comparison.shift.value == pytest.approx(rounds.mean())
     assert comparison.look.e == pytest.approx(SequentialTest().look(rounds).e)
+    assert (comparison.first, comparison.second) == ("sim with scribbler-s1", "sim"), "no folder of a file"
     assert whole.advice.planned == "planned"
     assert advise(order["results"]).to_dict() == whole.advice.to_dict()
     with Ledger.open(order["results"], writable=False) as ledger:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from realitygap._wording import platform_in_words
 from realitygap.errors import RecordError, StudyError
 from realitygap.gap import COVERAGE
 from realitygap.records import (
@@ -292,8 +293,9 @@ def _of_rounds(
         records = [ledger.record(by_round[k][i]) for i in range(n)]
         values.append(float(score_observed(task, records, ledger.arena).mean()) - float(rounds[k]))
     head = ledger.head()
+    names = platform_in_words(head.target, head.label), platform_in_words(str(plan["source"]), "")
     return advise_on(
-        [(head.target, str(plan["source"]), np.array(values))],
+        [(*names, np.array(values))],
         test=test,
         score=task.score_name,
         label=head.label,

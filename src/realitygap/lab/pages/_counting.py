@@ -140,9 +140,9 @@ class Counting:
         with ui.row().classes("lab-row"):
             for each in trials:
                 is_chosen = each.number == chosen
-                ui.button(
-                    f"{each.number}, {each.pen}", on_click=lambda number=each.number: self.choose(number)
-                ).props(f"{'unelevated' if is_chosen else 'outline'} no-caps dense padding='4px 10px'")
+                ui.button(_name_of(each), on_click=lambda number=each.number: self.choose(number)).props(
+                    f"{'unelevated' if is_chosen else 'outline'} no-caps dense padding='4px 10px'"
+                )
 
     def _show_counted(self, listed: list[CountedTrial]) -> None:
         """Show the scores that can be undone."""
@@ -152,7 +152,7 @@ class Counting:
         with ui.expansion(f"Scored, not closed: {len(counted)}").classes("lab-expansion"):
             for each in counted:
                 with ui.row().classes("lab-row"):
-                    ui.label(f"Trial {each.number}, {each.pen}, by {each.first}")
+                    ui.label(f"{_name_of(each)}, by {each.first}")
                     ui.button("Undo", on_click=lambda number=each.number: self._undo(number)).props(
                         f'flat dense no-caps aria-label="Undo the score of trial {each.number}"'
                     )
@@ -164,7 +164,7 @@ class Counting:
         await self.choose(number)
 
     def _corrections(self, listed: list[CountedTrial]) -> None:
-        closed = {each.number: f"Trial {each.number}, {each.pen}" for each in listed if each.trial.is_closed}
+        closed = {each.number: _name_of(each) for each in listed if each.trial.is_closed}
         closed = {
             number: text
             for number, text in closed.items()
@@ -183,8 +183,10 @@ class Counting:
         with ui.card().classes("lab-card").props(f'data-counting="{each.number}"'):
             with ui.row().classes("lab-row no-wrap"):
                 ui.element("span").classes("lab-pen").style(f"background: {ink_of(each.pen)}")
-                sheet = "" if each.label == "EMULATED" else f" on sheet {each.trial.sheet}"
-                ui.label(f"Trial {each.number}: the {each.pen} line{sheet}").classes("lab-section")
+                line = (
+                    "" if each.label == "EMULATED" else f": the {each.pen} line on sheet {each.trial.sheet}"
+                )
+                ui.label(f"Trial {each.number}{line}").classes("lab-section")
             hint(f"{each.title}. {_ROLES[role]}")
             for one in proposals:
                 self._show_proposal(each, role, one, is_chosen=one is chosen)
@@ -296,3 +298,8 @@ class Counting:
                 ui.button("Void trial", on_click=void).props("outline no-caps").set_enabled(
                     not each.trial.is_closed
                 )
+
+
+def _name_of(each: CountedTrial) -> str:
+    """Return the number of a trial, and its pen; an emulated robot draws on no paper."""
+    return f"Trial {each.number}" if each.label == "EMULATED" else f"Trial {each.number}, {each.pen}"

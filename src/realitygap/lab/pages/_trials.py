@@ -478,14 +478,14 @@ class _Page:
             }
             for each in found
         ]
+        has_paper = any(each.label != "EMULATED" for each in found)
         columns = [
             {"name": name, "label": label, "field": name, "align": "left"}
             for name, label in (
                 ("number", "Trial"),
                 ("label", "Label"),
                 ("code", "Code"),
-                ("sheet", "Sheet"),
-                ("pen", "Pen"),
+                *((("sheet", "Sheet"), ("pen", "Pen")) if has_paper else ()),
                 ("state", "State"),
                 ("cells", "Cells"),
                 ("said", "Notes"),

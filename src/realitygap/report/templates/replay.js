@@ -2,6 +2,10 @@
 
 const byId = (id) => document.getElementById(`replay-${id}`);
 const data = JSON.parse(byId("data").textContent);
+if (!globalThis.DecompressionStream) {
+  byId("why").textContent = "This browser cannot unpack the trials. Open the page with Chrome 103, Firefox 113, Safari 16.4, or newer.";
+  return;
+}
 const packed = new Blob([Uint8Array.from(atob(data.bytes), (letter) => letter.charCodeAt(0))]);
 const unpacked = packed.stream().pipeThrough(new DecompressionStream("deflate-raw"));
 const bytes = new Uint8Array(await new Response(unpacked).arrayBuffer()); // of all trials

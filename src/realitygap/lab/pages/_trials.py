@@ -123,8 +123,9 @@ class _Page:
         with ui.element("section").props('aria-label="Current step"').classes("lab-current"):
             self._asked.show()
         with self._fold("Score") as self._score_fold:
+            # Before the wait, in which the page may be sent: an element that gets a listener later is drawn again.
+            self._score_fold.on("after-show", js_handler=f"() => {_TO_GRID}")
             await self._counting.show()
-        self._score_fold.on("after-show", js_handler=f"() => {_TO_GRID}")
         with self._fold("Robot") as self._robot_fold:
             for part in (self._robot, self._ending):
                 part.show()

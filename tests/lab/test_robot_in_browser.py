@@ -245,9 +245,7 @@ def test_thymio_in_playground_is_driven_with_its_own_sensors(visit):
 def test_lost_link_disables_the_pad_and_keeps_the_last_readings_with_their_age(visit):
     page = visit("robot")
     with serve_tcp(Emulator("s2"), speed=20) as server:
-        page.get_by_text("Another port").click()
-        page.get_by_label("Port", exact=True).fill(server.name)
-        page.get_by_role("button", name="Connect", exact=True).click()
+        connect_to(page, server.name)
         page.get_by_text("Standing", exact=True).wait_for()
         assert page.locator(".lab-chip").inner_text() == f"Robot on {server.name}"
     page.locator(".lab-robot-silent .lab-chip", has_text="no readings").wait_for()

@@ -17,8 +17,9 @@ from realitygap.errors import StudyError
 from realitygap.lab import open_lab
 from realitygap.lab._class import PERIOD_S, Word
 from realitygap.lab._class_results import read_drives
-from realitygap.lab._class_turns import CLASS, SharedRobot, Turns
+from realitygap.lab._class_turns import Turns
 from realitygap.lab._control import RobotControl, Visitor
+from realitygap.lab._shared_robot import CLASS, SharedRobot
 from realitygap.lab.pages._class import _Board, _Class
 from realitygap.world import Pose, paper_arena
 

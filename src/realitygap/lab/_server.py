@@ -205,9 +205,10 @@ def _prepare(
     from nicegui import run, ui
 
     from ._class import Classroom
-    from ._class_turns import SharedRobot, Turns
+    from ._class_turns import Turns
     from ._connections import Strangers, guarded_protocol, most_strangers
     from ._lab import Lab
+    from ._shared_robot import SharedRobot
     from .pages import add_pages
 
     lab = Lab(root, allow_code=allow_code)

@@ -224,12 +224,14 @@ def emulated() -> Iterator[tuple[str, str]]:
 
 
 def open_advanced(page, field) -> None:
-    """Open the section Advanced, if there is one, so that a field is seen."""
+    """Open the section Advanced, if there is one, so that a field is seen: a form that is drawn again closes it."""
     advanced = page.get_by_text("Advanced", exact=True)
-    advanced.or_(field).first.wait_for()
-    if not field.is_visible():
+    for _ in range(60):
+        advanced.or_(field).first.wait_for()
+        if field.is_visible():
+            return
         advanced.first.click()
-        field.wait_for()
+        page.wait_for_timeout(1000)
 
 
 def open_fold(page, title) -> None:

@@ -88,6 +88,8 @@ class Child:
         pipe = self._process.stdout
         with contextlib.suppress(OSError, ValueError):
             for line in pipe or ():
+                if not line.endswith("\n"):  # the process ended in the middle of a message
+                    break
                 try:
                     self._hear(from_line(line))
                 except Exception:  # a process that is not heard to its end could not be ended

@@ -236,9 +236,10 @@ class _Board:
             with ui.column().classes("lab-cards"):
                 self._title = section("").classes("class-heading")
                 self._results = ui.html("", sanitize=False)
-                self._empty = hint(
-                    "Scan the code, enter a name, and practice. Results appear when a round starts."
-                )
+                join = "Scan the code and enter a name."
+                if not isinstance(room, Turns):
+                    join = "Scan the code, enter a name, and practice."
+                self._empty = hint(f"{join} Results appear when a round starts.")
         self._look()
         ui.timer(0.25, self._look)
 

@@ -173,6 +173,8 @@ def lab_port() -> Iterator[int]:
 
 @pytest.fixture
 def lab(tmp_path: Path, request: pytest.FixtureRequest, lab_port: int) -> Iterator[RunningLab]:
+    if "emulated" in request.fixturenames:  # a lab that ends waits for its robot, so the robot ends after it
+        request.getfixturevalue("emulated")
     running = RunningLab(tmp_path / "studies", is_forking=not hasattr(request, "param"), port=lab_port)
     running.start()
     yield running

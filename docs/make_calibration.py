@@ -7,7 +7,8 @@ and writes tables into the pages and each parameter into docs/data/calibration.c
 Measuring takes an hour, by hand:
 
     data="--out docs/data/calibration.jsonl"
-    uv run python benchmarks/calibration.py sim --n 24 --first-seed 1000 --observe track encoders cells $data
+    uv run python benchmarks/calibration.py sim --n 40 --first-seed 11000 --observe track $data
+    uv run python benchmarks/calibration.py sim --n 24 --first-seed 1000 --observe encoders cells $data
     uv run python benchmarks/calibration.py motion --n 24 --first-seed 1000 $data
     uv run python benchmarks/calibration.py contact --n 24 --first-seed 1000 $data
     uv run python benchmarks/calibration.py sensors --n 12 --first-seed 1000 $data

@@ -296,8 +296,8 @@ def test_parameters_that_the_page_of_inference_calls_missed_are_those_held_too_s
         for part in parts.values()
         if make_calibration.chance(part) <= 0.05
     ]
-    assert len(seldom) == 9
-    assert set(seldom) == {17, 18}
+    assert len(seldom) == 7
+    assert set(seldom) == {17, 18, 32}
     n_parameters = sum(len(parts) for parts in held.values())
     least = min(make_calibration.chance(part) for parts in held.values() for part in parts.values())
     assert n_parameters == 89

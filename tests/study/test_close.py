@@ -13,7 +13,7 @@ import pytest
 from realitygap.errors import RealityGapError, RecordError, StudyError
 from realitygap.gap import GapSide, measure_change
 from realitygap.orders import CloseOrder, read_order
-from realitygap.records import read_observations, trial_to_dict
+from realitygap.records import Ledger, read_observations, trial_to_dict
 from realitygap.report import write_closed_gap
 from realitygap.study import amend_design, close_gap, design_report
 from tests.forks import fork_context
@@ -132,12 +132,16 @@ def test_a_locked_design_holds_all_three_parts_until_it_is_amended(folder):
     assert "Deviations from the locked plan: none." in locked
     report = design_report("closed")
     assert report.design.design["command"] == "close"
+    assert report.progress == "8 scored trials"  # 2 controllers in 2 trials, and 4 trials of the calibration
     assert any(report.design.sha256 in note for note in locked)
     assert notes("closed") == locked
     with pytest.raises(StudyError, match=r"margin is 0\.5"):
         notes("closed", margin=0.5)
     amend_design("closed", "a margin that matters", {"margin": "0.5"})
     assert any("a margin that matters" in note for note in notes("closed", margin=0.5))
+    with Ledger.open(Path("closed/fit.trials.sqlite")) as trials:
+        trials.void(2, "the robot was touched")
+    assert any("fit.trials.sqlite" in deviation for deviation in design_report("closed").deviations)
     assert not any("locked" in note for note in notes("plain"))
     with pytest.raises(RecordError, match="before the first one"):
         notes("plain", lock=True)

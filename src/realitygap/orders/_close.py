@@ -28,8 +28,8 @@ class CloseOrder(PairOrder):
     trials and other controllers, so both gaps are of trials that no fit has seen. The folder has all trials of the
     target, the calibration (fit.toml), and the page (report.html). Run the same command again to resume.
 
-    With --lock, the design of all three parts is locked in design.sqlite. The controllers still take turns in a fixed
-    order, which is random for `gap --lock`.
+    With --lock, the design of all three parts is locked in design.sqlite. The order of the controllers in
+    a round stays fixed. It is random with `gap --lock`.
 
     Example: realitygap close sim twin:worn-1.toml
 

@@ -168,7 +168,7 @@ def _adopted(order: CloseOrder, say: Say | None) -> CloseOrder:
             )
         order = order.model_copy(update={"observe": observe})
         _adopt(order.folder, order)
-        design = design_of(order, target, score=order.task or "coverage")
+        design = design_of(order, target, score=order.task or "")
         hold_folder_to_design(order.folder, target, design, lock=order.lock, say=say or (lambda _: None))
     return order
 

@@ -200,7 +200,7 @@ def hold_folder_to_design(
 
 
 def open_design(source: Path | str, *, writable: bool = True) -> Ledger:
-    """Open the ledger with the design of trials: that of a file, of a study, or of the folder of a transfer."""
+    """Open the ledger with the design of a file, or of the folder of a study, a transfer, or a closed gap."""
     path = Path(source)
     return open_ledger(path / DESIGN_NAME if (path / DESIGN_NAME).exists() else path, writable=writable)
 
@@ -393,10 +393,10 @@ def driven_trials(ledger: Ledger) -> list[tuple[str, DrivenTrial]]:
     """Return the trials of a design, and a name of the file of each; empty if it is the file of the design."""
     if ledger.path.name != DESIGN_NAME:
         return [("", trial) for trial in ledger.driven()]
-    trials = []
-    for path in sorted(ledger.path.parent.glob("*/*.sqlite")):
+    trials, folder = [], ledger.path.parent
+    for path in sorted(set(folder.rglob("*.sqlite")) - {ledger.path}):
         with Ledger.open(path, writable=False) as file:
-            trials += [(f" in {path.parent.name}/{path.name}", trial) for trial in file.driven()]
+            trials += [(f" in {path.relative_to(folder).as_posix()}", trial) for trial in file.driven()]
     return trials
 
 

@@ -226,14 +226,12 @@ def emulated() -> Iterator[tuple[str, str]]:
 
 
 def open_advanced(page, field) -> None:
-    """Open the section Advanced, if there is one, so that a field is seen: a form that is drawn again closes it."""
+    """Open the section Advanced, unless the field is seen."""
     advanced = page.get_by_text("Advanced", exact=True)
-    for _ in range(60):
-        advanced.or_(field).first.wait_for()
-        if field.is_visible():
-            return
+    advanced.or_(field).first.wait_for()
+    if not field.is_visible():
         advanced.first.click()
-        page.wait_for_timeout(1000)
+    field.wait_for()
 
 
 def open_fold(page, title) -> None:

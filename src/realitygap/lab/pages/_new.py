@@ -273,9 +273,8 @@ class _Page:
             for field in condition_fields():
                 hint(f"{_COLUMNS[field.place.partition('.')[2]]}: {field.description}")
         self._show_conditions()
-        with ui.expansion("Advanced", value=self._is_open, on_value_change=self._open).classes(
-            "lab-expansion"
-        ):
+        self._advanced = ui.expansion("Advanced", value=self._is_open, on_value_change=self._open)
+        with self._advanced.classes("lab-expansion"):
             ui.input(placeholder="Filter settings by name or meaning", on_change=self._search).props(
                 'outlined dense clearable debounce=200 aria-label="Filter settings"'
             ).classes("lab-wide")
@@ -291,8 +290,11 @@ class _Page:
                 self._boxes.append((" ".join(f"{f.place} {f.description}" for f in rest).lower(), box))
 
     def _open(self, event: events.ValueChangeEventArguments[bool]) -> None:
-        """Remember whether advanced settings are shown, for the next time that the form is drawn."""
-        self._is_open = event.value
+        """Remember whether advanced settings are shown, for the next time that the form is drawn.
+
+        A press of a section that was just drawn again counts for the new one.
+        """
+        self._is_open = self._advanced.value = event.value
 
     def _search(self, event: events.ValueChangeEventArguments[str | None]) -> None:
         wanted = (event.value or "").lower()

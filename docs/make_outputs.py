@@ -10,6 +10,7 @@ In README.md and docs/**/*.md the blocks of a document are run in their order, i
 * ```python: is executed; where it has `>>>`, its outputs are compared as by doctest.
 * any block below a comment `<!-- file: NAME -->`: is written to NAME first.
 * a block below a comment that begins with `<!-- not run: `, and a reason, is left alone.
+* in a block below a comment `<!-- within 2 %: REASON -->`, numbers with a point may differ that much.
 
 `tests/test_docs.py` does the same without writing.
 """
@@ -35,7 +36,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 COLUMNS = 80
 BLOCK = re.compile(
-    r"(?:^<!-- (?P<mark>file|not run): (?P<text>.*?) -->\n+)?^```(?P<kind>[a-z]+)\n(?P<body>.*?)^```$",
+    r"(?:^<!-- (?P<mark>file|not run|within 2 %): (?P<text>.*?) -->\n+)?^```(?P<kind>[a-z]+)\n(?P<body>.*?)^```$",
     re.MULTILINE | re.DOTALL,
 )
 # What differs from one run and machine to the next.
@@ -44,6 +45,8 @@ VOLATILE = [
     (re.compile(r"\b\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\+00:00"), "DATE"),
     (re.compile(r"(Written: .*report\.html) \([\d.]+ s\)"), r"\1 (T s)"),
 ]
+FRACTION = re.compile(r"\d+\.\d+")
+NEARLY = 0.02
 # What stands where a terminal would have the progress bar.
 STARTING = re.compile(r"^Compiling or loading the kernels .*\n+", re.MULTILINE)
 
@@ -101,7 +104,7 @@ def rewrite(text: str, name: str) -> tuple[str, list[str]]:
                 Path(block.text).write_text(body, "utf-8")
             elif block.mark != "not run" and block.kind == "console":
                 body = run_console(body)
-                changes = differences(block.body, body, where)
+                changes = differences(block.body, body, where, nearly=block.mark == "within 2 %")
                 problems += changes
                 body = body if changes else block.body  # no new times where nothing else is new
             elif block.mark != "not run" and block.kind == "python":
@@ -199,16 +202,27 @@ def run_python(body: str, namespace: dict[str, object], where: str) -> list[str]
     return [f"{where}: {said.getvalue()}"] if runner.failures else []
 
 
-def differences(written: str, now: str, where: str) -> list[str]:
-    """A diff of two blocks, times and rates apart."""
+def differences(written: str, now: str, where: str, *, nearly: bool = False) -> list[str]:
+    """A diff of two blocks, times and rates apart, and numbers apart that are `nearly` the same."""
     for pattern, word in VOLATILE:
         written, now = pattern.sub(word, written), pattern.sub(word, now)
-    if written == now:
+    if written == now or (nearly and are_near(written, now)):
         return []
     diff = difflib.unified_diff(
         written.splitlines(), now.splitlines(), "as written", "as it is now", lineterm=""
     )
     return [f"{where}:\n" + "\n".join(diff)]
+
+
+def are_near(written: str, now: str) -> bool:
+    """Whether two texts differ in nothing but numbers with a point, by 2 % or one in the last digit."""
+    if FRACTION.split(written) != FRACTION.split(now):
+        return False
+    pairs = zip(FRACTION.findall(written), FRACTION.findall(now), strict=True)
+    return all(
+        abs(float(a) - float(b)) <= max(NEARLY * float(a), 1.01 * 10.0 ** -len(a.partition(".")[2]))
+        for a, b in pairs
+    )
 
 
 def main() -> int:

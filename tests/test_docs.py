@@ -666,3 +666,17 @@ def test_notebooks_are_stored_without_outputs(path):
     cells = [cell for cell in json.loads(path.read_text("utf-8"))["cells"] if cell["cell_type"] == "code"]
     assert cells
     assert all(cell["outputs"] == [] and cell["execution_count"] is None for cell in cells)
+
+
+@pytest.mark.parametrize(
+    ("now", "is_near"),
+    [
+        ("drive.gain 1.031 m", True),
+        ("drive.gain 1.011 m", True),
+        ("drive.gain 1.06 m", False),
+        ("drive.gain 1.03 cm", False),
+        ("drive.gain 1.03 m 0.1", False),
+    ],
+)
+def test_fitted_numbers_of_a_page_may_differ_by_two_percent(now, is_near):
+    assert make_outputs.are_near("drive.gain 1.030 m", now) == is_near

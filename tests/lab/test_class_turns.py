@@ -197,6 +197,22 @@ def test_lecturer_counts_the_cells_of_a_robot_that_nobody_observes(course, tmp_p
     assert "lab-label-real" in _Board(_Class(None, course.room))._list()
 
 
+def test_field_for_the_count_is_not_drawn_again_when_a_student_joins(course):
+    """The lecturer may be typing."""
+    course.join("Ada")
+    course.room.start_round()
+    course.room.start_turn()
+    course.pass_time(2.2)
+    board = _Board(_Class(None, course.room))
+    drive, others = board._uncounted(), board._state()
+    assert drive is not None
+    course.join("Ben")
+    assert board._uncounted() == drive
+    assert board._state() != others
+    course.room.count(drive, 31)
+    assert board._uncounted() is None
+
+
 def test_clock_of_an_observed_robot_starts_when_it_is_at_its_start(tmp_path):
     course = TurnsClass(tmp_path, FakeHand(paper_arena()))
     ada = course.join("Ada")

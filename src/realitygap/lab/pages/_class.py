@@ -231,6 +231,8 @@ class _Board:
                 ui.label(room.address.partition("://")[2]).classes("class-address")
                 self._controls = Part(self._state, self._show_controls)
                 self._controls.show()
+                self._counting = Part(self._uncounted, self._show_count)
+                self._counting.show()
                 self._removing = Part(self._names, self._show_names)
                 self._removing.show()
             with ui.column().classes("lab-cards"):
@@ -245,6 +247,7 @@ class _Board:
 
     def _look(self) -> None:
         self._controls.look()
+        self._counting.look()
         self._removing.look()
         self._title.text, self._results.content = self._heading(), self._list()
         self._empty.set_visibility(not self._room.drives())
@@ -272,8 +275,10 @@ class _Board:
             room.driver and room.driver.name,
             names,
             room.shared.problem,
-            room.uncounted and room.uncounted.name,
         )
+
+    def _uncounted(self) -> Drive | None:
+        return self._room.uncounted if isinstance(self._room, Turns) else None
 
     @property
     def _problem(self) -> str:
@@ -315,8 +320,6 @@ class _Board:
             with ui.row().classes("lab-row"):
                 ui.label(room.label).classes(f"lab-badge lab-label-{room.label.lower()}")
                 ui.label("All students drive this robot, in turns.")
-        if (drive := room.uncounted) is not None:
-            self._show_count(room, drive)
         if room.driver is not None:
             ui.label(f"{room.driver.name} is driving.").props('role="status"')
         elif room.queue:
@@ -332,8 +335,11 @@ class _Board:
         if waiting:
             hint(f"Then: {', '.join(student.name for student in waiting)}")
 
-    def _show_count(self, room: Turns, drive: Drive) -> None:
+    def _show_count(self, drive: Drive | None) -> None:
         """Ask for the cells of a drive that nobody observed."""
+        room = self._room
+        if drive is None or not isinstance(room, Turns):
+            return
         with ui.row().classes("lab-row"):
             cells = ui.number(f"Cells of {drive.name}", min=0, max=room.arena.grid.n_cells, step=1)
             ui.button("Save cells", on_click=lambda: try_now(lambda: room.count(drive, cells.value))).props(

@@ -37,11 +37,10 @@ def main(command: list[str]) -> int:
 
 def descendants(pid: int) -> list[int]:
     """Return the processes that a process has begun, and those that they have."""
-    children = [
-        int(child)
-        for thread in Path(f"/proc/{pid}/task").glob("*/children")
-        for child in content(thread).split()
-    ]
+    threads: list[Path] = []
+    with contextlib.suppress(OSError):  # it has ended
+        threads = list(Path(f"/proc/{pid}/task").iterdir())
+    children = [int(child) for thread in threads for child in content(thread / "children").split()]
     return children + [below for child in children for below in descendants(child)]
 
 

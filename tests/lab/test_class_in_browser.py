@@ -86,6 +86,19 @@ def test_driving_fits_the_screen_of_a_phone(student):
         assert box["y"] + box["height"] <= PHONE[1], part
 
 
+def test_name_that_is_entered_without_a_link_joins_when_the_link_is_back(student):
+    is_away = [True]
+    student.route_web_socket(
+        "**" + CLASS_SOCKET, lambda route: route.close() if is_away[0] else route.connect_to_server()
+    )
+    student.reload()
+    student.locator(".class-offline").wait_for()
+    student.fill("#who", "Ada")
+    student.get_by_role("button", name="Join").click()
+    is_away[0] = False
+    expect(student.locator("#name")).to_have_text("Ada")
+
+
 def test_phone_that_loads_its_page_again_keeps_its_name(student):
     student.fill("#who", "Ada")
     student.get_by_role("button", name="Join").click()

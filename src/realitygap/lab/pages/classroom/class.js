@@ -3,7 +3,7 @@ import player from "/lab-player/player.js";
 import drivePad from "/class/drive_pad.js";
 
 const find = (id) => document.getElementById(id), main = find("class");
-let socket = null, pads = 0;
+let socket = null, pads = 0, wanted = ""; // a name that the lab has not confirmed
 const send = (kind, more = {}) => socket?.readyState === WebSocket.OPEN && socket.send(JSON.stringify({ kind, ...more }));
 
 // the player of trials, in which the robot is live, or its drive is compared with evolution
@@ -46,7 +46,7 @@ find("join").addEventListener("submit", (event) => {
   const most = Number(find("who").dataset.most), length = [...name].length;
   const problem = !name ? "Enter a name, then press Join." : length > most ? `At most ${most} letters. You entered ${length}.` : "";
   find("problem").textContent = problem;
-  if (!problem) send("join", { name });
+  if (!problem) send("join", { name: (wanted = name) });
   else find("who").focus();
 });
 
@@ -58,6 +58,7 @@ const WORDS = {
 };
 function takeClass(news) {
   const { phase, name, place, n, evolution, scene, trials, live, words } = news;
+  if (name) wanted = "";
   main.dataset.phase = name ? phase : "joining";
   Object.assign(main.dataset, { compares: news.compares, watches: news.watches, observed: news.is_observed });
   find("name").textContent = name || "realitygap";
@@ -80,7 +81,10 @@ const take = { class: takeClass, now: takeNow, full: ({ text }) => { find("words
 function connect() {
   socket = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/class/ws`);
   socket.addEventListener("message", ({ data }) => { const news = JSON.parse(data); take[news.kind](news); });
-  socket.addEventListener("open", () => main.classList.remove("class-offline"));
+  socket.addEventListener("open", () => {
+    main.classList.remove("class-offline");
+    if (wanted) send("join", { name: wanted }); // it was entered while there was no link
+  });
   socket.addEventListener("close", ({ code }) => {
     setPad(true);
     main.classList.add("class-offline");

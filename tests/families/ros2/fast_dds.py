@@ -212,6 +212,11 @@ class FastRobot(ClosedOnExit):
             self._process.stdin.flush()
             return self._read()
 
+    @property
+    def process_id(self) -> int:
+        """The number of the robot's process, for tests that stop or kill it."""
+        return self._process.pid
+
     def wait_matched(self, *topics: str, peers: int = 1) -> None:
         """Wait until each of these topics has this number of peers."""
         wait_until(lambda: all(self.ask("endpoints")[topic][0] == peers for topic in topics))

@@ -170,6 +170,8 @@ def words_of(annotation: Any) -> str:
         if parts[-1] is Ellipsis:
             return "texts" if parts[0] is str else "numbers"
         return f"{len(parts)} numbers"
+    if origin is dict:
+        return "table"
     return {bool: "true or false", int: "whole number", float: "number", str: "text"}[annotation]
 
 

@@ -60,6 +60,7 @@ def test_the_issue_s_robots_are_there():
         "e-puck",
         "thymio",
         "thymio-playground",
+        "turtlebot3-burger",
     }
 
 

@@ -72,7 +72,7 @@ def _measured(order: CalibrateOrder, camera: str | None, *, quiet: bool) -> Cali
     from ._calibration_operator import CalibrationOperator
 
     robot = order.robot or ""
-    base = order.base or realitygap.platforms.class_of(robot).base_robot
+    base = order.base or realitygap.platforms.base_robot_of(robot)
     if order.observe is None and camera is not None:
         order = order.model_copy(update={"observe": "track"})
     where, model = realitygap.world.load_arena(order.arena), realitygap.world.load_robot(base)

@@ -6,16 +6,19 @@ Importing this package lets pyserial open ports whose names begin with `emulator
 from ._emulated import MILLISECOND, SECOND, EmulatedRobot, nanoseconds
 from ._port import EmulatedPort, number_in, open_arena, register
 from ._serve import Server, WitnessDoor, serve_pty, serve_tcp
-from ._witness import Witness, cells_at_times, connect_witness
+from ._walls import Walls
+from ._witness import DirectWitness, Witness, cells_at_times, connect_witness
 
 register()
 
 __all__ = [
     "MILLISECOND",
     "SECOND",
+    "DirectWitness",
     "EmulatedPort",
     "EmulatedRobot",
     "Server",
+    "Walls",
     "Witness",
     "WitnessDoor",
     "cells_at_times",

@@ -13,7 +13,7 @@ import numpy as np
 
 from realitygap.errors import StudyError
 from realitygap.orders import CalibrateOrder
-from realitygap.platforms import class_of, platform_of
+from realitygap.platforms import base_robot_of, platform_of
 from realitygap.records import NO_LINE, TrialRecord, existing_trials, read_observations, those_that_count
 from realitygap.report import save_sensor_figure
 from realitygap.study import (
@@ -130,7 +130,7 @@ def calibrate(channel: Channel, work: messages.CalibrationWork) -> None:
     """Drive the missing trials of a calibration, fit, and write the calibration."""
     order = CalibrateOrder(**work.order)
     out, platform = order.out or Path(), order.robot or ""
-    arena, robot = load_arena(order.arena), load_robot(order.base or class_of(platform).base_robot)
+    arena, robot = load_arena(order.arena), load_robot(order.base or base_robot_of(platform))
     is_led = order.witness is None and platform_of(platform).needs_person
     growing = _Growing(channel, out.with_suffix(".trials.sqlite"), arena, robot)
     try:

@@ -17,6 +17,7 @@ from ._repeats import retry_genomes, score_genomes
 from ._settings import PlatformSettings
 from ._simulated import SimTarget
 from ._spec import (
+    base_robot_of,
     class_of,
     described_platform,
     is_physical,
@@ -72,6 +73,7 @@ __all__ = [
     "allow_code",
     "as_numbers",
     "as_sim",
+    "base_robot_of",
     "built_in_platforms",
     "class_of",
     "close_twins",

@@ -85,6 +85,11 @@ class PlatformSettings(Settings):
         return cls(**({cls.rest_setting: rest} if rest else {}))
 
     @classmethod
+    def base_robot_at(cls, rest: str) -> str:
+        """Return the robot file that calibrations of the robot at `NAME:REST` build on."""
+        return cls.base_robot
+
+    @classmethod
     def kind_of_file(cls, path: Path) -> str:
         """Return the kind of a file that `NAME:FILE` can name, such as twin; empty for other files."""
         return ""

@@ -43,6 +43,15 @@ def class_of(spec: str) -> type[Platform]:
     return found
 
 
+def base_robot_of(spec: str) -> str:
+    """Return the robot file that calibrations of the platform that a user named build on.
+
+    Raises:
+        StudyError: There is no such platform.
+    """
+    return class_of(spec).base_robot_at(spec.partition(":")[2])
+
+
 def known_specs() -> tuple[str, ...]:
     """Return the ways to name platforms, those of other packages by their names alone."""
     own = [spec for each in built_in_platforms() for spec in each.specs()]

@@ -31,6 +31,7 @@ from ._ports import (
 from ._recorded_robot import RecordedRobot
 from ._recording import Recording, read_recording
 from ._recording_mcap import export_mcap
+from ._stall import StallRule
 
 __all__ = [
     "EXITS",
@@ -49,6 +50,7 @@ __all__ = [
     "RecordedRobot",
     "Recording",
     "Robot",
+    "StallRule",
     "SystemClock",
     "Terminal",
     "VirtualClock",

@@ -10,7 +10,7 @@ from realitygap._wording import change_verdict, claims, counted, platform_in_wor
 from realitygap.errors import StudyError
 from realitygap.gap import GapChange, measure_change
 from realitygap.orders import ORDER_FILE, CalibrateOrder, CloseOrder, GapOrder, takes_order
-from realitygap.platforms import class_of, open_target, platform_of
+from realitygap.platforms import base_robot_of, open_target, platform_of
 from realitygap.records import refuse_links, sees, write_whole
 from realitygap.trials import Pulse
 from realitygap.world import Calibration, load_arena, load_robot, read_calibration
@@ -205,7 +205,7 @@ def _adopt(folder: Path, order: CloseOrder) -> None:
 
 def _base_of(order: CloseOrder) -> str:
     """Return the robot on whose numbers the calibration builds."""
-    return order.sim.partition(":")[2] or class_of(order.target).base_robot
+    return order.sim.partition(":")[2] or base_robot_of(order.target)
 
 
 def _calibrated(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from realitygap.errors import StudyError
-from realitygap.platforms import DEFAULT_ROBOT, platform_class, platform_names, split_spec
+from realitygap.platforms import DEFAULT_ROBOT, base_robot_of, platform_names, split_spec
 from realitygap.records import OBSERVATIONS, Ledger, ObservationsHead, Observe, open_saved_trials, sees
 from realitygap.tasks import Task
 from realitygap.trials import Target
@@ -16,7 +16,7 @@ def observations_head(target: Target, observe: Observe, robot: str | None = None
     """Return the head of a file of trials on a target. Default robot: that of its platform."""
     name, _ = split_spec(target.name)
     if robot is None:
-        robot = platform_class(name).base_robot if name in platform_names() else DEFAULT_ROBOT
+        robot = base_robot_of(target.name) if name in platform_names() else DEFAULT_ROBOT
     arena = target.arena.to_dict()
     return ObservationsHead(target.name, target.label, robot, arena, target.step_s, observe, target.identity)
 

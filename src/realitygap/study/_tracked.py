@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from realitygap._wording import fixed
 from realitygap.errors import StudyError
+from realitygap.platforms import base_robot_of
 from realitygap.records import (
     LEDGER_NAME,
     PATH_PARTS,
@@ -113,7 +114,12 @@ def trial_in(ledger: Ledger, source: str | Path, number: int) -> TrialToTrack:
     )
     platform = condition.on.at_port(sittings[-1]["port"]) if sittings else condition.on
     head = ObservationsHead(
-        platform.spec, label or "REAL", platform.base_robot, arena.to_dict(), condition.on.command_s, "track"
+        platform.spec,
+        label or "REAL",
+        base_robot_of(platform.spec),
+        arena.to_dict(),
+        condition.on.command_s,
+        "track",
     )
     return TrialToTrack(head, observed, times, arena, number)
 

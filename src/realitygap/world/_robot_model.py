@@ -358,12 +358,15 @@ class RobotModel(Described):
         description="Light behind walls and obstacles: all, half as in Jyro, or nothing.",
     )
     looks: Looks = Looks()
+    driver: dict[str, Any] = Field(
+        {},
+        description="Settings of the driver of the robot's family, such as topics. Simulators do not use them.",
+    )
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the robot as plain values without its prose, which decides nothing; `from_dict` makes it again."""
-        return {
-            key: value for key, value in super().to_dict().items() if key not in ("description", "sources")
-        }
+        """Return the robot as plain values without what decides nothing in a simulation; `from_dict` makes it again."""
+        unused = ("description", "sources", "driver")
+        return {key: value for key, value in super().to_dict().items() if key not in unused}
 
     def _repr_svg_(self) -> str:
         return picture_of(self).to_svg()

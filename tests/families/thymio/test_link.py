@@ -6,7 +6,7 @@ from realitygap.errors import RobotError, RobotTimeout
 from realitygap.families.thymio import Thymio
 from realitygap.families.thymio import _messages as messages
 from realitygap.families.thymio._messages import Decoder, Kind, Message
-from realitygap.families.thymio._robot import StallRule
+from realitygap.robots import StallRule
 
 
 class Answering:
@@ -76,7 +76,7 @@ def test_settings_that_cannot_be_are_refused():
 
 
 def test_a_wheel_that_is_held_counts_as_stalled_after_a_while():
-    rule, targets = StallRule(), (300, -300)
+    rule, targets = StallRule(50), (300, -300)
     assert not rule.is_stalled(0.0, targets, (20, -290))
     assert not rule.is_stalled(0.2, targets, (20, -290))
     assert rule.is_stalled(0.3, targets, (20, -290))

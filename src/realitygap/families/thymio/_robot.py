@@ -11,7 +11,16 @@ from pathlib import Path
 from typing import Any
 
 from realitygap.errors import RobotError, RobotStopped, check_finite
-from realitygap.robots import EXITS, Command, Label, Observation, Port, PortDriver, check_command
+from realitygap.robots import (
+    EXITS,
+    Command,
+    Label,
+    Observation,
+    Port,
+    PortDriver,
+    StallRule,
+    check_command,
+)
 from realitygap.world import Pose
 
 from ._clock import BoardClock
@@ -50,10 +59,6 @@ _ENCODERS = ("encoder.0", "encoder.1")
 
 LEAST_TARGET = 50
 """Targets below it count as standing: measured speeds are noisy [units]."""
-SHARE = 0.3
-"""Share of its target below which a wheel counts as held."""
-STALL_S = 0.3
-"""Time for which a wheel has to be held [s]."""
 
 
 @dataclass(frozen=True)
@@ -86,35 +91,6 @@ class _Seen:
 
     values: dict[str, tuple[int, ...]]
     own: dict[str, int]
-
-
-class StallRule:
-    """A robot is stalled if a wheel has turned slower than 0.3 of its target for 0.3 s.
-
-    The numbers are chosen. The rule was not tried on a robot. A playground reports targets as speeds, so it never
-    applies there.
-    """
-
-    def __init__(self) -> None:
-        self._since: float | None = None
-
-    def is_stalled(self, now: float, targets: Sequence[int], speeds: Sequence[int]) -> bool:
-        """Return whether the robot is stalled.
-
-        Args:
-            now: The robot's time [s].
-            targets: Target speeds of both wheels [units].
-            speeds: Measured [units].
-        """
-        is_held = any(
-            abs(target) >= LEAST_TARGET and speed * (1 if target > 0 else -1) < SHARE * abs(target)
-            for target, speed in zip(targets, speeds, strict=True)
-        )
-        if not is_held:
-            self._since = None
-        elif self._since is None:
-            self._since = now
-        return self._since is not None and now - self._since >= STALL_S
 
 
 class Thymio(PortDriver):
@@ -185,7 +161,7 @@ class Thymio(PortDriver):
         self.reading_max = reading_max
         self.ground_white, self.ground_black = ground_white, ground_black
         self._selected: tuple[str, ...] = ()
-        self._stall = StallRule()
+        self._stall = StallRule(LEAST_TARGET)
         self._sums: tuple[int, int] | None = None
         self._way = [0, 0]  # sums of measured speeds since the robot was opened
         self._observed = (0.0, 0, 0)  # time and sums at the last observation
@@ -329,7 +305,7 @@ class Thymio(PortDriver):
             halted = self.description.first_free + OWN.index("halted")
             self.link.write(self.description, halted, (0,))
             self._read()
-        self._stall = StallRule()
+        self._stall = StallRule(LEAST_TARGET)
 
     def observe(self) -> Observation:
         """Read the infrared sensors, and the selected other ones."""

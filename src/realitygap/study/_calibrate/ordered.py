@@ -7,7 +7,7 @@ from pathlib import Path
 
 from realitygap.errors import DescriptionError, StudyError
 from realitygap.orders import CalibrateOrder, takes_order
-from realitygap.platforms import class_of, open_target
+from realitygap.platforms import base_robot_of, open_target
 from realitygap.records import existing_trials, is_observations, refuse_links
 from realitygap.trials import Operator, PortObserver, Pulse
 from realitygap.world import Calibration, load_arena, read_calibration
@@ -154,7 +154,7 @@ def _measured(
 ) -> Calibration:
     """Drive the trials, and fit."""
     robot = order.robot or ""
-    base = order.base or class_of(robot).base_robot
+    base = order.base or base_robot_of(robot)
     with open_target(
         robot,
         load_arena(order.arena),

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from realitygap.errors import RealityGapError
-from realitygap.platforms import SimTarget, class_of
+from realitygap.platforms import SimTarget, base_robot_of
 from realitygap.playback import MovingTrial, RobotShape
 from realitygap.records import TrialRecord
 from realitygap.trials import Target, TrialPlan
@@ -77,7 +77,7 @@ def _shape_of(platform: Target) -> RobotShape | None:
     if isinstance(platform, SimTarget):
         return RobotShape.of(platform.platform)
     try:
-        return RobotShape.of(load_robot(class_of(platform.name).base_robot))
+        return RobotShape.of(load_robot(base_robot_of(platform.name)))
     except RealityGapError:
         return None
 

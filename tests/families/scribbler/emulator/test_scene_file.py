@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from realitygap.emulator import Walls
 from realitygap.errors import RobotError
 from realitygap.families.scribbler.emulator import Emulator, open_scene
-from realitygap.families.scribbler.emulator._scene import Walls
 from realitygap.families.scribbler.emulator._view import picture
 
 from .wire import ask

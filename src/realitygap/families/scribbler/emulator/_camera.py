@@ -14,9 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from realitygap.emulator import Walls
 from realitygap.world import FloorImage
 
-from ._scene import Scene, Walls
+from ._scene import Scene
 from ._simulated import SimulatedRobot
 
 Bytes = NDArray[np.uint8]

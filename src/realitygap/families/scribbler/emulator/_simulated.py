@@ -6,11 +6,13 @@ import math
 from typing import Protocol, runtime_checkable
 
 import numpy as np
+from numpy.typing import NDArray
 
+from realitygap.emulator import Walls
 from realitygap.errors import check_finite
 from realitygap.world import Arena, Body, Pose
 
-from ._scene import Floats, Walls
+Floats = NDArray[np.float64]
 
 SCRIBBLER_BODY = Body(((0.089, 0.0795), (0.089, -0.0795), (-0.089, -0.0795), (-0.089, 0.0795)))
 """The outline of the Scribbler, 178 x 159 mm; its origin is the pen, midway between the wheels."""

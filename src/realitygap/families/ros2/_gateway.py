@@ -1,0 +1,177 @@
+"""The gateway: a separate process that speaks DDS for a driver, and stops the robot if the driver's program dies.
+
+It is run as `python -P -m realitygap.families.ros2._gateway SETTINGS`, with settings as JSON. Standard input brings
+requests, and standard output takes answers, a line of JSON each (`_lines` describes them). DDS has threads of its own,
+which end with a program that is killed. This process outlives it: a command has a life, and at its end, or at the end
+of standard input, the gateway publishes zeros.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import select
+import signal
+import sys
+import time
+from typing import Any
+
+from realitygap._limits import parse_json
+
+from ._dds import Node
+from ._lines import LIFE_S, MOST_TRAIL, REPEAT_S, TICK_S, ZEROS_S
+from ._messages import ODOMETRY, POSE, TWIST_STAMPED
+
+PIECE = 1 << 16
+LOOK_S = 1.0
+"""Time for which a look waits for others to answer [s]."""
+MOST_LINE = 1 << 16
+"""Largest length of a request [bytes]."""
+
+
+class Gateway:
+    """Serves one driver.
+
+    Args:
+        settings: `domain`, `interface`, `command` (its topic), and `topics`, types by topic.
+    """
+
+    def __init__(self, settings: dict[str, Any]) -> None:
+        self.node = Node(settings["domain"], settings["interface"])
+        self._command: str = settings["command"]
+        for topic, kind in settings["topics"].items():
+            self.node.subscribe(topic, kind)
+        self._trails: dict[str, list[list[float]]] = {}
+        self._twist = (0.0, 0.0)
+        self._until = -math.inf  # the end of the command's life
+        self._zeros_until = -math.inf
+        self._published = -math.inf
+        self._clock_offset = 0.0  # of the robot's time from this machine's
+
+    def answer(self, request: dict[str, Any]) -> dict[str, Any]:
+        """Do what a request says, and return the answer."""
+        what = request["do"]
+        if what == "drive":
+            self.drive(float(request["ahead"]), float(request["turn"]), float(request["life"]))
+            return {}
+        if what == "stop":
+            self.stop()
+            return {}
+        if what == "read":
+            self.tick()
+            trails, self._trails = self._trails, {}
+            return {"now": time.monotonic(), "topics": self.node.newest(), "trails": trails}
+        if what == "graph":
+            return {"graph": self.node.graph(), "kinds": self.node.command_kinds(self._command)}
+        raise ValueError(f"unknown request {what!r}")
+
+    def drive(self, ahead: float, turn: float, life_s: float) -> None:
+        """Publish a command [m/s, rad/s], and repeat it until its life ends [s]."""
+        self._twist = ahead, turn
+        self._until = time.monotonic() + min(life_s, LIFE_S)
+        self._publish()
+
+    def stop(self) -> None:
+        """Publish zeros, and repeat them for a while."""
+        self._twist, self._until = (0.0, 0.0), -math.inf
+        self._zeros_until = time.monotonic() + ZEROS_S
+        self._publish()
+
+    def tick(self) -> None:
+        """Take what has come, and repeat what lasts."""
+        for topic, message in self.node.take():
+            kind = self.node.kind_of(topic)
+            if kind == ODOMETRY:
+                stamp = message.header.stamp
+                self._clock_offset = stamp.sec + stamp.nanosec * 1e-9 - time.time()
+            if kind in (ODOMETRY, POSE):
+                pose = message.pose.pose if kind == ODOMETRY else message.pose
+                at, way = pose.position, pose.orientation
+                row = [time.monotonic(), at.x, at.y, yaw_of(way.x, way.y, way.z, way.w)]
+                if all(map(math.isfinite, row)):
+                    trail = self._trails.setdefault(topic, [])
+                    trail.append(row)
+                    del trail[:-MOST_TRAIL]
+        now = time.monotonic()
+        if self._twist != (0.0, 0.0) and now >= self._until:
+            self.stop()
+        elif (now < self._until or now < self._zeros_until) and now - self._published >= REPEAT_S:
+            self._publish()
+
+    def _publish(self) -> None:
+        ahead, turn = self._twist
+        self._published = time.monotonic()
+        for kind in self.node.command_kinds(self._command):
+            values: dict[str, Any] = {"linear": {"x": ahead}, "angular": {"z": turn}}
+            if kind == TWIST_STAMPED:
+                now = time.time() + self._clock_offset
+                stamp = {"sec": int(now), "nanosec": int(now % 1 * 1e9)}
+                values = {"header": {"stamp": stamp}, "twist": values}
+            self.node.publish(self._command, kind, values)
+
+    def halt(self) -> None:
+        """Publish zeros for a second: the program is gone."""
+        self.stop()
+        end = time.monotonic() + 2 * ZEROS_S
+        while time.monotonic() < end:
+            self._publish()
+            time.sleep(REPEAT_S)
+
+
+def yaw_of(x: float, y: float, z: float, w: float) -> float:
+    """Return the heading of a quaternion [rad]."""
+    return math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+
+
+def serve(gateway: Gateway, program: int) -> None:
+    """Answer requests until standard input ends, or the program is gone."""
+    held = b""
+    while True:
+        if select.select([0], [], [], TICK_S)[0]:
+            data = os.read(0, PIECE)
+            if not data:
+                return
+            *lines, held = (held + data).split(b"\n")
+            if len(held) > MOST_LINE:
+                return
+            for line in lines:
+                request = parse_json(line)
+                try:
+                    answer = gateway.answer(request)
+                except (ValueError, KeyError, TypeError) as error:
+                    answer = {"error": f"{type(error).__name__}: {error}"}
+                sys.stdout.write(json.dumps(answer | {"id": request.get("id")}) + "\n")
+                sys.stdout.flush()
+        elif os.getppid() != program:
+            return
+        gateway.tick()
+
+
+def look(settings: dict[str, Any]) -> None:
+    """Print who publishes and subscribes in a domain."""
+    node = Node(settings["domain"], settings["interface"])
+    time.sleep(LOOK_S)
+    sys.stdout.write(json.dumps(node.graph()))
+    node.close()
+
+
+def main() -> None:
+    """Serve the program that started this process, then stop the robot."""
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT):
+        signal.signal(number, signal.SIG_IGN)  # what ends the program must not end its gateway first
+    settings = parse_json(sys.argv[1])
+    if settings.get("looks"):
+        look(settings)
+        return
+    gateway = Gateway(settings)
+    if settings.get("halts"):  # another gateway was lost
+        gateway.node.wait_for_subscriber(settings["command"])
+    else:
+        serve(gateway, int(settings["program"]))
+    gateway.halt()
+    gateway.node.close()
+
+
+if __name__ == "__main__":
+    main()

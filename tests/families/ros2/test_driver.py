@@ -1,0 +1,259 @@
+"""The driver against a robot by Fast DDS: bytes, physics, and stops that nobody of us wrote."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from realitygap.emulator import Walls
+from realitygap.errors import RobotError
+from realitygap.families.ros2 import Ros2Robot
+from realitygap.robots import Command
+from realitygap.world import Pose, paper_arena
+
+from .fast_dds import FastRobot, wait_until
+
+pytest.importorskip("cyclonedds", reason="needs the Python package cyclonedds")
+pytestmark = pytest.mark.slow
+
+MOUNTS = [(0.05, 0.03, 0.5), (0.05, 0.0, 0.0), (0.05, -0.03, -0.5)]
+FILE = """
+name = "fast"
+step_s = 0.2
+[[body]]
+corner = [[0, 0]]
+radius = 0.05
+[drive]
+speed = 0.2
+track = 0.1
+[each.range]
+reach = 1.0
+response = "linear"
+cone = 0.1
+rays = 5
+{sensors}
+[encoder]
+[driver]
+family = "ros2"
+odometry = "odom"
+bump = "bumper"
+{driver}
+"""
+RANGES = 'ranges = ["range_0", "range_1", "range_2"]'
+SCAN = "[driver.scan]"
+MIDDLE = Pose(0.5, 0.4, 0.3)
+
+
+@pytest.fixture
+def connect(start_robot: Any, domain: int, tmp_path: Path) -> Any:
+    """A function that starts a robot by Fast DDS, and returns it with our driver's robot."""
+    opened: list[Ros2Robot] = []
+
+    def start(driver: str = RANGES, address: str = "/", **options: object) -> tuple[FastRobot, Ros2Robot]:
+        fast = start_robot(
+            **{"range": MOUNTS, "range_limits": (0.001, 1), "cone": 0.2, "timeout": 0} | options
+        )
+        opened.append(open_driver(tmp_path, domain, driver, address))
+        opened[-1].reset()
+        return fast, opened[-1]
+
+    yield start
+    for robot in opened:
+        robot.close()
+
+
+def open_driver(folder: Path, domain: int, driver: str = RANGES, address: str = "/") -> Ros2Robot:
+    sensors = "\n".join(f"[[range]]\nx = {x}\ny = {y}\ndirection = {direction}" for x, y, direction in MOUNTS)
+    (folder / "fast.toml").write_text(FILE.format(sensors=sensors, driver=driver))
+    return Ros2Robot(f"{address}?domain={domain}&interface=lo", robot=str(folder / "fast.toml"))
+
+
+def rests(fast: FastRobot) -> bool:
+    return fast.motors() == (0.0, 0.0)
+
+
+@pytest.mark.parametrize("driver", [RANGES, SCAN])
+@pytest.mark.parametrize("byte_order", ["little", "big"])
+def test_readings_are_those_of_the_true_pose(connect, driver, byte_order):
+    fast, robot = connect(driver, byte_order=byte_order, nothing="nan")
+    fast.place(MIDDLE)
+    walls = Walls.of(paper_arena())
+    wanted = []
+    for x, y, direction in MOUNTS:
+        at = MIDDLE.point(x, y)
+        rays = MIDDLE.heading + direction + np.linspace(-0.1, 0.1, 21)
+        wanted.append(walls.ranges(np.full(21, at[0]), np.full(21, at[1]), rays, 1.0).min())
+
+    def is_near() -> bool:
+        return bool(np.allclose(robot.observe().raw, wanted, atol=0.02))
+
+    wait_until(is_near)
+
+
+@pytest.mark.parametrize("kind", ["twist_topic", "stamped_topic"])
+def test_commands_move_it_as_odometry_tells(connect, kind):
+    other = {"twist_topic": "stamped_topic", "stamped_topic": "twist_topic"}[kind]
+    fast, robot = connect(**{kind: "cmd_vel", other: ""})
+    robot.select(robot.channels)
+    fast.place(MIDDLE)
+    robot.observe()
+    before = robot.wheels()
+    robot.drive(Command(0.5, 0.25))
+    robot.observe()
+    robot.stop()
+    wait_until(lambda: rests(fast))
+    wait_until(lambda: bool(np.hypot(*np.subtract(fast.pose()[:2], MIDDLE[:2])) > 0.01))
+    path = fast.path()
+    steps = np.hypot(*np.diff(path[:, 1:3], axis=0).T)
+    turns = np.diff(np.unwrap(path[:, 3])) * 0.05
+
+    def ways() -> Any:
+        return np.subtract(robot.wheels(), before)
+
+    wait_until(lambda: bool(np.allclose(ways(), [(steps - turns).sum(), (steps + turns).sum()], atol=0.002)))
+    counts = fast.ask("commands")
+    assert counts["stamped" if kind == "stamped_topic" else "twist"] > 0
+    assert counts["refused"] == 0
+
+
+def test_stamps_are_in_the_robots_time(connect):
+    fast, robot = connect(twist_topic="", stamped_topic="cmd_vel", max_age=0.5, clock_shift=1000)
+    fast.place(MIDDLE)
+    robot.drive(Command(0.5, 0.0))
+    wait_until(lambda: fast.ask("commands")["stamped"] > 0)
+    assert fast.ask("commands")["refused"] == 0
+
+
+def test_command_ends_with_its_life(connect):
+    fast, robot = connect()
+    fast.place(MIDDLE)
+    robot.drive(Command(0.2, 0.0))
+    wait_until(lambda: not rests(fast) or len(fast.path()) > 1)
+    wait_until(lambda: rests(fast))
+
+
+def test_robot_stops_if_its_program_is_killed(start_robot, domain, tmp_path):
+    fast = start_robot(range=MOUNTS, timeout=0)
+    open_driver(tmp_path, domain).close()
+    program = (
+        "import sys; from realitygap.families.ros2 import Ros2Robot; from realitygap.robots import Command\n"
+        f"robot = Ros2Robot('/?domain={domain}&interface=lo', robot={str(tmp_path / 'fast.toml')!r}, step_s=30)\n"
+        "robot.drive(Command(0.1, 0.0))"
+    )
+    with subprocess.Popen([sys.executable, "-c", program]) as driver:
+        wait_until(lambda: not rests(fast))
+        driver.kill()
+    wait_until(lambda: rests(fast))
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
+def test_robot_stops_if_the_gateway_dies_or_is_frozen(connect, number):
+    fast, robot = connect()
+    fast.place(MIDDLE)
+    robot.motors(0.1, 0.1)
+    wait_until(lambda: not rests(fast))
+    os.kill(robot.link.port.process_id, number)
+    with pytest.raises(RobotError, match="lost"):
+        robot.observe()
+    wait_until(lambda: rests(fast))
+
+
+def test_two_robots_in_two_namespaces_are_told_apart(start_robot, domain, tmp_path):
+    one = start_robot(range=MOUNTS, namespace="/one", timeout=0)
+    two = start_robot(range=MOUNTS, namespace="/two", timeout=0)
+    with pytest.raises(RobotError, match="ros2:/one, ros2:/two"):
+        open_driver(tmp_path, domain)
+    with open_driver(tmp_path, domain, address="/two") as robot:
+        robot.motors(0.1, 0.1)
+        wait_until(lambda: not rests(two))
+        assert rests(one)
+
+
+def test_two_robots_in_one_namespace_are_refused(start_robot, domain, tmp_path):
+    start_robot(range=MOUNTS)
+    start_robot(range=MOUNTS)
+    with pytest.raises(RobotError, match="two robots in one namespace"):
+        open_driver(tmp_path, domain)
+
+
+@pytest.mark.parametrize(
+    ("options", "driver", "message"),
+    [
+        ({"renamed": "odom"}, RANGES, "/odom has type .*, expected nav_msgs/msg/Odometry"),
+        ({"rate_range": 0}, RANGES, "Nobody publishes /range_0"),
+        ({}, RANGES + '\ncommand = "wheels"', "Nobody takes commands on /wheels"),
+        ({"twist_topic": "odd", "stamped_topic": ""}, RANGES, "Nobody takes commands on /cmd_vel"),
+    ],
+)
+def test_what_is_missing_is_named(start_robot, domain, tmp_path, options, driver, message):
+    start_robot(**{"range": MOUNTS} | options)
+    with pytest.raises(RobotError, match=message):
+        open_driver(tmp_path, domain, driver)
+
+
+def test_sensor_that_falls_silent_ends_the_trial_with_its_name(connect):
+    fast, robot = connect(RANGES + "\nsilent_s = 0.5")
+    fast.ask("mute range_1")
+    with pytest.raises(RobotError, match="/range_1 is silent"):  # noqa: PT012
+        while True:
+            robot.observe()
+
+
+def test_robot_that_leaves_the_network_is_silent_and_one_that_returns_is_read(connect):
+    fast, robot = connect(RANGES + "\nsilent_s = 0.5")
+    fast.ask("leave")
+
+    def fails() -> bool:
+        try:
+            robot.observe()
+        except RobotError as error:
+            return "silent" in str(error)
+        return False
+
+    wait_until(fails)
+    fast.ask("return")
+    wait_until(lambda: not fails())
+
+
+def test_odd_messages_are_read_or_refused(connect):
+    fast, robot = connect(SCAN, rate_odom=1000, variance=0.25)
+    fast.place(MIDDLE)
+    fast.ask("scan_rays 90")
+    robot.observe()
+    fast.ask("scan_rays 2621440")
+    check = re.compile(r"2,621,440 values|is silent")
+
+    def is_refused() -> bool:
+        try:
+            robot.observe()
+        except RobotError as error:
+            return bool(check.search(str(error)))
+        return False
+
+    wait_until(is_refused)
+    fast.ask("scan_rays 360")
+    wait_until(lambda: not is_refused())
+
+
+@pytest.mark.parametrize("value", ["nan", "inf"])
+def test_range_that_is_no_number_is_nothing_in_range(connect, value):
+    fast, robot = connect(variance=0.25)
+    fast.ask(f"readings {value}")
+    wait_until(lambda: robot.observe().readings == (0.0, 0.0, 0.0))
+
+
+def test_no_program_is_left_when_it_is_closed(connect: Callable[..., Any]) -> None:
+    _, robot = connect()
+    number = robot.link.port.process_id
+    robot.close()
+    with pytest.raises(ProcessLookupError):
+        os.kill(number, 0)

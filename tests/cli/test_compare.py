@@ -110,3 +110,16 @@ def test_a_table_of_one_platform_is_refused(tmp_path):
     path.write_text("controller,platform,score\na,sim,0.5\n")
     assert "All scores are of the platform sim" in refused("compare", path)
     assert "There is no file" in refused("compare", tmp_path / "none.csv")
+
+
+def test_file_of_trials_is_refused_with_the_commands_that_compare_it(tmp_path):
+    from realitygap.records import write_observations
+    from tests.records.test_observations_file import HEAD, trial
+
+    for name in ("trials.sqlite", "trials.jsonl"):
+        file = tmp_path / name
+        write_observations(file, HEAD, [trial(0)])
+        for table in (file, f"real={file}"):
+            text = refused("compare", table)
+            assert f"gap sim recorded:{file}" in text
+            assert f"trials advise {file}" in text

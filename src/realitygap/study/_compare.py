@@ -14,6 +14,7 @@ from realitygap.gap import Comparison, ScoreGap
 from realitygap.gap import compare_scores as compare_rows
 from realitygap.logs import ScoreRow, read_scores
 from realitygap.orders import CompareOrder, takes_order
+from realitygap.records import is_observations
 
 _SIM, _REAL = "sim", "real"
 
@@ -103,6 +104,12 @@ def _read(table: str, order: CompareOrder) -> list[ScoreRow]:
     platform, equals, path = table.partition("=")
     if not equals or is_file(table):
         platform, path = "", table
+    if is_observations(path):
+        raise TableError(
+            f"{path} has trials of one platform. Expected a table of scores of two. Compare its trials with a "
+            f"simulator: realitygap gap sim recorded:{path}. Or print the comparison that it plans: realitygap trials "
+            f"advise {path}"
+        )
     return read_scores(
         Path(path), platform=platform, controller=order.controller or "", score=order.score or ""
     )

@@ -95,7 +95,13 @@ def drive(
     operator = choose_operator(port, witness, answers, path, quiet=as_json)
     with resumable("Scored trials are saved."), operated_under_camera(camera, resolved, operator) as looking:
         result = realitygap.study.drive_study(
-            resolved, port, path, operator=looking, allow_code=code_permission(allow_code), lock=lock
+            resolved,
+            port,
+            path,
+            operator=looking,
+            allow_code=code_permission(allow_code),
+            lock=lock,
+            who=who,
         )
     print_result(result, as_json=as_json)
     if not as_json:

@@ -18,6 +18,8 @@ from realitygap.records import AMENDED, RESUMED, UNBLINDED, DrivenTrial, Ledger,
 from realitygap.stats import Null, SequentialTest
 from realitygap.trials import Target
 
+from ._problems import Problems
+from ._study import StudySection, TrialsSection
 from ._targets import open_trials
 
 Unit = Literal["pair", "round", ""]
@@ -120,6 +122,7 @@ def hold_to_design(
     lock: bool,
     blind: bool = False,
     say: Callable[[str], None] | None = None,
+    who: str | None = None,
 ) -> LockedDesign | None:
     """Lock the design of an order before its first trial, or check that the order is the one that was locked.
 
@@ -129,6 +132,7 @@ def hold_to_design(
         lock: True to lock it. A design that is locked already holds without it.
         blind: True to lock it blind.
         say: Called with the hash when it was locked, before trial 1, so that it can be published.
+        who: Person who locks it. Default: the name of the account.
 
     Returns:
         The locked design; None if the order has no lock, and the file none either.
@@ -139,7 +143,7 @@ def hold_to_design(
     """
     try:
         was_locked = file.design() is not None
-        locked = _held(file, design, lock or blind, blind)
+        locked = _held(file, design, lock or blind, blind, who)
     except BaseException:
         file.close()
         raise
@@ -148,7 +152,9 @@ def hold_to_design(
     return locked
 
 
-def _held(file: Ledger, design: Mapping[str, Any], lock: bool, blind: bool) -> LockedDesign | None:
+def _held(
+    file: Ledger, design: Mapping[str, Any], lock: bool, blind: bool, who: str | None
+) -> LockedDesign | None:
     locked = file.design()
     if locked is None:
         if not lock:
@@ -157,7 +163,7 @@ def _held(file: Ledger, design: Mapping[str, Any], lock: bool, blind: bool) -> L
             raise StudyError(
                 "The trials of a recording were driven before, and a design is locked before the first trial."
             )
-        return file.lock_design(design, who=account(), version=__version__, is_blind=blind)
+        return file.lock_design(design, who=account(who), version=__version__, is_blind=blind)
     if locked.problem:
         raise RecordError(f"{file.path}: {locked.problem}. Nothing was driven. Restore the file from a copy.")
     if blind and not locked.was_blind:
@@ -332,9 +338,17 @@ def _amended_rules(design: Mapping[str, Any]) -> dict[str, Any]:
 
     Raises:
         OrderError: A setting is out of range.
+        StudyError: A setting of a study is out of range.
     """
     model = ORDERS.get(design["command"])
     if model is None:  # of a study, whose file has the settings
+        problems, settings = Problems(), design["settings"]
+        study = {"name": settings["study"], "replicates": settings["replicates"]}
+        trials = {name: value for name, value in settings.items() if name in TrialsSection.model_fields}
+        problems.check(StudySection, study, "study")
+        problems.check(TrialsSection, trials, "trials")
+        if problems.lines:
+            raise StudyError("\n".join(problems.lines))
         return {}
     given = {
         name: value for name, value in (design["names"] | design["settings"]).items() if value is not None

@@ -147,6 +147,7 @@ def drive_study(
     open_robot: OpenRobot | None = None,
     allow_code: AllowCode = False,
     lock: bool = False,
+    who: str | None = None,
 ) -> StudyResult:
     """Drive the conditions of a study that are on a robot, or what is missing of them.
 
@@ -166,6 +167,7 @@ def drive_study(
         allow_code: Permission to run Python files, as in `run_study`.
         lock: True to lock the design of these conditions before the first trial. `[trials]` decides their order, and
             whether they are blind.
+        who: Person who locks it. Default: the name of the account.
 
     Raises:
         StudyError: No condition of the study is on a robot, nobody places the robot, the folder holds another study,
@@ -181,7 +183,7 @@ def drive_study(
         _adopt(folder, study)
         ledger_path = path / LEDGER_NAME
         with Ledger.open(ledger_path) if ledger_path.exists() else Ledger.create(ledger_path) as ledger:
-            hold_to_design(ledger, _physical_design(study, port), lock=lock)
+            hold_to_design(ledger, _physical_design(study, port), lock=lock, who=who)
             physical = PhysicalStudy(study, ledger, operator, open_robot or connect_robot(port, arena), port)
             waiting = physical.carry_out()
         return StudyResult(folder, 0, 0, 0.0, _physical_result(study, folder, physical.n_driven, waiting))

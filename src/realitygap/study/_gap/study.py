@@ -204,7 +204,8 @@ def study_gap(
         if known is None or {**known.plan, "rounds": None} != {**comparison, "rounds": None}:
             file.plan_comparison(comparison)
     on_target = carry_out(target, [*plans, *more], observe, tell, file, locked)
-    deviations = check_unblinded(results)
+    _, is_recorded, recorded = target.name.partition("recorded:")
+    deviations = check_unblinded(recorded if is_recorded else results)
     source, pace_notes = _paced(source, target, on_target) if at_its_pace else (source, ())
     own = [replace(plan, number=plan.number - TARGET_FROM) for plan in plans]
     in_source = carry_out(source, own, seen, tell)

@@ -18,6 +18,8 @@ from hypothesis import strategies as st
 from realitygap.errors import RealityGapError, RecordError, StudyError
 from realitygap.evolution import NeatSettings, Population
 from realitygap.lab._counts import Counts
+from realitygap.lab._lab import Lab
+from realitygap.lab._mistakes import FormError
 from realitygap.lab._saved import SavedFile
 from realitygap.orders import OrderError
 from realitygap.records import (
@@ -221,9 +223,10 @@ def test_no_view_shows_results_by_arm_while_the_design_is_blind(two, tmp_path):
         texts[name] = answered(*command)
         assert "blind" in texts[name], (name, texts[name])
     saved = SavedFile(file).read()
-    texts["lab"] = repr(saved) + " ".join(trial.name for trial in saved.trials) + " ".join(saved.looks)
+    texts["lab"] = repr(saved) + " ".join(trial.name for trial in saved.trials)
+    texts["lab"] += " ".join(saved.looks) + " ".join(saved.design.sentences)
     assert "Stop: the planned end is reached." in texts["lab"]
-    assert "Deviations from the locked plan: none." in saved.looks
+    assert "Deviations from the locked plan: none." in saved.design.sentences
     for call in (
         lambda: write_fieldtrial(file, tmp_path / "z.csv", 0.1),
         lambda: advise(file, null="mean"),
@@ -434,7 +437,8 @@ def test_blind_gap_shows_no_controller_until_it_is_unblinded(tmp_path):
     with pytest.raises(StudyError, match="2 of 2 rounds complete") as end:
         gap_between("sim", "sim:scribbler-s1", **order, blind=True)
     file = order["results"]
-    texts = [str(end.value), *(repr(each) for each in SavedFile(file).read().looks)]
+    saved = SavedFile(file).read()
+    texts = [str(end.value), *saved.looks, *saved.design.sentences]
     views = (("list",), ("list", "--json"), ("show",), ("show", "--json"), ("show", "2", "--json"))
     for action, *rest in (*views, ("advise",), ("advise", "--json")):
         texts.append(answered("trials", action, file, *rest))
@@ -444,7 +448,12 @@ def test_blind_gap_shows_no_controller_until_it_is_unblinded(tmp_path):
         for word in (*names, '"hidden"', "controller 1", '"number": 4', "E ="):
             assert word not in text, (word, text)
     unblind_design(file, "all trials are driven")
-    assert gap_between("sim", "sim:scribbler-s1", **order).study.result.notes
+    notes = gap_between("sim", "sim:scribbler-s1", **order).study.result.notes
+    assert notes[-1].startswith("Deviations from the locked plan")
+    again = gap_between("sim", f"recorded:{file}", n_controllers=3, trials=2)
+    assert again.study.result.notes[-2:] == notes[-2:], (
+        "the report of recorded trials lists the same deviations"
+    )
 
 
 def test_calibration_and_single_controller_lock_their_rules(two, tmp_path):
@@ -486,24 +495,34 @@ def test_transfer_locks_its_rule_for_all_files_of_its_folder(tmp_path):
 
 
 def test_study_on_a_robot_locks_its_conditions_and_lists_deviations(tmp_path):
-    def drive(lock=False, **changes):
+    def drive(lock=False, who=None, **changes):
         open_robot = {"open_robot": lambda platform: FakeRobot(platform.wait_s)}
         return drive_study(
-            small_study(**changes), "fake", tmp_path, operator=Unattended(), lock=lock, **open_robot
+            small_study(**changes), "fake", tmp_path, operator=Unattended(), lock=lock, who=who, **open_robot
         )
 
-    drive(lock=True)
+    drive(lock=True, who="anna")
+    assert design_report(tmp_path).design.lock["who"] == "anna"
     assert deviations(tmp_path) == []
     with Ledger.open(tmp_path / "ledger.sqlite", writable=False) as ledger:
         assert [arm["name"] for arm in ledger.design().design["arms"]] == ["robot"]
     with pytest.raises(StudyError, match="replicates is 2, locked: 1"):
         drive(replicates="2")
+    for settings in ({"replicates": "many"}, {"replicates": "0"}, {"order": "backwards"}):
+        with pytest.raises(StudyError, match=f"{next(iter(settings))}.*expected"):
+            amend_design(tmp_path, "more runs", settings)
     amend_design(tmp_path, "more runs", {"replicates": "2"})
     drive(replicates="2")
     (amended,) = deviations(tmp_path)
     assert amended.endswith("more runs. replicates: 1 → 2.")
-    looks = Counts(tmp_path, ResultsFolder.open(tmp_path).description).looks()
-    assert looks == f"Deviations from the locked plan: {amended}"
+    counts = Counts(tmp_path, ResultsFolder.open(tmp_path).description)
+    counts.look()
+    assert counts.design.deviations == (amended,)
+    lab = Lab(tmp_path.parent)
+    with pytest.raises(FormError) as refused:
+        lab.go_on(tmp_path.name, port="emulator://s2?fluke=2", lock=True, who="anna")
+    lab.close()
+    assert list(refused.value.problems) == ["lock"]
     assert amended in write_report(tmp_path).read_text("utf-8").replace("&#39;", "'")
 
 

@@ -23,7 +23,7 @@ from realitygap.records import (
     settings_of_condition,
 )
 from realitygap.runs import Condition
-from realitygap.study import advise, design_report
+from realitygap.study import DesignReport, advise, design_report
 from realitygap.world import Arena
 
 from ._mistakes import refuse_unnamed
@@ -104,6 +104,9 @@ class Counts:
     Args:
         folder: Of the study.
         description: What it says of itself.
+
+    Attributes:
+        design: The locked design with all deviations, as last read; None without one.
     """
 
     def __init__(self, folder: Path, description: dict[str, Any]) -> None:
@@ -117,6 +120,7 @@ class Counts:
         self._arenas: dict[str, Arena] = {}
         self._stamp: tuple[Any, ...] = ()
         self._found: list[CountedTrial] = []
+        self.design: DesignReport | None = None
         self._proposed: dict[int, list[Proposal]] = {}
         self._proposed_stamp: tuple[Any, ...] = ()
         self._drafts: dict[tuple[int, str, ScoreRole], Draft] = {}
@@ -149,6 +153,7 @@ class Counts:
             if stamp and stamp != self._stamp:
                 with Ledger.open(path, writable=False) as ledger:
                     self._found = self._read(ledger)
+                    self.design = design_report(ledger)
                 self._stamp = stamp
             stamp = (self._stamp, _changed(self._folder / FOLDER))
             if stamp != self._proposed_stamp:
@@ -161,23 +166,19 @@ class Counts:
             return self._found
 
     def looks(self) -> str:
-        """Return what complete runs show of the conditions on a robot, and deviations from a locked design.
-
-        There is nothing to show of one condition, or of blind ones.
-        """
-        if not (self._folder / LEDGER_NAME).exists():
-            return ""
+        """Return what complete runs show of the conditions on a robot; nothing of one condition, or of blind ones."""
         physical = [each for each in self._settings.values() if is_physical(each)]
-        is_compared = len(physical) > 1 and not self.is_blind
+        if not (self._folder / LEDGER_NAME).exists() or len(physical) < 2 or self.is_blind:
+            return ""
         try:
-            report = design_report(self._folder)
-            parts = (
-                advise(self._folder).summary if is_compared else "",
-                "" if report is None else report.line,
-            )
-            return " ".join(filter(None, parts))
+            return advise(self._folder).summary
         except RealityGapError as error:
             return str(error)
+
+    @property
+    def has_begun(self) -> bool:
+        """True if a trial has begun, so that the design cannot be locked any more."""
+        return any(each.trial.state != "planned" for each in self._found)
 
     def trials(self) -> list[CountedTrial]:
         """Trials as last read."""

@@ -17,13 +17,14 @@ from ._checks import Checks
 from ._class import Classroom
 from ._control import RobotControl, Visitor
 from ._counts import Counts
+from ._design import TOO_LATE
 from ._drawing import Drawer
 from ._files import is_name, plain_files
 from ._gap import GapJob, gap_mistakes
 from ._job import Job
 from ._live import LiveJob, live_mistakes
 from ._messages import LiveWork, StudyWork, TrialChoice, VideoWork
-from ._mistakes import Mistakes
+from ._mistakes import FormError, Mistakes, refuse_unnamed
 from ._own_robots import OwnRobots
 from ._photos import Photos
 from ._standing import Standing, standing_of
@@ -221,6 +222,12 @@ class Lab:
                 )
             if options.get("port"):
                 sitting_mistakes(self.root, options).refuse()
+                if options.get("lock"):
+                    refuse_unnamed(options.get("who", ""))
+                    counts = self.counts(name)
+                    counts.look()
+                    if counts.has_begun:
+                        raise FormError({"lock": TOO_LATE})
                 self.robot.refuse_second()
             return self._begin(name, StudyWork(str(folder), self.allow_code, **options))
 

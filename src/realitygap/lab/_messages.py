@@ -210,6 +210,8 @@ class StudyWork(Work):
         camera: Camera above the robot, as `read_camera` takes it.
         counts: Who scores: `page`, `camera`, or `witness`.
         when: When trials are scored: `sheet` or `trial`.
+        lock: Whether the design of the trials on a robot is locked before the first one.
+        who: Person who locks it.
     """
 
     function: ClassVar[str] = "_study:run"
@@ -223,6 +225,8 @@ class StudyWork(Work):
     camera: str = ""
     counts: str = ""
     when: str = "sheet"
+    lock: bool = False
+    who: str = ""
 
 
 class IdentifyWork(Work):

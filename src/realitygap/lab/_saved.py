@@ -4,21 +4,19 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import date
 from pathlib import Path
 from typing import Any
 
 from realitygap.errors import RealityGapError, RecordError
 from realitygap.records import LEDGER_NAME, Ledger, Score, Trial, is_observations, ledger_stamp, open_ledger
-from realitygap.study import advise_ledger, design_report
+from realitygap.study import DesignReport, advise_ledger, design_report
 from realitygap.world import Arena
 
+from ._design import LONGEST_TEXT
 from ._files import plain_files
 from ._mistakes import refuse_unnamed
-
-LONGEST_TEXT = 1000
-"""Largest length of a reason or note [letters]."""
 
 
 def saved_files(root: Path) -> dict[str, Path]:
@@ -56,8 +54,8 @@ class SavedTrials:
         trials: The trials.
         notes: Notes on each trial, by its number.
         changed: Day on which the file was last changed.
-        looks: What the trials show of a comparison that is planned in the file, and its locked design with all
-            deviations, a line each; empty if there is none.
+        looks: What the trials show of a comparison that is planned in the file, a line each; empty if there is none.
+        design: Its locked design with all deviations; None if there is none.
     """
 
     target: str
@@ -67,6 +65,7 @@ class SavedTrials:
     notes: Mapping[int, str]
     changed: date
     looks: tuple[str, ...] = ()
+    design: DesignReport | None = field(default=None, repr=False)
 
     def trial(self, number: int | None) -> Trial | None:
         """Return a trial by its number."""
@@ -76,17 +75,21 @@ class SavedTrials:
 class SavedFile:
     """A file of trials that visitors list, correct, void, and annotate. All methods wait for the disk.
 
+    Attributes:
+        path: Path of the file.
+        stamp: Changes with the file.
+
     Raises:
         RecordError: From any method: the file is damaged, in use, or cannot be written, or has no such trial.
     """
 
     def __init__(self, path: Path) -> None:
-        self._path = path
+        self.path = path
         self.stamp: tuple[Any, ...] = ()
 
     def read(self) -> SavedTrials:
         """Return the trials."""
-        self.stamp = ledger_stamp(self._path)
+        self.stamp = ledger_stamp(self.path)
         with self._open(writable=False) as ledger:
             trials = tuple(ledger.trials())
             notes = {
@@ -94,18 +97,18 @@ class SavedFile:
                 for trial in trials
             }
             head = ledger.head()
-            changed = date.fromtimestamp(self._path.stat().st_mtime)
-            return SavedTrials(head.target, head.label, ledger.arena, trials, notes, changed, _looks(ledger))
+            changed = date.fromtimestamp(self.path.stat().st_mtime)
+            return SavedTrials(head.target, head.label, ledger.arena, trials, notes, changed, *_looks(ledger))
 
     def _open(self, *, writable: bool = True) -> Ledger:
         """Open the trials. Lines of JSON are converted before they are changed; then the new file has them."""
-        ledger = open_ledger(self._path, writable=writable)
-        self._path = ledger.path
+        ledger = open_ledger(self.path, writable=writable)
+        self.path = ledger.path
         return ledger
 
     def has_changed(self) -> bool:
         """Return whether the file has changed since it was read."""
-        return ledger_stamp(self._path) != self.stamp
+        return ledger_stamp(self.path) != self.stamp
 
     def score(self, number: int, cells: Sequence[int], who: str) -> None:
         """Enter the cells of a trial in place of those of before."""
@@ -129,13 +132,11 @@ class SavedFile:
             ledger.note(text[:LONGEST_TEXT], who, number)
 
 
-def _looks(ledger: Ledger) -> tuple[str, ...]:
-    """Return what the trials of a planned comparison show, and deviations from a locked design."""
+def _looks(ledger: Ledger) -> tuple[tuple[str, ...], DesignReport | None]:
+    """Return what the trials of a planned comparison show, and their locked design."""
+    report = None
     try:
-        looks = () if ledger.comparison() is None else tuple(advise_ledger(ledger).sentences)
         report = design_report(ledger)
-        if report is None:
-            return looks
-        return (*looks, report.line, f"SHA-256 of the locked design: {report.design.sha256}.")
+        return () if ledger.comparison() is None else tuple(advise_ledger(ledger).sentences), report
     except RealityGapError as error:
-        return (str(error),)
+        return (str(error),), report

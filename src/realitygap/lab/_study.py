@@ -170,7 +170,10 @@ def run(channel: Channel, work: messages.StudyWork) -> None:
     result = run_study(study, folder, tell=tell, threads=work.threads, allow_code=work.allow_code)
     if work.port:
         with _operated(channel, work, study, folder) as operator:
-            result = drive_study(study, work.port, folder, operator=operator, allow_code=work.allow_code)
+            locking: dict[str, Any] = {"lock": work.lock, "who": work.who or None}
+            result = drive_study(
+                study, work.port, folder, operator=operator, allow_code=work.allow_code, **locking
+            )
     physical = result.physical
     channel.say(messages.StudyDone("" if physical is None else physical.waiting))
 

@@ -170,6 +170,21 @@ class Form:
             self._add(key, label, element, explanation, lambda: element.value)
         return element
 
+    def switch(self, key: str, label: str, *, explanation: str = "", is_enabled: bool = True) -> ui.switch:
+        """Add a switch that is off.
+
+        Args:
+            key: Key of the field.
+            label: Label, next to the switch.
+            explanation: Explanation, below the field.
+            is_enabled: Whether it can be switched on.
+        """
+        with ui.element("div").classes("lab-field"):
+            element = ui.switch(label)
+            element.props(f"id={_control(element)}").set_enabled(is_enabled)
+            self._explain(key, label, element, explanation, lambda: element.value)
+        return element
+
     # fields of an order
 
     def field_of(self, field: OrderField, choices: Choices | None = None) -> None:
@@ -346,6 +361,12 @@ class Form:
     ) -> None:
         element.props(f'outlined dense for="{_control(element)}"')
         self._label.props(f'for="{_control(element)}"')
+        self._explain(key, label, element, explanation, check)
+
+    def _explain(
+        self, key: str, label: str, element: ValueElement[Any], explanation: str, check: Callable[[], Any]
+    ) -> None:
+        """Add a field with the lines below it."""
         note = ui.label(explanation).classes("lab-hint") if explanation else None
         problem = ui.label("").classes("lab-problem")
         field = self._fields[key] = _Field(label, element, problem, note, check)

@@ -14,6 +14,7 @@ from realitygap.errors import RealityGapError
 from realitygap.lab._lab import Lab
 from realitygap.lab._saved import SavedFile, SavedTrials, saved_files
 
+from ._design import DesignFold
 from ._elements import CellGrid
 from ._fields import Form
 from ._frame import LONGEST_NAME, framed, hint, remember_who, section, text_of, visitor_of
@@ -76,6 +77,14 @@ class _Page:
         hint("The command that saved these trials uses your changes when it resumes. It repeats void trials.")
         self._facts = ui.row().classes("lab-row")
         self._looks = ui.label().classes("lab-finding").props('role="status"')
+        self._design = DesignFold(
+            lambda: self._file.path,
+            lambda: self._saved.design,
+            lambda: self._who,
+            lambda: True,
+            self._reload,
+        )
+        self._design.show()
         columns = [
             {"name": key, "label": label, "field": key, "align": "left"} for key, label in _COLUMNS.items()
         ]
@@ -118,6 +127,7 @@ class _Page:
             _show_facts(self._saved)
         self._looks.text = " ".join(self._saved.looks)
         self._looks.set_visibility(bool(self._saved.looks))
+        self._design.look()
         self._table.rows = [
             {
                 "number": trial.trial,

@@ -16,8 +16,9 @@ from realitygap.lab import _messages as messages
 from realitygap.lab._choices import port_choices
 from realitygap.lab._control import Visitor
 from realitygap.lab._counts import CountedTrial, Counts
+from realitygap.lab._design import TOO_LATE
 from realitygap.lab._lab import Lab
-from realitygap.lab._mistakes import FormError
+from realitygap.lab._mistakes import FormError, refuse_unnamed
 from realitygap.lab._photos import Photos
 from realitygap.lab._study import StudyJob, sitting_mistakes
 from realitygap.report import measure_agreement
@@ -26,9 +27,10 @@ from realitygap.robots import PortGuess, list_ports
 
 from ._control import show_holder
 from ._counting import Counting
+from ._design import DesignFold
 from ._fields import Form, needed
 from ._frame import LONGEST_NAME, framed, hint, remember_who, text_of, visitor_of
-from ._notices import WRONG, attempt, show_at_fields
+from ._notices import WRONG, attempt, show_at_fields, try_now
 from ._part import Part, watching
 from ._photos import SheetPhotos
 from ._sitting import Driving, show_question
@@ -48,6 +50,9 @@ _SCORERS = {
     "camera": "The camera; without one, a person confirms",
     "witness": "The emulator; only for emulated robots",
 }
+_LOCK = (
+    "Saves conditions, replicates, and rules with a hash before trial 1. All deviations from them are listed."
+)
 _WHEN = {"sheet": "When a sheet is full", "trial": "After each trial"}
 _TO_GRID = "document.querySelector('[data-counting]')?.scrollIntoView({block: 'start'})"
 """Bring the grid into view; its section must be open, or the page is not long enough."""
@@ -129,6 +134,14 @@ class _Page:
         with self._fold("Robot") as self._robot_fold:
             for part in (self._robot, self._ending):
                 part.show()
+        self._design = DesignFold(
+            lambda: self._lab.studies.path(self._name),
+            lambda: self._counts.design,
+            lambda: self._visitor.who,
+            lambda: self._job() is None or self._may(),
+            self._look,
+        )
+        self._design.show()
         self._pictured, self._tracked = self._sheets.stand(), self._videos.stand()
         self._listed = self._counts.trials()
         self._photos, self._filmed = ui.refreshable(self._sheets.show), ui.refreshable(self._videos.show)
@@ -254,6 +267,7 @@ class _Page:
     async def _show_changes(self) -> None:
         for part in (
             self._robot, self._asked, self._ending, self._stepped, self._steps, self._known, self._holder,
+            self._design,
         ):  # fmt: skip
             part.look()
         if self._counts.trials() is not self._listed:
@@ -309,6 +323,9 @@ class _Page:
             preflight=None if job is None else job.preflight,
             camera_note="" if job is None else job.camera_note,
             operator="" if job is None or self._may() else self._lab.robot.operator_name,
+            may_lock=None
+            if job is not None or self._counts.design is not None
+            else not self._counts.has_begun,
         )
 
     def _show_robot(self, now: _RobotStand) -> None:
@@ -317,7 +334,7 @@ class _Page:
         if job is None:
             if now.outcome:
                 ui.label(now.outcome).classes("lab-problem" if now.is_failed else "").props('role="status"')
-            self._show_beginning()
+            self._show_beginning(now.may_lock)
             return
         with ui.row().classes("lab-row"):
             if now.label:
@@ -383,7 +400,7 @@ class _Page:
         if now.job is not None:
             ui.button("Disconnect", on_click=now.job.ask_to_end).props("flat no-caps").set_enabled(now.may)
 
-    def _show_beginning(self) -> None:
+    def _show_beginning(self, may_lock: bool | None) -> None:
         """Show the form that connects a robot."""
         if self._can_begin is None:
             return
@@ -399,10 +416,12 @@ class _Page:
         form.summary()
 
         def begin(values: dict[str, Any]) -> None:
-            self._lab.go_on(self._name, **values)
+            self._lab.go_on(self._name, who=self._visitor.who, **values)
             self._lab.robot.take(self._visitor)
 
         async def connect() -> None:
+            if may_lock and lock.value and not try_now(lambda: refuse_unnamed(self._visitor.who)):
+                return
             await form.submit(begin, partial(sitting_mistakes, self._lab.root))
 
         async def emulate() -> None:
@@ -419,6 +438,10 @@ class _Page:
                 placeholder="/dev/rfcomm0 or COM3",
                 explanation="Place the robot on free floor first.",
             )
+            if may_lock is not None:
+                lock = form.switch(
+                    "lock", "Lock design", explanation=_LOCK if may_lock else TOO_LATE, is_enabled=may_lock
+                )
             with ui.row().classes("lab-row"):
                 text = "Reconnect" if is_lost else "Connect robot"
                 ui.button(text, on_click=connect).props("unelevated no-caps").classes("lab-primary")
@@ -537,6 +560,7 @@ class _RobotStand:
     preflight: messages.PreflightResult | None
     camera_note: str
     operator: str
+    may_lock: bool | None
 
 
 @dataclass(frozen=True)

@@ -56,6 +56,9 @@ def pytest_xdist_auto_num_workers() -> int | None:
 
 def pytest_sessionstart(session: pytest.Session) -> None:
     """Compile once what several processes would each compile: the most used kernels, and the byte code of the tests."""
+    os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = (
+        "OFF"  # DDS binds to all addresses; only its own tests use it
+    )
     config = session.config
     is_controller = config.getoption("numprocesses", None) and not hasattr(config, "workerinput")
     if not is_controller or config.option.collectonly:

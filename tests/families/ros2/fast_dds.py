@@ -76,7 +76,6 @@ import json
 import os
 import selectors
 import shutil
-import socket
 import subprocess
 import tempfile
 import threading
@@ -106,8 +105,6 @@ LOOPBACK = (
     "</ParticipantIndex></Discovery></Domain></CycloneDDS>"
 )
 """CYCLONEDDS_URI of a peer."""
-DOMAINS = range(100)
-"""DDS domains whose ports are below those that Linux gives to others."""
 REPEATED = ("range", "wall")
 PATIENCE_S = 60.0
 
@@ -136,30 +133,6 @@ def build() -> Path:
                 )
                 made.replace(path)
     return path
-
-
-class FreeDomain(ClosedOnExit):
-    """A DDS domain of this machine that no other test uses.
-
-    Attributes:
-        number: Number of the domain.
-    """
-
-    def __init__(self) -> None:
-        for number in DOMAINS[1:]:
-            self._claim = socket.socket(socket.AF_UNIX)
-            try:
-                self._claim.bind(f"\0fast-dds-domain-{number}")
-            except OSError:
-                self._claim.close()
-                continue
-            self.number = number
-            return
-        raise OSError("All DDS domains are in use.")
-
-    def close(self) -> None:
-        """Let others use the domain."""
-        self._claim.close()
 
 
 class FastRobot(ClosedOnExit):

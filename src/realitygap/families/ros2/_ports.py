@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
+import os
 import subprocess
 import sys
 import threading
@@ -28,14 +30,28 @@ class _Looks:
         self._lock = threading.Lock()
         self._at = -FRESH_S
         self._found: list[PortGuess] = []
+        self._looking: threading.Thread | None = None
 
-    def robots(self) -> list[PortGuess]:
-        """Return the robots of the last look; look if it is old."""
+    def robots(self, *, waits: bool) -> list[PortGuess]:
+        """Return the robots of the last look, and begin another one if it is old.
+
+        Args:
+            waits: True to wait for that one.
+        """
         with self._lock:
-            if time.monotonic() - self._at >= FRESH_S:
-                self._found = _look()
-                self._at = time.monotonic()
-            return list(self._found)
+            is_old = time.monotonic() - self._at >= FRESH_S
+            if is_old and self._looking is None:
+                self._looking = threading.Thread(target=self._look, daemon=True)
+                self._looking.start()
+            looking = self._looking
+        if waits and looking is not None:
+            looking.join()
+        return list(self._found)
+
+    def _look(self) -> None:
+        found = _look()
+        with self._lock:
+            self._found, self._at, self._looking = found, time.monotonic(), None
 
 
 _looks = _Looks()
@@ -45,8 +61,16 @@ def find_ports() -> list[PortGuess]:
     """Return the robots that take commands in the domain; none if cyclonedds is not installed.
 
     Domain and interface are those of an address without options: this machine, unless variables of ROS say otherwise.
+    There is no look if `ROS_AUTOMATIC_DISCOVERY_RANGE` is OFF. A page of the lab, which must not wait, gets the robots
+    of the last look.
     """
-    return _looks.robots() if find_spec("cyclonedds") else []
+    if os.environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "").upper() == "OFF" or not find_spec("cyclonedds"):
+        return []
+    try:
+        asyncio.get_running_loop()
+    except RuntimeError:
+        return _looks.robots(waits=True)
+    return _looks.robots(waits=False)
 
 
 def _look() -> list[PortGuess]:

@@ -60,7 +60,10 @@ def test_the_issue_s_robots_are_there():
         "e-puck",
         "thymio",
         "thymio-playground",
+        "create3",
+        "epuck2",
         "turtlebot3-burger",
+        "turtlebot4",
     }
 
 

@@ -82,7 +82,7 @@ def test_address_stays_on_this_machine_unless_ros_says_otherwise(monkeypatch):
         ("", "has no table"),
         ('[driver]\nfamily = "ros2"\nodometri = "odom"', "odometri"),
         ('[driver]\nfamily = "ros2"', "neither ranges nor scan"),
-        ('[driver]\nfamily = "ros2"\nranges = ["a"]', "has 5 range sensors, and .* 1 topics"),
+        ('[driver]\nfamily = "ros2"\nranges = ["a"]', "has 5 range sensors, and .* names 1 of them"),
     ],
 )
 def test_robot_file_without_its_topics_gets_one_message(tmp_path, driver, message):

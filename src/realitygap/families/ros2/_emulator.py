@@ -198,6 +198,18 @@ class EmulatedRos2(EmulatedRobot):
         sensors = zip(wiring.ranges, self._body.range, self._seen.readings, strict=False)
         for topic, sensor, reading in sensors:
             found[self._full(topic)] = m.RANGE, range_message(sensor, reading)
+        if wiring.intensity:
+            values = zip(wiring.intensity_frames, self._seen.readings, strict=True)
+            found[self._full(wiring.intensity)] = (
+                m.INTENSITIES,
+                {
+                    "header": self.stamp(),
+                    "readings": [
+                        {"header": {"frame_id": frame}, "value": round(wiring.intensity_most * reading)}
+                        for frame, reading in values
+                    ],
+                },
+            )
         if wiring.bump:
             found[self._full(wiring.bump)] = wiring.bump_kind, self._bump_message()
         if wiring.battery:

@@ -29,7 +29,7 @@ from ._graph import Ends, refuse_graph
 from ._lines import LIFE_S
 from ._link import START_S, Link, open_link, open_port
 from ._messages import full_topic
-from ._wiring import is_bumped, load_wired, range_of, respond, sectors_of
+from ._wiring import intensities_of, is_bumped, load_wired, range_of, respond, sectors_of
 
 DEFAULT_ROBOT = "turtlebot3-burger"
 DISCOVERY_S = 5.0
@@ -240,14 +240,7 @@ class Ros2Robot(PortDriver):
         """Read the range sensors, and the selected other ones."""
         with self._noted("observe"):
             seen = self._read()
-            distances = self._distances(seen)
-            readings = tuple(
-                respond(sensor, far) for sensor, far in zip(self.model.range, distances, strict=True)
-            )
-        raw = tuple(
-            sensor.reach if far is None else far
-            for sensor, far in zip(self.model.range, distances, strict=True)
-        )
+            readings, raw = self._readings(seen)
         bump = seen.get(self._full(self.wiring.bump))
         is_bump = bump is not None and is_bumped(self.wiring.bump_kind, bump)
         channels = {"bump.0": float(is_bump)} | dict(
@@ -255,6 +248,15 @@ class Ros2Robot(PortDriver):
         )
         chosen = {name: channels[name] for name in self._selected}
         return self._seen(Observation(readings, is_bump or self._is_stalled(seen), raw, chosen))
+
+    def _readings(self, seen: Mapping[str, Any]) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Return the reading of each range sensor, and its distance [m], or its intensity."""
+        if self.wiring.intensity:
+            shares = intensities_of(seen[self._full(self.wiring.intensity)], self.wiring)
+            return shares, tuple(share * self.wiring.intensity_most for share in shares)
+        pairs = tuple(zip(self.model.range, self._distances(seen), strict=True))
+        readings = tuple(respond(sensor, far) for sensor, far in pairs)
+        return readings, tuple(sensor.reach if far is None else far for sensor, far in pairs)
 
     def _distances(self, seen: Mapping[str, Any]) -> list[float | None]:
         """Return the distance that each range sensor sees [m]; None: nothing is in range."""

@@ -52,6 +52,14 @@ class Wiring(Settings):
     ranges: tuple[str, ...] = Field(
         (), max_length=64, description="Topics of sensor_msgs/Range, one for each range sensor in its order."
     )
+    intensity: str = Field(
+        "",
+        description="Topic of irobot_create_msgs/IrIntensityVector, whose values are readings. Empty: none.",
+    )
+    intensity_frames: tuple[str, ...] = Field(
+        (), max_length=64, description="Frames of its values, one for each range sensor in its order."
+    )
+    intensity_most: float = Field(1.0, gt=0, description="Value that counts as a reading of 1.")
     bump: str = Field("", description="Topic that tells bumps. Empty: none.")
     bump_kind: BumpKind = Field("std_msgs/msg/Bool", description="Type of its messages.")
     battery: str = Field("", description="Topic of sensor_msgs/BatteryState. Empty: none.")
@@ -74,6 +82,7 @@ class Wiring(Settings):
             (self.pose, m.POSE),
             (self.scan.topic if self.scan else "", m.SCAN),
             *((topic, m.RANGE) for topic in self.ranges),
+            (self.intensity, m.INTENSITIES),
             (self.bump, self.bump_kind),
             (self.battery, m.BATTERY),
         ]
@@ -81,7 +90,7 @@ class Wiring(Settings):
 
     def needed(self, namespace: str) -> tuple[str, ...]:
         """Return the topics without which trials cannot be driven."""
-        names = (self.odometry, self.pose, self.scan.topic if self.scan else "", *self.ranges)
+        names = (self.odometry, self.pose, self.scan.topic if self.scan else "", *self.ranges, self.intensity)
         return tuple(full_topic(namespace, name) for name in names if name)
 
 
@@ -102,12 +111,10 @@ def load_wired(robot: str) -> tuple[RobotModel, Wiring]:
         wiring = Wiring(**model.driver)
     except ValueError as error:
         raise RobotError(f"Robot {robot}, [driver]: {error}") from error
-    n, ranges = len(model.range), len(wiring.ranges)
-    if ranges and ranges != n:
-        raise RobotError(
-            f"Robot {robot} has {n} range sensors, and [driver] names {ranges} topics of ranges."
-        )
-    if n and not ranges and wiring.scan is None:
+    n, named = len(model.range), wiring.intensity_frames if wiring.intensity else wiring.ranges
+    if named and len(named) != n:
+        raise RobotError(f"Robot {robot} has {n} range sensors, and [driver] names {len(named)} of them.")
+    if n and not named and wiring.scan is None:
         raise RobotError(f"Robot {robot} has {n} range sensors, and [driver] has neither ranges nor scan.")
     return model, wiring
 
@@ -135,10 +142,18 @@ def respond(sensor: RangeSensor, distance: float | None) -> float:
 
 def range_of(message: Mapping[str, Any]) -> float | None:
     """Return the distance of a sensor_msgs/Range [m]; None if nothing is in range."""
-    value, least, most = message["range"], message["min_range"] or 0.0, message["max_range"]
-    if value is None or (most and value >= most):
+    value, least, most = message["range"], message["min_range"] or 0.0, message["max_range"] or 0.0
+    if value is None or (most > least and value >= most):  # an e-puck2's limits are the wrong way round
         return None
-    return max(float(value), float(least))
+    return max(float(value), 0.0)
+
+
+def intensities_of(message: Mapping[str, Any], wiring: Wiring) -> tuple[float, ...]:
+    """Return the reading of each range sensor from an IrIntensityVector; 0 for a frame that is not in it."""
+    values = {each["header"]["frame_id"]: each["value"] for each in message["readings"]}
+    return tuple(
+        min(max(values.get(frame, 0) / wiring.intensity_most, 0.0), 1.0) for frame in wiring.intensity_frames
+    )
 
 
 def sectors_of(message: Mapping[str, Any], scan: Scan, sensors: Sequence[RangeSensor]) -> list[float | None]:

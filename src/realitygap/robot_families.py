@@ -66,6 +66,9 @@ class RobotFamily:
         platforms: Reference to the class of each of its platforms, by name.
         terminal: Module with the functions of `realitygap.robots.Terminal`.
         ports: Examples of its ports, without the name before them.
+        port_files: Options of its ports that name files, besides `arena`.
+        addresses: Regular expression of its ports, without their options, that are addresses in a network. Others are
+            devices, sockets, or emulators.
         emulated: Port of an emulated robot in this program; empty if there is none.
         emulators: Reference to the class of the port, by host of an `emulator://HOST` address.
         emulate: Reference to the command `realitygap emulate NAME`; empty if there is none.
@@ -88,6 +91,8 @@ class RobotFamily:
     platforms: Mapping[str, str]
     terminal: str
     ports: tuple[str, ...]
+    port_files: tuple[str, ...] = ()
+    addresses: str = ""
     emulated: str = ""
     emulators: Mapping[str, str] = field(default_factory=dict)
     emulate: str = ""

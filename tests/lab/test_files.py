@@ -19,6 +19,9 @@ from realitygap.lab._gap import free_name, gap_mistakes
         "scribbler:/dev/ttyUSB0",
         "socket://127.0.0.1:7001",
         "emulator://s2?fluke=2&speed=off&arena=paper",
+        "ros2:/",
+        "ros2:/robot1?domain=3&interface=wlan0&robot=mine.toml",
+        "ros2:emulator://ros2?robot=turtlebot4",
     ],
 )
 def test_devices_sockets_and_emulators_are_opened(tmp_path, port):
@@ -39,6 +42,11 @@ def test_devices_sockets_and_emulators_are_opened(tmp_path, port):
         "emulator://s2?state=/etc/passwd",
         "emulator://s2?arena=%2fetc%2fpasswd",
         "emulator://s2?twin=../../twin.toml",
+        "/robot1?domain=3",
+        "ros2:/robot1?robot=/etc/passwd",
+        "ros2:/a/../b",
+        "ros2:emulator://ros2?body=../mine.toml",
+        "ros2:emulator://ros2?robot=%2fetc%2fpasswd",
         "\x00",
     ],
 )

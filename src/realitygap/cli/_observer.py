@@ -28,7 +28,8 @@ if TYPE_CHECKING:
     from realitygap.world import Arena
 
 _HELP = (
-    'Overhead camera by number, with options of realitygap track: "0?tag=10&tag-height=0.1&lens=cam.toml".'
+    'Overhead camera by number, with options of realitygap track: "0?tag=10&tag-height=0.1&lens=cam.toml". '
+    "own: poses that the robot tells, as on ROS 2."
 )
 
 Camera = Annotated[str | None, typer.Option(metavar="CAMERA", help=_HELP)]
@@ -92,7 +93,7 @@ def _ask_for_start(plan: TrialPlan, arena: Arena, observe: Observe) -> None:
 
 @contextlib.contextmanager
 def under_camera(
-    spec: str | None, arena: Arena, observer: PortObserver | None
+    spec: str | None, arena: Arena, observer: PortObserver | None, witness: str | None = None
 ) -> Iterator[PortObserver | None]:
     """Return the observer of a robot, with a camera if one is named.
 
@@ -100,6 +101,7 @@ def under_camera(
         spec: Camera, as given by the user; None for none.
         arena: Arena of the robot.
         observer: Observer without a camera; None if no person has to place the robot.
+        witness: Witness of an emulated robot, which then places it, and does not report its poses.
 
     Raises:
         StudyError: The camera's options are wrong, or the robot has no operator.
@@ -107,6 +109,9 @@ def under_camera(
     """
     if spec is None:
         yield observer
+        return
+    if spec == realitygap.study.OWN_POSES:
+        yield realitygap.study.OwnPosesObserver(arena, observer or _witness_of(witness))
         return
     if observer is None:
         raise StudyError(
@@ -117,6 +122,11 @@ def under_camera(
     number, marks = parse_camera(spec, arena)
     with realitygap.vision.LiveTrack(realitygap.vision.CameraDevice(number), marks) as live:
         yield realitygap.study.CameraObserver(live, arena, observer)
+
+
+def _witness_of(address: str | None) -> PortObserver:
+    remote = None if address is None else realitygap.emulator.connect_witness(address)
+    return realitygap.trials.WitnessObserver(remote)
 
 
 @contextlib.contextmanager
@@ -135,7 +145,7 @@ def measuring(
     with (
         resumable(order.results, how),
         TrialsBar(quiet=quiet) as bar,
-        under_camera(camera, arena, observer) as seen_by,
+        under_camera(camera, arena, observer, order.witness) as seen_by,
     ):
         yield {"observer": seen_by, "tell": bar.show, "say": bar.say}
 
@@ -162,6 +172,10 @@ def operated_under_camera(spec: str | None, study: Study, operator: Operator) ->
         )
 
     arena = realitygap.study.physical_conditions(study)[0].arena.arena()
+    if spec == realitygap.study.OWN_POSES:
+        operator.observer = realitygap.study.OwnPosesObserver(arena, say=lambda text: echo(text, err=True))
+        yield operator
+        return
     number, marks = parse_camera(spec, arena)
     with realitygap.vision.LiveTrack(realitygap.vision.CameraDevice(number), marks) as live:
         operator.observer = realitygap.study.CameraObserver(

@@ -14,7 +14,7 @@ from urllib.parse import parse_qsl
 from realitygap._limits import parse_toml
 from realitygap.errors import StudyError
 from realitygap.platforms import Platform, names_a_port, platform_of, split_spec
-from realitygap.robot_families import ports_in_words
+from realitygap.robot_families import default_family, find_family, ports_in_words
 from realitygap.robots import split_port
 from realitygap.runs import NAME_PATTERN
 from realitygap.settings import shown
@@ -24,8 +24,6 @@ LONGEST_TEXT = 200_000
 """Largest length of a study file [letters]."""
 
 _SOCKETS = ("socket", "rfc2217")
-_EMULATORS_FILES = ("arena", "state", "twin")
-"""Settings of an emulated robot's port that name files."""
 _PYTHON = "python:"
 """A platform from a file, which is not imported here."""
 _PROSE = ("name", "title", "note", "published_source", "change")
@@ -123,19 +121,22 @@ def refuse_port(root: Path, port: str) -> None:
     Raises:
         StudyError: It is no device, socket or emulator, or an emulator with a file outside the folder.
     """
-    _, name = split_port(port)
-    scheme, colon, rest = name.partition("://")
+    family_name, name = split_port(port)
+    family = find_family(family_name) or default_family()
+    base, _, options = name.partition("?")
+    for key, value in parse_qsl(options):
+        if key in ("arena", *family.port_files):
+            refuse_outside(root, value)
+    scheme, colon, rest = base.partition("://")
     if not colon:
-        is_below_dev = name.startswith("/") and name != "/dev" and _is_within(Path("/dev"), name)
-        if is_below_dev or re.fullmatch(r"COM\d+", name, re.IGNORECASE):
+        is_below_dev = base.startswith("/") and base != "/dev" and _is_within(Path("/dev"), base)
+        is_address = bool(family.addresses) and re.fullmatch(family.addresses, base) is not None
+        if is_address or (not options and (is_below_dev or re.fullmatch(r"COM\d+", base, re.IGNORECASE))):
             return
     elif scheme in _SOCKETS:
-        if re.fullmatch(r"[^/?#@]+:\d+/?", rest):
+        if not options and re.fullmatch(r"[^/?#@]+:\d+/?", rest):
             return
     elif scheme == "emulator":
-        for key, value in parse_qsl(rest.partition("?")[2]):
-            if key in _EMULATORS_FILES:
-                refuse_outside(root, value)
         return
     raise StudyError(f"{shown(port)} is no port that the lab opens. Expected {ports_in_words()}.")
 

@@ -11,7 +11,14 @@ from realitygap.emulator import Witness
 from realitygap.errors import RobotError, StudyError
 from realitygap.records import LEDGER_NAME, Ledger, Score, TrialRecord
 from realitygap.robots import Command, Observation, Robot
-from realitygap.study import CameraObserver, Study, physical_conditions, read_camera
+from realitygap.study import (
+    OWN_POSES,
+    CameraObserver,
+    OwnPosesObserver,
+    Study,
+    physical_conditions,
+    read_camera,
+)
 from realitygap.trials import Card, Operator, Preflight, Verdict, WitnessObserver, own_witness
 from realitygap.vision import CameraDevice, LiveTrack
 
@@ -221,11 +228,10 @@ class PageOperator(Operator):
         """Return the score, or None if a person must check the cells first; they are saved as a proposal."""
         self._page.driven()
         seen, number = super().drawn(card, record), card.trial.trial
-        if card.observe != "cells" or (
-            seen is not None and seen.who == CameraObserver.who and not self.proposer
-        ):
+        is_tracked = seen is not None and isinstance(self.observer, CameraObserver)
+        if card.observe != "cells" or (is_tracked and not self.proposer):
             return seen
-        if seen is not None and seen.who == CameraObserver.who:
+        if seen is not None and is_tracked:
             told = f"Cells and path by {self.proposer}, checked by the person who saved them."
             keep_proposal(self._folder, number, track_proposal(seen, self.proposer, self.proposer, told))
         if self._witness is not None:
@@ -293,6 +299,11 @@ def under_camera(
         VisionError: There is no such camera.
     """
     arena = physical_conditions(study)[0].arena.arena()
+    if spec == OWN_POSES:
+        operator.observer = OwnPosesObserver(arena, say=say)
+        operator.proposer = OwnPosesObserver.who if asks else ""
+        yield operator
+        return
     name, marks = read_camera(spec, arena)
     if not name.isdecimal():
         raise StudyError(

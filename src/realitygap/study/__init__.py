@@ -10,7 +10,7 @@ from ._calibrate.from_table import calibrate_from_table
 from ._calibrate.one import calibrate, save_calibration
 from ._calibrate.ordered import make_calibration
 from ._calibrate.whole import calibrate_all
-from ._camera import CameraObserver, marks_of, read_camera, tag_of
+from ._camera import OWN_POSES, CameraObserver, OwnPosesObserver, marks_of, read_camera, tag_of
 from ._close import ClosedGap, close_gap
 from ._closing.plan import PLANS, ClosingPlan
 from ._closing.rows import CalibratedRow, ClosingSummary, GoalRow, TwinRow
@@ -61,6 +61,7 @@ __all__ = [
     "DESIGN_NAME",
     "MAZE_SEEDS",
     "MOST_CONTROLLERS",
+    "OWN_POSES",
     "PLANS",
     "SECTIONS",
     "Advice",
@@ -81,6 +82,7 @@ __all__ = [
     "GapPlan",
     "GapStudy",
     "GoalRow",
+    "OwnPosesObserver",
     "Planned",
     "Progress",
     "ReportSection",

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 from urllib.parse import parse_qsl
 
 import numpy as np
@@ -17,11 +17,13 @@ from realitygap.errors import RobotError, StudyError, VisionError, did_you_mean
 from realitygap.records import EndReason, Observe, Score, TrialRecord
 from realitygap.robots import Clock, Robot
 from realitygap.trials import PortObserver, SheetObserver, TrialPlan
-from realitygap.vision import CORNER_SIZE_M, FAMILIES, Marks, RobotTag, Track, Tracked, read_lens
-from realitygap.world import Arena
+from realitygap.vision import CORNER_SIZE_M, FAMILIES, Marks, RobotTag, Track, read_lens
+from realitygap.world import Arena, Pose
 
 from ._tracked import score_along
 
+OWN_POSES = "own"
+"""Name in place of a camera for the poses that a robot tells."""
 AT_REST_S = 0.4
 """Largest time by which the poses may begin after or end before a trial, because the robot is at rest at both ends."""
 
@@ -37,8 +39,17 @@ class Looking(Protocol):
         """A trial begins."""
         ...
 
-    def tracked(self, until_s: float | None = None) -> Tracked:
+    def tracked(self, until_s: float | None = None) -> HasTrack:
         """Return the track since then, up to a time [s] at least."""
+        ...
+
+
+class HasTrack(Protocol):
+    """A result with a track, such as `Tracked`."""
+
+    @property
+    def track(self) -> Track:
+        """The robot's path."""
         ...
 
 
@@ -98,6 +109,9 @@ class CameraObserver:
         """Have it put at a start, and look from then on."""
         self.beside.place(plan, arena, "readings")
         self._times, self._track = [], None
+        self._begin(plan.start or arena.start)
+
+    def _begin(self, start: Pose) -> None:
         self._camera.begin()
 
     def battery_v(self) -> float:
@@ -156,6 +170,70 @@ class CameraObserver:
         if self._track is None:
             self._track = seen_between(self._camera, self._times[0], self._times[-1])
         return self._track
+
+
+class OwnPosesObserver(CameraObserver):
+    """A robot that tells its poses, by odometry or from a motion capture, and so the cells that it crosses.
+
+    Such a robot has `tells_poses`, `begin_path`, and `path`, as one on ROS 2. Another observer puts it at its start.
+
+    Args:
+        arena: Arena of the trials.
+        beside: Observer that puts the robot at its start, a person or the witness of an emulated robot.
+        say: Called with the reason if a trial has to be counted by hand.
+    """
+
+    who = "robot's poses"
+
+    def __init__(
+        self, arena: Arena, beside: PortObserver | None = None, say: Callable[[str], None] = lambda _: None
+    ) -> None:
+        self._path = _OwnPath()
+        super().__init__(self._path, arena, beside, say)
+
+    def meet(self, robot: Robot, arena: Arena | None = None) -> None:
+        """Take note of a robot that was opened.
+
+        Raises:
+            RobotError: It tells no poses, or drives in another arena.
+        """
+        if not getattr(robot, "tells_poses", False):
+            raise RobotError(
+                "This robot tells no poses. Name a camera above it, or, for a robot on ROS 2, its odometry or motion "
+                "capture in [driver] of the robot file."
+            )
+        super().meet(robot, arena)
+        self._path.robot = robot
+
+    def _begin(self, start: Pose) -> None:
+        self._path.robot.begin_path(start)
+
+
+class _OwnPath:
+    """The path that a robot tells since its trial began, as `Looking` has it."""
+
+    def __init__(self) -> None:
+        self.robot: Any = None
+        self._rows = np.empty((0, 4))
+
+    def now(self) -> float:
+        return float(self.robot.clock.now())
+
+    def begin(self) -> None:
+        raise NotImplementedError("A path begins at a pose.")
+
+    def tracked(self, until_s: float | None = None) -> _OwnPath:
+        self._rows = self.robot.path()
+        if not len(self._rows):
+            raise RobotError("The robot told no pose in this trial. Check its odometry.")
+        return self
+
+    @property
+    def track(self) -> Track:
+        """The robot's path."""
+        poses = self._rows[:, 1:].copy()
+        poses[:, 2] = np.unwrap(poses[:, 2])
+        return Track(self._rows[:, 0], poses, np.ones(len(poses), np.bool_))
 
 
 def seen_between(camera: Looking, first: float, last: float) -> Track:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from realitygap.errors import RealityGapError, RobotError
@@ -13,10 +14,12 @@ from realitygap.families.ros2 import Ros2Robot
 from realitygap.families.ros2._address import read_address
 from realitygap.families.ros2._messages import DEFINITIONS, fields_of, message_of, name_on_wire
 from realitygap.families.ros2._wiring import Scan, load_wired, respond, sectors_of
-from realitygap.platforms import base_robot_of, platform_of
+from realitygap.platforms import base_robot_of, open_target, platform_of
 from realitygap.robots import Command
+from realitygap.study import OwnPosesObserver
 from realitygap.testing import check_platform, check_robot
-from realitygap.world import RangeSensor, load_robot, robot_names
+from realitygap.trials import TrialPlan, WitnessObserver
+from realitygap.world import RangeSensor, load_robot, paper_arena, robot_names
 
 PORT = "emulator://ros2?speed=off"
 ROBOTS = [name for name in robot_names() if load_robot(name).driver.get("family") == "ros2"]
@@ -122,3 +125,30 @@ def test_names_on_the_wire_lead_back():
         assert fields_of(name)
     assert name_on_wire("nav_msgs/msg/Odometry") == "nav_msgs::msg::dds_::Odometry_"
     assert message_of("something::else") == "something::else"
+
+
+def test_own_poses_are_those_of_odometry_from_the_start():
+    arena = paper_arena()
+    plan = TrialPlan(commands=np.array([[0.8, 0.0], [0.0, 0.5], [0.8, 0.2]] * 3), number=3, sees_end=True)
+    seen = []
+    for observer in (WitnessObserver(), OwnPosesObserver(arena, WitnessObserver())):
+        with open_target(f"ros2:{PORT}", arena, observer=observer) as target:
+            assert target.observes == "track"
+            (trial,) = target.carry_out([plan], "track")
+            seen.append(trial)
+    true, told = (trial.poses for trial in seen)
+    assert np.allclose(told[0], arena.start, atol=0.001)
+    assert np.abs(told[:, :2] - true[:, :2]).max() < 0.01
+    assert np.abs(np.angle(np.exp(1j * (told[:, 2] - true[:, 2])))).max() < 0.05
+    assert np.hypot(*(told[-1, :2] - told[0, :2])) > 0.05
+    assert set(seen[1].cells) <= set(range(arena.grid.n_cells))
+
+
+def test_robot_without_odometry_tells_no_poses(tmp_path):
+    file = tmp_path / "blind.toml"
+    file.write_text('base = "turtlebot3-burger"\n[driver]\nodometry = ""\n')
+    observer = OwnPosesObserver(paper_arena(), WitnessObserver())
+    with pytest.raises(RobotError, match="tells no poses"):
+        open_target(f"ros2:{PORT}&robot={file}", paper_arena(), observer=observer).carry_out(
+            [TrialPlan(commands=np.zeros((1, 2)))], "track"
+        )

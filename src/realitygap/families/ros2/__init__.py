@@ -18,6 +18,8 @@ FAMILY = RobotFamily(
     platforms={"ros2": f"{__name__}._platform:Ros2Platform"},
     terminal=f"{__name__}._terminal",
     ports=("/robot1?interface=wlan0",),
+    port_files=("robot", "body"),
+    addresses=r"/[\w/]*",
     emulated="emulator://ros2",
     emulators={"ros2": f"{__name__}._emulator:Ros2Port"},
     emulate=f"{__name__}._emulate:emulate",

@@ -48,7 +48,7 @@ def read_address(text: str) -> Address:
     if "://" in text:
         base, _, query = text.partition("?")
         pairs = parse_qsl(query, keep_blank_values=True)
-        robot = "".join(value for name, value in pairs if name == "robot")
+        robot = dict(pairs).get("robot", "")
         rest = "&".join(f"{name}={value}" for name, value in pairs if name != "robot")
         keeps = text.startswith("emulator:")
         return Address("", text if keeps else base + (f"?{rest}" if rest else ""), 0, "", robot, "EMULATED")

@@ -11,6 +11,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from realitygap.errors import RobotError, check_finite
 from realitygap.robots import (
     EXITS,
@@ -26,7 +29,7 @@ from realitygap.world import Pose
 
 from ._address import Address, read_address
 from ._graph import Ends, refuse_graph
-from ._lines import LIFE_S
+from ._lines import LIFE_S, MOST_TRAIL
 from ._link import START_S, Link, open_link, open_port
 from ._messages import full_topic
 from ._wiring import intensities_of, is_bumped, load_wired, range_of, respond, sectors_of
@@ -132,6 +135,9 @@ class Ros2Robot(PortDriver):
         self._stall = StallRule(LEAST_SPEED)
         self._way = [0.0, 0.0]  # of each wheel since the robot was opened [m]
         self._last: dict[str, tuple[float, float, float]] = {}  # the last pose of each trail
+        self._poses_on = self._full(self.wiring.pose or self.wiring.odometry)
+        self._path: list[tuple[float, float, float, float]] = []  # time [s] and pose since the trial began
+        self._start: Pose | None = None
         self._observed = (math.nan, 0.0, 0.0)  # time and ways at the last observation
         self._wheels = (0.0, 0.0)  # the last command [m/s]
         self.label: Label = self._address.label
@@ -191,6 +197,9 @@ class Ros2Robot(PortDriver):
         for topic, rows in seen["trails"].items():
             for row in rows:
                 self._follow(topic, (row[1], row[2], row[3]))
+                if topic == self._poses_on:
+                    self._path.append((row[0], row[1], row[2], row[3]))
+                    del self._path[:-MOST_TRAIL]
         for topic in self._needed:
             known = seen["topics"].get(topic, {"age": math.inf})
             if "too_long" in known:
@@ -288,6 +297,40 @@ class Ros2Robot(PortDriver):
         return self._stall.is_stalled(
             self.clock.now(), self._wheels, (ahead - turn * half, ahead + turn * half)
         )
+
+    @property
+    def tells_poses(self) -> bool:
+        """True if it has odometry, or a motion capture tells its poses."""
+        return bool(self._poses_on)
+
+    def begin_path(self, start: Pose) -> None:
+        """Begin a path at a pose, at which the robot stands."""
+        self._path.clear()
+        self._read()
+        del self._path[:-1]
+        self._start = start
+
+    def path(self) -> NDArray[np.float64]:
+        """Return time [s], x [m], y [m], and heading [rad] in the arena since `begin_path`, (t, 4).
+
+        Poses of odometry are moved so that the first one is the start. So are those of `pose`, unless `pose_frame` is
+        `arena`.
+        """
+        self._read()
+        rows = np.array(self._path, np.float64).reshape(-1, 4)
+        if (
+            len(rows)
+            and self._start is not None
+            and (self.wiring.pose_frame == "start" or not self.wiring.pose)
+        ):
+            x, y, heading = rows[0, 1:]
+            ahead = (rows[:, 1] - x) * math.cos(heading) + (rows[:, 2] - y) * math.sin(heading)
+            aside = (rows[:, 2] - y) * math.cos(heading) - (rows[:, 1] - x) * math.sin(heading)
+            cos, sin = math.cos(self._start.heading), math.sin(self._start.heading)
+            rows[:, 1] = self._start.x + ahead * cos - aside * sin
+            rows[:, 2] = self._start.y + ahead * sin + aside * cos
+            rows[:, 3] += self._start.heading - heading
+        return rows
 
     def wheels(self) -> tuple[float, float]:
         """Return the way of each wheel since the robot was opened [m], by odometry."""

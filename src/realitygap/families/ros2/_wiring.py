@@ -48,6 +48,10 @@ class Wiring(Settings):
         "",
         description="Topic of geometry_msgs/PoseStamped, as of a motion capture. Empty: odometry tells poses.",
     )
+    pose_frame: Literal["start", "arena"] = Field(
+        "start",
+        description="Frame of poses. start: each trial begins at its start, as for odometry. arena: that of the arena.",
+    )
     scan: Scan | None = Field(None, description="Laser scanner.")
     ranges: tuple[str, ...] = Field(
         (), max_length=64, description="Topics of sensor_msgs/Range, one for each range sensor in its order."

@@ -25,6 +25,7 @@ FAMILY = RobotFamily(
     platforms={"scribbler": f"{__name__}._platform:ScribblerPlatform"},
     terminal=f"{__name__}._terminal",
     ports=("/dev/rfcomm0", "COM3", "socket://HOST:PORT"),
+    port_files=("state", "twin"),
     emulated="emulator://s2?fluke=2",
     emulators=dict.fromkeys(("s1", "s2"), f"{__name__}.emulator._port:ScribblerPort"),
     emulate=f"{__name__}._emulate:emulate",

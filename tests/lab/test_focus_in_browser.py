@@ -65,7 +65,7 @@ def test_focus_stays_near_when_a_robot_is_connected_and_never_returns_to_the_dri
     )
     has_focus(page, ".lab-main .lab-place")
     press(page, "Disconnect")
-    page.get_by_role("button", name="Use an emulated robot").wait_for()
+    page.get_by_role("button", name="Use an emulated robot", exact=True).wait_for()
     has_focus(page, ".lab-main .lab-place")
 
 

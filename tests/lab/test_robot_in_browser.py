@@ -23,7 +23,7 @@ PORT = "emulator://s2?fluke=2"
 
 
 def connect(page) -> None:
-    page.get_by_role("button", name="Use an emulated robot").click()
+    page.get_by_role("button", name="Use an emulated robot", exact=True).click()
     wait_connected(page, PORT)
 
 
@@ -176,7 +176,7 @@ def test_each_visitor_drives_an_emulated_robot_of_their_own(visit):
     assert second.get_by_text("Standing", exact=True).is_visible()
     first.keyboard.up("ArrowUp")
     second.get_by_role("button", name="Disconnect").click()
-    second.get_by_role("button", name="Use an emulated robot").wait_for()
+    second.get_by_role("button", name="Use an emulated robot", exact=True).wait_for()
     drive_and_stop(first)
 
 

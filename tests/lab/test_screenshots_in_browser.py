@@ -93,7 +93,7 @@ def test_studies_and_one_that_is_watched(lab, visit):
 @pytest.mark.long
 def test_screenshots_show_a_robot_driven_by_hand(lab, visit):
     page = visit("robot", size=PHONE, has_touch=True, **FINE)
-    page.get_by_role("button", name="Use an emulated robot").click()
+    page.get_by_role("button", name="Use an emulated robot", exact=True).click()
     page.get_by_text("Battery").wait_for()
     page.locator(".lab-pad").press("ArrowUp", delay=3000)
     page.locator(".lab-pad").blur()

@@ -170,7 +170,7 @@ def test_mistakes_in_python_are_told_too(results, tmp_path):
         (["DIR", "--speed", "2", "-o", "a.svg"], "--speed. Leave that out."),
         (["network", "DIR", "DIR", "-o", "a.svg"], "Only a movie shows several"),
         (["arena", "papr", "-o", "a.svg"], "Did you mean 'paper'?"),
-        (["robot", "r2d2", "-o", "a.svg"], "Known: e-puck, jyro, khepera"),
+        (["robot", "r2d2", "-o", "a.svg"], "Known: create3, e-puck, epuck2, jyro"),
         (["robot", "jyro", "--robot", "khepera", "-o", "a.svg"], "Not for robot: --robot"),
         (["arena", "none.svg", "-o", "a.svg"], "There is no arena file none.svg"),
         (["arena", "--condition", "x", "-o", "a.svg"], "Not for arena: --condition"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import selectors
 import time
 from importlib.util import find_spec
@@ -139,7 +140,8 @@ class DdsServer:
         for _, message in self._node.take():
             twist = message.twist if self._kind == TWIST_STAMPED else message
             life_s = self._emulator.wiring.timeout_s or FOREVER_S
-            self._emulator.command(twist.linear.x, twist.angular.z, life_s)
+            with contextlib.suppress(ValueError):  # of a number that is infinite or NaN
+                self._emulator.command(twist.linear.x, twist.angular.z, life_s)
 
     def _publish(self, ticks: int) -> None:
         for topic, (kind, message) in self._emulator.messages().items():

@@ -140,12 +140,14 @@ class EmulatedRos2(EmulatedRobot):
         """Take bytes of requests."""
         *lines, self._held = (self._held + data).split(b"\n")
         for line in lines:
+            number = None
             try:
                 request = parse_json(line)
-                answer = self._answer(request) | {"id": request.get("id")}
+                number = request.get("id")
+                answer = self._answer(request)
             except (ValueError, KeyError, TypeError, AttributeError) as error:
                 answer = {"error": f"{type(error).__name__}: {error}"}
-            self._answers += json.dumps(answer).encode() + b"\n"
+            self._answers += json.dumps(answer | {"id": number}).encode() + b"\n"
 
     def transmit(self) -> bytes:
         """Return the answers that have not been sent."""

@@ -164,7 +164,11 @@ def main() -> None:
     if settings.get("looks"):
         look(settings)
         return
-    gateway = Gateway(settings)
+    try:
+        gateway = Gateway(settings)
+    except ValueError as error:  # it answers the first request
+        sys.stdout.write(json.dumps({"error": str(error), "id": 1}) + "\n")
+        return
     if settings.get("halts"):  # another gateway was lost
         gateway.node.wait_for_subscriber(settings["command"])
     else:

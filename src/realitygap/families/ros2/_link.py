@@ -152,7 +152,7 @@ class Link:
         self.tell(what, request, answer)
         reply: dict[str, Any] = parse_json(answer)
         if "error" in reply:
-            raise RobotError(f"{self.name} refuses {what}: {reply['error']}.")
+            raise RobotError(f"{self.name}: {str(reply['error']).rstrip('.')}.")
         return reply
 
     def _answer(self, wait_s: float) -> bytes:

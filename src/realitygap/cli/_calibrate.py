@@ -82,7 +82,7 @@ def _measured(order: CalibrateOrder, camera: str | None, *, quiet: bool) -> Cali
     try:
         with resumable(kept), TrialsBar(quiet=quiet or is_led) as bar:
             sheet = sheet_observer(asks_for_start=False) if is_led else None
-            with under_camera(camera, where, sheet, order.witness) as observer:
+            with under_camera(camera, robot, where, sheet, order.witness) as observer:
                 return realitygap.study.make_calibration(
                     order, observer=observer, operator=operator, tell=partial(bar.show, robot)
                 )

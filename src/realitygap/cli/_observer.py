@@ -93,12 +93,17 @@ def _ask_for_start(plan: TrialPlan, arena: Arena, observe: Observe) -> None:
 
 @contextlib.contextmanager
 def under_camera(
-    spec: str | None, arena: Arena, observer: PortObserver | None, witness: str | None = None
+    spec: str | None,
+    target: str,
+    arena: Arena,
+    observer: PortObserver | None,
+    witness: str | None = None,
 ) -> Iterator[PortObserver | None]:
     """Return the observer of a robot, with a camera if one is named.
 
     Args:
         spec: Camera, as given by the user; None for none.
+        target: The robot, as the user named it.
         arena: Arena of the robot.
         observer: Observer without a camera; None if no person has to place the robot.
         witness: Witness of an emulated robot, which then places it, and does not report its poses.
@@ -111,6 +116,10 @@ def under_camera(
         yield observer
         return
     if spec == realitygap.study.OWN_POSES:
+        if not realitygap.platforms.class_of(target).is_physical:
+            raise StudyError(
+                f"--camera own is for a robot that tells its poses. Leave it out: {target} reports them anyway."
+            )
         yield realitygap.study.OwnPosesObserver(arena, observer or _witness_of(witness))
         return
     if observer is None:
@@ -145,7 +154,7 @@ def measuring(
     with (
         resumable(order.results, how),
         TrialsBar(quiet=quiet) as bar,
-        under_camera(camera, arena, observer, order.witness) as seen_by,
+        under_camera(camera, order.target, arena, observer, order.witness) as seen_by,
     ):
         yield {"observer": seen_by, "tell": bar.show, "say": bar.say}
 

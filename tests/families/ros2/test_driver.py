@@ -17,6 +17,9 @@ import pytest
 from realitygap.emulator import Walls
 from realitygap.errors import RobotError
 from realitygap.families.ros2 import Ros2Robot
+from realitygap.families.ros2._address import read_address
+from realitygap.families.ros2._graph import Ends, refuse_graph
+from realitygap.families.ros2._messages import ODOMETRY, TWIST
 from realitygap.robots import Command
 from realitygap.world import Pose, paper_arena
 
@@ -178,11 +181,30 @@ def test_two_robots_in_two_namespaces_are_told_apart(start_robot, domain, tmp_pa
         assert rests(one)
 
 
-def test_two_robots_in_one_namespace_are_refused(start_robot, domain, tmp_path):
+def test_two_robots_in_one_namespace_are_refused_when_the_second_appears(connect, start_robot):
+    _, robot = connect()
     start_robot(range=MOUNTS)
-    start_robot(range=MOUNTS)
+
+    def is_refused() -> bool:
+        try:
+            robot.observe()
+        except RobotError as error:
+            return "two robots in one namespace" in str(error)
+        return False
+
+    wait_until(is_refused)
+
+
+def test_two_robots_in_one_namespace_are_refused_at_the_beginning():
+    ends = [end | {"reliable": True, "durable": False} for end in (
+        {"role": "subscriber", "topic": "/cmd_vel", "kind": TWIST, "who": "a"},
+        {"role": "publisher", "topic": "/odom", "kind": ODOMETRY, "who": "a"},
+        {"role": "publisher", "topic": "/odom", "kind": ODOMETRY, "who": "b"},
+    )]  # fmt: skip
     with pytest.raises(RobotError, match="two robots in one namespace"):
-        open_driver(tmp_path, domain)
+        refuse_graph(
+            Ends(tuple(ends)), read_address("/"), "/cmd_vel", {"/odom": ODOMETRY}, [], is_complete=True
+        )
 
 
 @pytest.mark.parametrize(
@@ -203,9 +225,15 @@ def test_what_is_missing_is_named(start_robot, domain, tmp_path, options, driver
 def test_sensor_that_falls_silent_ends_the_trial_with_its_name(connect):
     fast, robot = connect(RANGES + "\nsilent_s = 0.5")
     fast.ask("mute range_1")
-    with pytest.raises(RobotError, match="/range_1 is silent"):  # noqa: PT012
-        while True:
+
+    def is_named() -> bool:
+        try:
             robot.observe()
+        except RobotError as error:
+            return "/range_1 is silent" in str(error)
+        return False
+
+    wait_until(is_named)
 
 
 def test_robot_that_leaves_the_network_is_silent_and_one_that_returns_is_read(connect):

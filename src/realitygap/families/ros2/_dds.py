@@ -146,7 +146,8 @@ class Node:
             self._participant = DomainParticipant(domain)
         except DDSException as error:
             raise ValueError(
-                f"DDS cannot use interface {interface or 'of CYCLONEDDS_URI'} in domain {domain}: {error.msg}"
+                f"DDS cannot use interface {interface or 'of CYCLONEDDS_URI'} in domain {domain}. Name one of this "
+                "machine, such as lo or wlan0, or auto."
             ) from error
         self._readers: dict[str, tuple[str, DataReader[Any]]] = {}
         self._writers: dict[tuple[str, str], DataWriter[Any]] = {}
@@ -186,17 +187,22 @@ class Node:
                 yield topic, sample
 
     def newest(self) -> dict[str, dict[str, Any]]:
-        """Return the newest message of each topic, its age [s], and how many came."""
+        """Return the newest message of each topic, its age [s], how many came, and how many programs publish it."""
         now = time.monotonic()
         found = {}
         for topic, known in self._newest.items():
-            kind, value = self.kind_of(topic), known["message"]
-            if (n := n_values(kind, value)) > MOST_VALUES:
-                found[topic] = {"n": known["n"], "age": now - known["at"], "too_long": n}
+            kind, reader = self._readers[topic]
+            seen = found[topic] = {
+                "n": known["n"],
+                "age": now - known["at"],
+                "publishers": len(reader.get_matched_publications()),
+            }
+            if (n := n_values(kind, known["message"])) > MOST_VALUES:
+                seen["too_long"] = n
                 continue
             if "plain" not in known or known["plain"][0] != known["n"]:
-                known["plain"] = known["n"], plain(kind, value)
-            found[topic] = {"n": known["n"], "age": now - known["at"], "message": known["plain"][1]}
+                known["plain"] = known["n"], plain(kind, known["message"])
+            seen["message"] = known["plain"][1]
         return found
 
     def _writer(self, topic: str, message: str) -> DataWriter[Any]:

@@ -101,8 +101,8 @@ class EmulatedRos2(EmulatedRobot):
             self._now += TICK
             if self._now > self._until:
                 self._twist = (0.0, 0.0)
-            ahead, turn = self._twist
             drive = self.model.drive
+            ahead, turn = self._twist[0] * drive.ahead, self._twist[1]
             if drive.mixing == "independent":
                 command = Command(_part(ahead / drive.speed), _part(turn / drive.turn_rate))
             else:

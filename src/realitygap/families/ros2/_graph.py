@@ -12,6 +12,8 @@ from . import _messages as m
 from ._address import Address
 
 COMMANDS = (m.TWIST, m.TWIST_STAMPED)
+SENSORS = (m.ODOMETRY, m.SCAN, m.RANGE)
+"""Types that one program of a robot publishes."""
 _MOST_NAMED = 12
 
 
@@ -72,11 +74,8 @@ def refuse_graph(
             raise RobotError(
                 f"{topic} has type {wrong[0]}, expected {kind}. Change [driver] in the robot file."
             )
-        if len({end["who"] for end in publishers}) > 1 and kind in (m.ODOMETRY, m.SCAN, m.RANGE):
-            raise RobotError(
-                f"{len(publishers)} programs publish {topic}: two robots in one namespace? Start each in a "
-                "namespace of its own, and name it: ros2:/robot1."
-            )
+        if kind in SENSORS:
+            refuse_two(topic, len({end["who"] for end in publishers}))
     if is_complete:
         return
     takers = ends.of("subscriber", command)
@@ -103,6 +102,19 @@ def refuse_graph(
             "service of its publisher: this reader asks for BEST_EFFORT and VOLATILE."
         )
     raise RobotError(f"The robot at {where} was not found in time. Try again.")
+
+
+def refuse_two(topic: str, n: int) -> None:
+    """Raise an error if several programs publish a topic of a robot's sensor.
+
+    Raises:
+        RobotError: They do.
+    """
+    if n > 1:
+        raise RobotError(
+            f"{n} programs publish {topic}: two robots in one namespace? Start each in a separate one, and name it: "
+            "ros2:/robot1."
+        )
 
 
 def _refuse_namespace(ends: Ends, command: str, where: str) -> NoReturn:

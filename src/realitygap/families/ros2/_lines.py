@@ -4,7 +4,7 @@
 |---|---|
 | `{"do": "drive", "ahead": m/s, "turn": rad/s, "life": s}` | `{}`; the command is repeated until its life ends |
 | `{"do": "stop"}` | `{}`; zeros are published and repeated |
-| `{"do": "read"}` | `now` [s], `topics` (newest message, age, number of each), `trails` ([now, x, y, yaw] of poses) |
+| `{"do": "read"}` | `now` [s], `topics` (newest message, age, number, publishers), `trails` ([now, x, y, yaw]) |
 | `{"do": "graph"}` | `graph` (who publishes and subscribes), `kinds` (the types of commands that somebody takes) |
 
 A request may have an `id`, which its answer repeats. An answer to a wrong request has `error`. A number that is

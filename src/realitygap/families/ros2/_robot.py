@@ -28,8 +28,8 @@ from realitygap.robots import (
 from realitygap.world import Pose
 
 from ._address import Address, read_address
-from ._graph import Ends, refuse_graph
-from ._lines import LIFE_S, MOST_TRAIL
+from ._graph import SENSORS, Ends, refuse_graph, refuse_two
+from ._lines import LIFE_S
 from ._link import START_S, Link, open_link, open_port
 from ._messages import full_topic
 from ._wiring import intensities_of, is_bumped, load_wired, range_of, respond, sectors_of
@@ -44,6 +44,8 @@ SETTLE_S = 0.5
 LOOK_S = 0.05
 LIFE_MARGIN_S = 0.2
 """Time for which a command outlives its step, so that the next one finds the motors running [s]."""
+MOST_PATH = 500_000
+"""Largest number of poses of a trial."""
 LEAST_SPEED = 0.02
 """Commanded speed of a wheel below which a robot does not count as stalled [m/s]; chosen."""
 
@@ -82,7 +84,7 @@ class Ros2Robot(PortDriver):
     bumper. `encoder.0` and `encoder.1` are the mean speed of each wheel since the last observation as a part of full
     speed, by odometry. It is stalled while it is bumped, or by `StallRule` if it has odometry.
 
-    A process of its own, the gateway, speaks DDS. It repeats a command until its life ends, and publishes zeros then,
+    A separate process, the gateway, speaks DDS. It repeats a command until its life ends, and publishes zeros then,
     and when this program ends or is killed. If the gateway is killed or frozen, another one publishes zeros.
 
     Args:
@@ -197,11 +199,12 @@ class Ros2Robot(PortDriver):
         for topic, rows in seen["trails"].items():
             for row in rows:
                 self._follow(topic, (row[1], row[2], row[3]))
-                if topic == self._poses_on:
+                if topic == self._poses_on and len(self._path) < MOST_PATH:
                     self._path.append((row[0], row[1], row[2], row[3]))
-                    del self._path[:-MOST_TRAIL]
         for topic in self._needed:
             known = seen["topics"].get(topic, {"age": math.inf})
+            if self._topics[topic] in SENSORS:  # another robot may appear at any time
+                refuse_two(topic, known.get("publishers", 1))
             if "too_long" in known:
                 raise RobotError(
                     f"A message on {topic} has {known['too_long']:,} values, which is too many for a sensor of a robot."
@@ -305,9 +308,11 @@ class Ros2Robot(PortDriver):
 
     def begin_path(self, start: Pose) -> None:
         """Begin a path at a pose, at which the robot stands."""
+        self._read()
+        newest = self._path[-1:]
         self._path.clear()
         self._read()
-        del self._path[:-1]
+        self._path[:] = (newest + self._path)[-1:]
         self._start = start
 
     def path(self) -> NDArray[np.float64]:
@@ -315,8 +320,16 @@ class Ros2Robot(PortDriver):
 
         Poses of odometry are moved so that the first one is the start. So are those of `pose`, unless `pose_frame` is
         `arena`.
+
+        Raises:
+            RobotError: There are more than 500,000.
         """
         self._read()
+        if len(self._path) >= MOST_PATH:
+            raise RobotError(
+                f"The robot has told {MOST_PATH:,} poses since the trial began, which is too many. Drive shorter "
+                "trials, or have it publish its poses less often."
+            )
         rows = np.array(self._path, np.float64).reshape(-1, 4)
         if (
             len(rows)

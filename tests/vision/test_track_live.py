@@ -206,7 +206,7 @@ def test_a_camera_as_an_option_says_what_it_looks_for():
     ):
         with pytest.raises(StudyError, match=said):
             parse_camera(spec, ARENA)
-    with pytest.raises(StudyError, match="report their poses"), under_camera("0", ARENA, None):
+    with pytest.raises(StudyError, match="report their poses"), under_camera("0", "sim", ARENA, None):
         pass
-    with under_camera(None, ARENA, None) as nobody:
+    with under_camera(None, "sim", ARENA, None) as nobody:
         assert nobody is None

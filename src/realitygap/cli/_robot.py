@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from math import isfinite
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -91,17 +92,36 @@ def list_ports(as_json: Json = False) -> None:
 
 
 @robot.command("info")
-def info(port: Port, as_json: Json = False, record: Record = None) -> None:
+def info(
+    port: Port,
+    probe: Annotated[
+        bool,
+        typer.Option(
+            "--probe",
+            help="Measure for how long the robot follows a command that is not repeated. It turns on the spot for "
+            "up to 5 s.",
+        ),
+    ] = False,
+    as_json: Json = False,
+    record: Record = None,
+) -> None:
     """Identify the robot on a port.
 
     Prints the model of the robot, its firmware, and whether the robot is real or emulated.
 
     Example: realitygap robot info /dev/rfcomm0
 
+    Example: realitygap robot info ros2:/robot1 --probe
+
     In Python: realitygap.robots.open_on("/dev/rfcomm0")[1].info
     """
     with _opened(port, record) as (terminal, opened):
+        if probe and not hasattr(opened, "timeout"):
+            raise RobotError(f"The robot on {port} has no timeout to measure. Leave --probe out.")
         found = terminal.info(opened)
+        if probe:
+            lasts_s = opened.timeout()
+            found |= {"measured_timeout_s": lasts_s if isfinite(lasts_s) else "5 or more"}
     _print(found, as_json)
 
 

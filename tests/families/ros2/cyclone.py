@@ -38,6 +38,11 @@ Twist = message("geometry_msgs", "Twist", linear=Vector3, angular=Vector3)
 TwistStamped = message("geometry_msgs", "TwistStamped", header=Header, twist=Twist)
 Pose = message("geometry_msgs", "Pose", position=Point, orientation=Quaternion)
 PoseStamped = message("geometry_msgs", "PoseStamped", header=Header, pose=Pose)
+Transform = message("geometry_msgs", "Transform", translation=Vector3, rotation=Quaternion)
+TransformStamped = message(
+    "geometry_msgs", "TransformStamped", header=Header, child_frame_id=str, transform=Transform
+)
+TFMessage = message("tf2_msgs", "TFMessage", transforms=sequence[TransformStamped])
 Covariance = array[float64, 36]
 PoseWithCovariance = message("geometry_msgs", "PoseWithCovariance", pose=Pose, covariance=Covariance)
 TwistWithCovariance = message("geometry_msgs", "TwistWithCovariance", twist=Twist, covariance=Covariance)
@@ -87,17 +92,20 @@ class Peer(ClosedOnExit):
             wait_until(lambda: bool(made.get_matched_subscriptions()))
         return made
 
-    def reader(self, topic: str, kind: Any, *, is_reliable: bool = False, depth: int = 1) -> DataReader:
-        """Return a reader."""
+    def reader(
+        self, topic: str, kind: Any, *, is_reliable: bool = False, is_durable: bool = False, depth: int = 1
+    ) -> DataReader:
+        """Return a reader; a durable one asks for messages of before."""
         reliability = (
             Policy.Reliability.Reliable(duration(seconds=10))
             if is_reliable
             else Policy.Reliability.BestEffort
         )
+        durability = Policy.Durability.TransientLocal if is_durable else Policy.Durability.Volatile
         return DataReader(
             self.participant,
             Topic(self.participant, topic, kind),
-            Qos(reliability, Policy.History.KeepLast(depth)),
+            Qos(reliability, durability, Policy.History.KeepLast(depth)),
         )
 
     def close(self) -> None:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import re
 import signal
 import subprocess
 import sys
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +21,7 @@ from realitygap.errors import RobotError
 from realitygap.families.ros2 import Ros2Robot
 from realitygap.families.ros2._address import read_address
 from realitygap.families.ros2._graph import Ends, refuse_graph
+from realitygap.families.ros2._link import Link
 from realitygap.families.ros2._messages import ODOMETRY, TWIST
 from realitygap.robots import Command
 from realitygap.world import Pose, paper_arena
@@ -26,6 +29,19 @@ from realitygap.world import Pose, paper_arena
 from .fast_dds import FastRobot, wait_until
 
 pytest.importorskip("cyclonedds", reason="needs the Python package cyclonedds")
+
+from .cyclone import (
+    Header,
+    Quaternion,
+    TFMessage,
+    Time,
+    Transform,
+    TransformStamped,
+    Twist,
+    Vector3,
+    valid,
+)
+
 pytestmark = pytest.mark.slow
 
 MOUNTS = [(0.05, 0.03, 0.5), (0.05, 0.0, 0.0), (0.05, -0.03, -0.5)]
@@ -220,6 +236,96 @@ def test_what_is_missing_is_named(start_robot, domain, tmp_path, options, driver
     start_robot(**{"range": MOUNTS} | options)
     with pytest.raises(RobotError, match=message):
         open_driver(tmp_path, domain, driver)
+
+
+def test_subscriber_with_another_quality_of_service_is_named(domain, peer, tmp_path):
+    kept = peer.reader("rt/cmd_vel", Twist, is_reliable=True, is_durable=True)
+    with pytest.raises(RobotError, match="subscriber of /cmd_vel asks for durability TRANSIENT_LOCAL"):
+        open_driver(tmp_path, domain)
+    assert valid(kept) == []
+
+
+def test_robot_that_appears_while_it_is_looked_for_is_found(start_robot, domain, tmp_path, monkeypatch):
+    fast = start_robot(range=MOUNTS)
+    fast.ask("leave")
+    asked, ask = [], Link.ask
+
+    def ask_and_return(link: Link, what: str, *more: float, **values: float) -> dict[str, Any]:
+        answer = ask(link, what, *more, **values)
+        asked.append(answer)
+        if len(asked) == 2:
+            fast.ask("return")
+        return answer
+
+    monkeypatch.setattr(Link, "ask", ask_and_return)
+    with open_driver(tmp_path, domain) as robot:
+        assert robot.observe().readings
+    assert asked[0]["graph"] == []
+
+
+def transforms(*steps: tuple[str, str, float, float, float]) -> Any:
+    return TFMessage([
+        TransformStamped(
+            Header(Time(0, 0), parent),
+            child,
+            Transform(Vector3(x, y, 0.5), Quaternion(0.0, 0.0, np.sin(turn / 2), np.cos(turn / 2))),
+        )
+        for parent, child, x, y, turn in steps
+    ])  # fmt: skip
+
+
+TF = RANGES + '\npose = "/tf"\npose_frame = "arena"\npose_frames = ["map", "base_link"]'
+
+
+def test_transforms_tell_poses_through_all_frames_between(connect, peer):
+    writer = peer.writer("rt/tf", TFMessage, is_matched=False)
+    turned = np.pi / 2
+    sent = transforms(
+        ("map", "/odom", 0.3, 0.2, turned), ("odom", "base_link", 0.1, 0.0, -turned), ("map", "cup", 9, 9, 9)
+    )
+    with published(writer, sent):
+        _, robot = connect(TF)
+        robot.begin_path(Pose(0.0, 0.0, 0.0))
+        assert robot.path()[-1, 1:] == pytest.approx([0.3, 0.3, 0.0])
+    writer.write(transforms(("odom", "base_link", 0.2, 0.1, 0.0)))
+    wait_until(lambda: robot.path()[-1, 1:] == pytest.approx([0.2, 0.4, turned]))
+
+
+def test_transforms_without_the_frames_are_named(start_robot, domain, peer, tmp_path):
+    start_robot(range=MOUNTS)
+    writer = peer.writer("rt/tf", TFMessage, is_matched=False)
+    with (
+        published(writer, transforms(("map", "odom", 0, 0, 0), ("world", "base_link", 0, 0, 0))),
+        pytest.raises(RobotError, match=r"tells no pose .* there: world > base_link, map > odom"),
+    ):
+        open_driver(tmp_path, domain, TF)
+
+
+@contextlib.contextmanager
+def published(writer: Any, message: Any) -> Iterator[None]:
+    """Publish a message again and again."""
+    is_over = threading.Event()
+
+    def publish() -> None:
+        while not is_over.wait(0.05):
+            writer.write(message)
+
+    thread = threading.Thread(target=publish)
+    thread.start()
+    try:
+        yield
+    finally:
+        is_over.set()
+        thread.join()
+
+
+@pytest.mark.parametrize(("timeout", "least", "most"), [(0.5, 0.5, 1.5), (0, np.inf, np.inf)])
+def test_probe_measures_the_robots_own_timeout(connect, timeout, least, most):
+    # A busy computer may need longer to hear of the stop, but never hears of it too early.
+    fast, robot = connect(timeout=timeout)
+    fast.place(MIDDLE)
+    assert least - 0.06 <= robot.timeout() <= most
+    wait_until(lambda: rests(fast))
 
 
 def test_sensor_that_falls_silent_ends_the_trial_with_its_name(connect):

@@ -18,7 +18,7 @@ from realitygap.trials import NoiseKey
 from realitygap.world import Arena, Pose, RangeSensor, load_robot
 
 from . import _messages as m
-from ._lines import LIFE_S, MOST_TRAIL
+from ._lines import LIFE_S, MOST_TRAIL, ONCE_S
 from ._messages import full_topic
 from ._robot import DEFAULT_ROBOT
 from ._wiring import load_wired
@@ -157,7 +157,8 @@ class EmulatedRos2(EmulatedRobot):
     def _answer(self, request: Mapping[str, Any]) -> dict[str, Any]:
         what = request["do"]
         if what == "drive":
-            self.command(float(request["ahead"]), float(request["turn"]), min(float(request["life"]), LIFE_S))
+            most = (self.wiring.timeout_s or ONCE_S) if request.get("once") else LIFE_S
+            self.command(float(request["ahead"]), float(request["turn"]), min(float(request["life"]), most))
             return {}
         if what == "stop":
             self.command(0.0, 0.0, 0.0)

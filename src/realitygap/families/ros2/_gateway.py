@@ -20,8 +20,9 @@ from typing import Any
 from realitygap._limits import parse_json
 
 from ._dds import Node
-from ._lines import LIFE_S, MOST_TRAIL, REPEAT_S, TICK_S, ZEROS_S
-from ._messages import ODOMETRY, POSE, TWIST_STAMPED
+from ._frames import Frames, planar
+from ._lines import LIFE_S, MOST_TRAIL, ONCE_S, REPEAT_S, TICK_S, ZEROS_S
+from ._messages import ODOMETRY, POSE, TF, TWIST_STAMPED
 
 PIECE = 1 << 16
 LOOK_S = 1.0
@@ -34,7 +35,7 @@ class Gateway:
     """Serves one driver.
 
     Args:
-        settings: `domain`, `interface`, `command` (its topic), and `topics`, types by topic.
+        settings: `domain`, `interface`, `command` (its topic), `topics` (types by topic), and `frames` (of transforms).
     """
 
     def __init__(self, settings: dict[str, Any]) -> None:
@@ -43,8 +44,10 @@ class Gateway:
         for topic, kind in settings["topics"].items():
             self.node.subscribe(topic, kind)
         self._trails: dict[str, list[list[float]]] = {}
+        self._frames = Frames(*settings.get("frames", ("", "")))
         self._twist = (0.0, 0.0)
         self._until = -math.inf  # the end of the command's life
+        self._repeats = True
         self._zeros_until = -math.inf
         self._published = -math.inf
         self._clock_offset = 0.0  # of the robot's time from this machine's
@@ -53,7 +56,12 @@ class Gateway:
         """Do what a request says, and return the answer."""
         what = request["do"]
         if what == "drive":
-            self.drive(float(request["ahead"]), float(request["turn"]), float(request["life"]))
+            self.drive(
+                float(request["ahead"]),
+                float(request["turn"]),
+                float(request["life"]),
+                not request.get("once"),
+            )
             return {}
         if what == "stop":
             self.stop()
@@ -61,20 +69,36 @@ class Gateway:
         if what == "read":
             self.tick()
             trails, self._trails = self._trails, {}
-            return {"now": time.monotonic(), "topics": self.node.newest(), "trails": trails}
+            topics = {topic: self._framed(topic, known) for topic, known in self.node.newest().items()}
+            return {
+                "now": time.monotonic(),
+                "topics": {topic: known for topic, known in topics.items() if known},
+                "trails": trails,
+            }
         if what == "graph":
-            return {"graph": self.node.graph(), "kinds": self.node.command_kinds(self._command)}
+            return {
+                "graph": self.node.graph(),
+                "kinds": self.node.command_kinds(self._command),
+                "frames": self._frames.known(),
+            }
         raise ValueError(f"unknown request {what!r}")
 
-    def drive(self, ahead: float, turn: float, life_s: float) -> None:
+    def _framed(self, topic: str, known: dict[str, Any]) -> dict[str, Any]:
+        """Return what is known of a topic; of transforms, only the pose of the robot, empty if there is none."""
+        if self.node.kind_of(topic) != TF:
+            return known
+        at = self._frames.at
+        return {} if at is None else known | {"age": time.monotonic() - at[0], "message": {"pose": at[1:]}}
+
+    def drive(self, ahead: float, turn: float, life_s: float, repeats: bool = True) -> None:
         """Publish a command [m/s, rad/s], and repeat it until its life ends [s]."""
-        self._twist = ahead, turn
-        self._until = time.monotonic() + min(life_s, LIFE_S)
+        self._twist, self._repeats = (ahead, turn), repeats
+        self._until = time.monotonic() + min(life_s, LIFE_S if repeats else ONCE_S)
         self._publish()
 
     def stop(self) -> None:
         """Publish zeros, and repeat them for a while."""
-        self._twist, self._until = (0.0, 0.0), -math.inf
+        self._twist, self._until, self._repeats = (0.0, 0.0), -math.inf, True
         self._zeros_until = time.monotonic() + ZEROS_S
         self._publish()
 
@@ -87,17 +111,23 @@ class Gateway:
                 self._clock_offset = stamp.sec + stamp.nanosec * 1e-9 - time.time()
             if kind in (ODOMETRY, POSE):
                 pose = message.pose.pose if kind == ODOMETRY else message.pose
-                at, way = pose.position, pose.orientation
-                row = [time.monotonic(), at.x, at.y, yaw_of(way.x, way.y, way.z, way.w)]
-                if all(map(math.isfinite, row)):
-                    trail = self._trails.setdefault(topic, [])
-                    trail.append(row)
-                    del trail[:-MOST_TRAIL]
+                self._keep(topic, [time.monotonic(), *planar(pose.position, pose.orientation)])
+            elif kind == TF and self._frames.take(message) and self._frames.at:
+                self._keep(topic, [*self._frames.at])
         now = time.monotonic()
         if self._twist != (0.0, 0.0) and now >= self._until:
             self.stop()
-        elif (now < self._until or now < self._zeros_until) and now - self._published >= REPEAT_S:
+        elif (
+            self._repeats and now < max(self._until, self._zeros_until) and now - self._published >= REPEAT_S
+        ):
             self._publish()
+
+    def _keep(self, topic: str, row: list[float]) -> None:
+        """Add a time [s] and a pose to the trail of a topic."""
+        if all(map(math.isfinite, row)):
+            trail = self._trails.setdefault(topic, [])
+            trail.append(row)
+            del trail[:-MOST_TRAIL]
 
     def _publish(self) -> None:
         ahead, turn = self._twist
@@ -117,11 +147,6 @@ class Gateway:
         while time.monotonic() < end:
             self._publish()
             time.sleep(REPEAT_S)
-
-
-def yaw_of(x: float, y: float, z: float, w: float) -> float:
-    """Return the heading of a quaternion [rad]."""
-    return math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
 
 
 def serve(gateway: Gateway, program: int) -> None:

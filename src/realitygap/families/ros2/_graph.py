@@ -49,6 +49,7 @@ def refuse_graph(
     command: str,
     topics: Mapping[str, str],
     missing: Sequence[str],
+    frames: Sequence[str] = (),
     *,
     is_complete: bool,
 ) -> None:
@@ -60,6 +61,7 @@ def refuse_graph(
         command: Topic of its commands.
         topics: Types of the topics that the driver reads.
         missing: Topics of which no message came.
+        frames: Transforms that came.
         is_complete: True if nothing is missing, so that only two robots are refused.
 
     Raises:
@@ -96,6 +98,11 @@ def refuse_graph(
             raise RobotError(
                 f"Nobody publishes {topic} at {where}. Topics there: {_listed(ends)}. Start the robot's driver of this "
                 "sensor, or name another topic in [driver] of the robot file."
+            )
+        if topics[topic] == m.TF:
+            raise RobotError(
+                f"{topic} tells no pose between the frames of pose_frames in [driver] of the robot file. Transforms "
+                f"there: {', '.join(frames) or 'none'}. Static transforms are not read."
             )
         raise RobotError(
             f"{topic} is silent: it has a publisher, and no message came. Check the sensor, and the quality of "

@@ -3,6 +3,7 @@
 | request | answer |
 |---|---|
 | `{"do": "drive", "ahead": m/s, "turn": rad/s, "life": s}` | `{}`; the command is repeated until its life ends |
+| `{"do": "drive", …, "once": 1}` | `{}`; the command is published once, and zeros at the end of its life |
 | `{"do": "stop"}` | `{}`; zeros are published and repeated |
 | `{"do": "read"}` | `now` [s], `topics` (newest message, age, number, publishers), `trails` ([now, x, y, yaw]) |
 | `{"do": "graph"}` | `graph` (who publishes and subscribes), `kinds` (the types of commands that somebody takes) |
@@ -16,7 +17,9 @@ REPEAT_S = 0.05
 ZEROS_S = 0.5
 """Time for which zeros are repeated after a stop [s]."""
 LIFE_S = 2.0
-"""Longest life of a command [s]."""
+"""Longest life of a command that is repeated [s]."""
+ONCE_S = 5.0
+"""Longest life of a command that is published once [s]."""
 TICK_S = 0.01
 """Time between two looks for messages [s]."""
 MOST_TRAIL = 10_000

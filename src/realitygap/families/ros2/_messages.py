@@ -1,7 +1,7 @@
 """Messages of ROS 2: their definitions, as `.msg` files have them, and their names on the wire.
 
-Sources: the packages common_interfaces, rcl_interfaces, irobot_create_msgs, and turtlebot3_msgs of ROS 2 Jazzy, without
-their comments. On the wire, topic `/odom` is `rt/odom`, and type `nav_msgs/msg/Odometry` is
+Sources: the packages common_interfaces, geometry2, rcl_interfaces, irobot_create_msgs, and turtlebot3_msgs of ROS 2
+Jazzy, without their comments. On the wire, topic `/odom` is `rt/odom`, and type `nav_msgs/msg/Odometry` is
 `nav_msgs::msg::dds_::Odometry_` (design.ros2.org, "Topic and Service name mapping to DDS").
 """
 
@@ -20,6 +20,10 @@ DEFINITIONS = {
     "geometry_msgs/msg/Pose": "geometry_msgs/Point position\ngeometry_msgs/Quaternion orientation",
     "geometry_msgs/msg/PoseStamped": "std_msgs/Header header\ngeometry_msgs/Pose pose",
     "geometry_msgs/msg/PoseWithCovariance": "geometry_msgs/Pose pose\nfloat64[36] covariance",
+    "geometry_msgs/msg/Transform": "geometry_msgs/Vector3 translation\ngeometry_msgs/Quaternion rotation",
+    "geometry_msgs/msg/TransformStamped": (
+        "std_msgs/Header header\nstring child_frame_id\ngeometry_msgs/Transform transform"
+    ),
     "geometry_msgs/msg/Twist": "geometry_msgs/Vector3 linear\ngeometry_msgs/Vector3 angular",
     "geometry_msgs/msg/TwistStamped": "std_msgs/Header header\ngeometry_msgs/Twist twist",
     "geometry_msgs/msg/TwistWithCovariance": "geometry_msgs/Twist twist\nfloat64[36] covariance",
@@ -27,6 +31,7 @@ DEFINITIONS = {
         "std_msgs/Header header\nstring child_frame_id\ngeometry_msgs/PoseWithCovariance pose\n"
         "geometry_msgs/TwistWithCovariance twist"
     ),
+    "tf2_msgs/msg/TFMessage": "geometry_msgs/TransformStamped[] transforms",
     "sensor_msgs/msg/LaserScan": (
         "std_msgs/Header header\nfloat32 angle_min\nfloat32 angle_max\nfloat32 angle_increment\n"
         "float32 time_increment\nfloat32 scan_time\nfloat32 range_min\nfloat32 range_max\nfloat32[] ranges\n"
@@ -59,7 +64,8 @@ DEFINITIONS = {
 
 TWIST, TWIST_STAMPED = "geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped"
 ODOMETRY, SCAN, RANGE = "nav_msgs/msg/Odometry", "sensor_msgs/msg/LaserScan", "sensor_msgs/msg/Range"
-POSE, BATTERY, BOOL = "geometry_msgs/msg/PoseStamped", "sensor_msgs/msg/BatteryState", "std_msgs/msg/Bool"
+POSE, TF = "geometry_msgs/msg/PoseStamped", "tf2_msgs/msg/TFMessage"
+BATTERY, BOOL = "sensor_msgs/msg/BatteryState", "std_msgs/msg/Bool"
 HAZARDS, SENSOR_STATE = "irobot_create_msgs/msg/HazardDetectionVector", "turtlebot3_msgs/msg/SensorState"
 INTENSITIES = "irobot_create_msgs/msg/IrIntensityVector"
 

@@ -29,7 +29,7 @@ from realitygap.world import Pose
 
 from ._address import Address, read_address
 from ._graph import SENSORS, Ends, refuse_graph, refuse_two
-from ._lines import LIFE_S
+from ._lines import LIFE_S, ONCE_S
 from ._link import START_S, Link, open_link, open_port
 from ._messages import full_topic
 from ._wiring import intensities_of, is_bumped, load_wired, range_of, respond, sectors_of
@@ -39,13 +39,17 @@ DISCOVERY_S = 5.0
 """Longest wait for a robot's topics, and for the first message of each [s]."""
 SETTLE_S = 0.5
 """Time for which discovery goes on when a robot was found [s]: another one may have the same topics."""
-SETTLE_S = 0.5
-"""Time for which discovery goes on when a robot was found [s]: another one may have the same topics."""
 LOOK_S = 0.05
 LIFE_MARGIN_S = 0.2
 """Time for which a command outlives its step, so that the next one finds the motors running [s]."""
 MOST_PATH = 500_000
 """Largest number of poses of a trial."""
+PROBE_TURN = 0.5
+"""Turn rate at which a robot's own timeout is measured [rad/s]."""
+PROBE_NEAR = 0.02
+"""Heading that counts as that at the end [rad]."""
+PROBE_REST_S = 0.7
+"""Rest before that [s], until the zeros of a stop are over."""
 LEAST_SPEED = 0.02
 """Commanded speed of a wheel below which a robot does not count as stalled [m/s]; chosen."""
 
@@ -122,7 +126,11 @@ class Ros2Robot(PortDriver):
         self._needed = self.wiring.needed(namespace)
         self._odometry = self._full(self.wiring.odometry)
         self._command = self._full(self.wiring.command)
-        settings = {"command": self._command, "topics": self._topics}
+        settings = {
+            "command": self._command,
+            "topics": self._topics,
+            "frames": self.wiring.pose_frames or ("", ""),
+        }
         self.link: Link = (
             open_link(self._address, settings) if isinstance(port, str) else open_port(port, self._name)
         )
@@ -182,25 +190,26 @@ class Ros2Robot(PortDriver):
         while True:
             seen = self.link.ask("graph")
             ends = Ends(tuple(seen["graph"]))
-            came = self.link.ask("read")["topics"]
+            came = self._ask_read()["topics"]
             missing = [topic for topic in self._needed if topic not in came]
             is_complete, now = bool(seen["kinds"]) and not missing, time.monotonic()
             settled = settled or (now + SETTLE_S * bool(self._address.namespace) if is_complete else 0.0)
             if now >= (settled if is_complete else until):
                 refuse_graph(
-                    ends, self._address, self._command, self._topics, missing, is_complete=is_complete
+                    ends,
+                    self._address,
+                    self._command,
+                    self._topics,
+                    missing,
+                    seen.get("frames", ()),
+                    is_complete=is_complete,
                 )
                 return [str(kind) for kind in seen["kinds"]]
             time.sleep(LOOK_S)
 
     def _read(self) -> dict[str, Any]:
         """Return the newest message of each topic, and follow odometry."""
-        seen = self.link.ask("read")
-        for topic, rows in seen["trails"].items():
-            for row in rows:
-                self._follow(topic, (row[1], row[2], row[3]))
-                if topic == self._poses_on and len(self._path) < MOST_PATH:
-                    self._path.append((row[0], row[1], row[2], row[3]))
+        seen = self._ask_read()
         for topic in self._needed:
             known = seen["topics"].get(topic, {"age": math.inf})
             if self._topics[topic] in SENSORS:  # another robot may appear at any time
@@ -218,6 +227,16 @@ class Ros2Robot(PortDriver):
             topic: known["message"] for topic, known in seen["topics"].items() if "message" in known
         }
         return topics
+
+    def _ask_read(self) -> dict[str, Any]:
+        """Return the answer to a reading, whose poses are kept."""
+        seen = self.link.ask("read")
+        for topic, rows in seen["trails"].items():
+            for row in rows:
+                self._follow(topic, (row[1], row[2], row[3]))
+                if topic == self._poses_on and len(self._path) < MOST_PATH:
+                    self._path.append((row[0], row[1], row[2], row[3]))
+        return seen
 
     def _follow(self, topic: str, pose: tuple[float, float, float]) -> None:
         """Add a step of odometry to the way of the wheels."""
@@ -359,6 +378,44 @@ class Ros2Robot(PortDriver):
         message = self._read().get(self._full(self.wiring.battery))
         return math.nan if message is None or message["voltage"] is None else float(message["voltage"])
 
+    def timeout(self) -> float:
+        """Return the time for which the robot follows a command that is not repeated [s]; inf: 5 s and longer.
+
+        It turns on the spot, at 0.5 rad/s or less, and the heading of its poses shows when this ends. So the time has
+        the delay and the lag of the robot in it.
+
+        Raises:
+            RobotError: It tells no poses, does not turn, or the link is lost.
+        """
+        if not self.tells_poses:
+            raise RobotError(
+                "The robot tells no poses, which would show when it stops. Name its odometry in [driver] of its file."
+            )
+        self.reset()
+        self.clock.sleep(PROBE_REST_S)
+        self._read()
+        self._path.clear()
+        turn = min(PROBE_TURN, self.wiring.most_turn)
+        began = self.clock.now()
+        self.link.ask("drive", ahead=0.0, turn=turn, life=ONCE_S, once=1)
+        until, turned = began + ONCE_S, np.empty((0, 2))
+        while (now := self.clock.now()) < until:
+            self.clock.sleep(LOOK_S)
+            self._read()
+            rows = np.array(self._path, np.float64).reshape(-1, 4)
+            turned = np.column_stack([rows[:, 0], np.unwrap(rows[:, 3])])
+            if (
+                len(turned)
+                and abs(turned[-1, 1] - turned[0, 1]) > PROBE_NEAR
+                and now - _last_turn(turned) > 1.0
+            ):
+                break
+        self._stop_motors()
+        if not len(turned) or abs(turned[-1, 1] - turned[0, 1]) <= PROBE_NEAR:
+            raise RobotError("The robot did not turn. Check that it is on, and that nothing holds it.")
+        lasts_s = _last_turn(turned) + PROBE_NEAR / turn - began
+        return math.inf if lasts_s > ONCE_S - PROBE_REST_S else lasts_s
+
     def drive(self, command: Command) -> None:
         """Drive one command for `step_s`: left wheel move - turn, right wheel move + turn, limited to -1..1.
 
@@ -410,6 +467,11 @@ class Ros2Robot(PortDriver):
 def _address_of(port: Any) -> Address:
     """Return the address of an open port."""
     return Address("", str(getattr(port, "name", "")), 0, "", "", "EMULATED")
+
+
+def _last_turn(turned: NDArray[np.float64]) -> float:
+    """Return the last time at which a heading was not near its end, of times [s] and headings [rad], (t, 2)."""
+    return float(turned[np.abs(turned[:, 1] - turned[-1, 1]) > PROBE_NEAR, 0][-1])
 
 
 def _short(message: Any) -> Any:

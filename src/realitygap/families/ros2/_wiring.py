@@ -46,7 +46,12 @@ class Wiring(Settings):
     )
     pose: str = Field(
         "",
-        description="Topic of geometry_msgs/PoseStamped, as of a motion capture. Empty: odometry tells poses.",
+        description="Topic of geometry_msgs/PoseStamped, as of a motion capture, or of TF, such as /tf. Empty: "
+        "odometry tells poses.",
+    )
+    pose_frames: tuple[str, str] | None = Field(
+        None,
+        description="Frames of the arena and of the robot, if `pose` is a topic of TF: ['map', 'base_link'].",
     )
     pose_frame: Literal["start", "arena"] = Field(
         "start",
@@ -83,7 +88,7 @@ class Wiring(Settings):
         """Return the types of all topics that the driver reads, by full name."""
         kinds = [
             (self.odometry, m.ODOMETRY),
-            (self.pose, m.POSE),
+            (self.pose, m.TF if self.pose_frames else m.POSE),
             (self.scan.topic if self.scan else "", m.SCAN),
             *((topic, m.RANGE) for topic in self.ranges),
             (self.intensity, m.INTENSITIES),

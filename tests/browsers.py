@@ -29,6 +29,16 @@ ARGUMENTS = [
 ]
 LOCAL = ("file:", "data:")
 """How addresses of pages in files begin, and of what is in them."""
+RECORD = """() => {
+  window.presses = [];
+  const text = ({ target }) => (target.textContent || target.ariaLabel || "").trim().slice(0, 40);
+  for (const kind of ["pointerdown", "pointerup", "click", "keydown"])
+    addEventListener(kind, (event) => {
+      const at = [performance.now(), event.clientX, event.clientY].map(Math.round).join(" ");
+      presses.push(`${at} ${kind} ${event.key ?? ""} ${event.target.tagName} ${text(event)}`);
+    }, true);
+}"""
+"""Keeps what was pressed: time since the page was loaded [ms], place, and element."""
 STORED = "local_storage,indexeddb,cache_storage,service_workers"
 
 
@@ -113,6 +123,20 @@ class Visitors:
         complaints, self.complaints = self.complaints, []
         assert complaints == [], complaints
 
+    def state(self) -> str:
+        """Return what the open pages show, and what was pressed there, for the report of a test that failed."""
+        shown = []
+        for _, context in self._used:
+            for page in context.pages[1:] if context not in self._closed else ():
+                with contextlib.suppress(Exception):  # a page that is lost must not hide the failure
+                    shown += [
+                        page.url,
+                        *page.evaluate(
+                            "() => [document.body.className, document.body.innerText, ...presses.slice(-40)]"
+                        ),
+                    ]
+        return "\n".join(shown + self.complaints)
+
     def _context(self, **options: Any) -> Any:
         kind = repr(sorted(options.items()))
         free = self._free.setdefault(kind, [])
@@ -122,6 +146,7 @@ class Visitors:
             context = self.browser.new_context(**options)
             context.on("close", lambda closed: self._closed.append(closed))
             context.on("request", self._check)
+            context.add_init_script(f"({RECORD})()")
             context.new_page()
         self._used.append((kind, context))
         return context

@@ -195,6 +195,16 @@ def visitors() -> Iterator[Visitors]:
         yield Visitors(browser)
 
 
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item: pytest.Item) -> Iterator[None]:
+    """Add what the pages show to the report of a failed test."""
+    report = yield
+    visitors = getattr(item, "funcargs", {}).get("visitors")
+    if report.when == "call" and report.failed and visitors is not None:
+        report.sections.append(("Pages", visitors.state()))
+    return report
+
+
 @pytest.fixture
 def visit(visitors: Visitors, lab: RunningLab) -> Iterator[Callable[..., Any]]:
     """Opens a page of the lab, in a browser of its own: visit("new")."""

@@ -70,6 +70,25 @@ def test_button_that_is_drawn_again_between_press_and_release_is_pressed(board, 
     board.get_by_text("2 students joined").wait_for()
 
 
+@pytest.mark.parametrize(("way_px", "counts"), [(0, True), (60, False)])
+def test_button_that_moves_away_between_press_and_release_is_pressed_unless_the_pointer_moved(
+    board, way_px, counts
+):
+    board, _ = board
+    start = board.get_by_role("button", name="Start round")
+    start.evaluate("""it => addEventListener("click", ({ target }) => {
+      window.clicked = window.clicked || it.contains(target);
+    }, true)""")
+    box = start.bounding_box()
+    board.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    board.mouse.down()
+    start.evaluate("it => { it.style.transform = 'translateY(150px)'; }")
+    board.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2 + way_px)
+    board.mouse.up()
+    board.wait_for_function("() => 'clicked' in window")
+    assert board.evaluate("() => clicked") is counts
+
+
 def test_press_of_a_button_that_was_drawn_again_before_it_arrived_counts_once(board):
     board, join = board
     board.evaluate(HOLD)

@@ -53,6 +53,19 @@
   for (const end of ["pointerup", "pointercancel", "keyup"]) addEventListener(end, () => { if (press) waitFor(CLICK_MS); }, true);
   addEventListener("click", () => { if (press) waitFor(0); }, true);
 
+  // A section that opens moves a control while it is pressed. If the pointer did not move, the press counts nevertheless.
+  const NEAR_PX = 5;
+  let down = null;
+  addEventListener("pointerdown", (event) => {
+    down = event.button === 0 && isPress(event) ? { control: event.target.closest(CONTROLS), x: event.clientX, y: event.clientY } : null;
+  }, true);
+  addEventListener("pointerup", (event) => {
+    const held = down;
+    down = null;
+    if (!held || Math.hypot(event.clientX - held.x, event.clientY - held.y) > NEAR_PX) return;
+    if (!(event.target instanceof Node && held.control.contains(event.target))) held.control.click();
+  }, true);
+
   // A value is checked when its field is left, such as by pressing a button. A message would move that button away from the
   // pointer before it is released, and the click would be lost. So the check waits for the release.
   let isHeld = false;

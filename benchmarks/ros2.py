@@ -81,7 +81,8 @@ STUDY = """
 name = "on-ros2"
 replicates = 1
 seed = 1
-population_size = 8
+[neat]
+population = 8
 generations = 3
 [platform.ros2]
 robot = "fast.toml"

@@ -14,6 +14,7 @@ from ._registry import (
     study_platforms,
 )
 from ._repeats import retry_genomes, score_genomes
+from ._robot_file import RobotFilePlatform
 from ._settings import PlatformSettings
 from ._simulated import SimTarget
 from ._spec import (
@@ -60,6 +61,7 @@ __all__ = [
     "RecordedPlatform",
     "RecordedTarget",
     "Rehearsal",
+    "RobotFilePlatform",
     "SimEnsemble",
     "SimPlatform",
     "SimRobot",

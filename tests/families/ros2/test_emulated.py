@@ -28,7 +28,9 @@ ROBOTS = [name for name in robot_names() if load_robot(name).driver.get("family"
 @pytest.mark.parametrize("name", ROBOTS)
 def test_each_shipped_robot_can_be_emulated_and_keeps_the_contract(name):
     check_robot(Ros2Robot(f"{PORT}&robot={name}"))
-    check_platform(platform_of(f"ros2:{PORT}&robot={name}"))
+    platform = platform_of(f"ros2:{PORT}&robot={name}")
+    check_platform(platform)
+    assert len(platform.body.corners) > 2
 
 
 def test_robot_drives_as_its_body_and_odometry_tells_it(tmp_path):

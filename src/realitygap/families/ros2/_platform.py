@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar
 
 from pydantic import Field
 
-from realitygap.platforms import PortPlatform
-from realitygap.world import Body, RangeSensors, RobotModel, load_robot
+from realitygap.platforms import PortPlatform, RobotFilePlatform
 
 from ._address import read_address
 from ._robot import DEFAULT_ROBOT
@@ -17,7 +15,7 @@ if TYPE_CHECKING:
     from ._robot import Ros2Robot
 
 
-class Ros2Platform(PortPlatform):
+class Ros2Platform(RobotFilePlatform, PortPlatform):
     """A robot on ROS 2, without an installation of ROS. Its address comes from the command line.
 
     An address is the namespace of its topics, such as `ros2:/` or `ros2:/robot1?domain=0&interface=wlan0`. Discovery
@@ -47,14 +45,10 @@ class Ros2Platform(PortPlatform):
         """Name or file of the robot at the port."""
         return (read_address(self.port).robot if self.port else "") or self.robot
 
-    @cached_property
-    def _model(self) -> RobotModel:
-        return load_robot(self.robot_name)
-
     @property
     def channels(self) -> tuple[str, ...]:  # type: ignore[override]
         """Names of its sensors besides range sensors, by its topics."""
-        driver = self._model.driver
+        driver = self.model.driver
         return (
             *(("bump.0",) if driver.get("bump") else ()),
             *(("encoder.0", "encoder.1") if driver.get("odometry") else ()),
@@ -64,21 +58,6 @@ class Ros2Platform(PortPlatform):
     def command_s(self) -> float:
         """Duration of a command [s]."""
         return self.step_s
-
-    @property
-    def body(self) -> Body:
-        """The outline of the robot file's first part in figures."""
-        return Body(tuple(self._model.body[0].corners))
-
-    @property
-    def sensors(self) -> RangeSensors:
-        """The mounts of its range sensors in figures."""
-        return RangeSensors(self._model.mounts, self._model.reach)
-
-    @property
-    def outline_words(self) -> str:
-        """The origin of the outline in figures, for their captions."""
-        return f"{self._model.name}’s"
 
     def connect(self) -> Ros2Robot:
         """Connect to the robot at the port.

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar, Self
 
 from pydantic import Field, PrivateAttr
 
-from realitygap.platforms import Opening, Platform, PortPlatform
-from realitygap.world import Arena, Body, RangeSensors, RobotModel, load_robot
+from realitygap.platforms import Opening, PortPlatform, RobotFilePlatform
+from realitygap.world import Arena
 
 if TYPE_CHECKING:
     from realitygap.robots import Port
@@ -17,29 +16,10 @@ if TYPE_CHECKING:
     from ._robot import Thymio
 
 
-class ThymioBody(Platform):
+class ThymioBody(RobotFilePlatform):
     """A platform whose robot is a Thymio II."""
 
     base_robot: ClassVar[str] = "thymio"
-
-    @cached_property
-    def _model(self) -> RobotModel:
-        return load_robot(self.base_robot)
-
-    @property
-    def body(self) -> Body:
-        """The outline of the Thymio in figures."""
-        return Body(tuple(self._model.body[0].corners))
-
-    @property
-    def sensors(self) -> RangeSensors:
-        """The mounts of its infrared sensors in figures."""
-        return RangeSensors(self._model.mounts, self._model.reach)
-
-    @property
-    def outline_words(self) -> str:
-        """The origin of the outline in figures, for their captions."""
-        return "Enki’s"
 
 
 class ThymioPlatform(ThymioBody, PortPlatform):

@@ -23,16 +23,15 @@ from pydantic import (
 from realitygap.robot_families import default_family
 from realitygap.world import (
     Arena,
-    Body,
     Calibration,
     Distribution,
     Pose,
-    RangeSensors,
     RobotModel,
     load_robot,
     read_calibration,
 )
 
+from .._robot_file import RobotFilePlatform
 from .._simulated import SimulatedPlatform
 
 T = TypeVar("T")
@@ -115,7 +114,7 @@ def _why_not(robot: RobotModel, numbers: Mapping[str, float | Distribution]) -> 
     return problems
 
 
-class SimSettings(SimulatedPlatform):
+class SimSettings(RobotFilePlatform, SimulatedPlatform):
     """The settings of `sim`, and what follows from them alone."""
 
     name: ClassVar[str] = "sim"
@@ -266,24 +265,9 @@ class SimSettings(SimulatedPlatform):
         return self.step_s or self.model.step_s
 
     @property
-    def body(self) -> Body:
-        """Outline around all parts of the body, for figures."""
-        return Body(hull([point for part in self.model.body for point in part.outline()]))
-
-    @property
-    def sensors(self) -> RangeSensors:
-        """Mounts and reach of the range sensors, for figures."""
-        return RangeSensors(self.model.mounts, self.model.reach)
-
-    @property
     def title(self) -> str:
         """Title of its picture."""
         return f"{self.model.name} ({self.label})"
-
-    @property
-    def outline_words(self) -> str:
-        """The origin of the outline in figures, for their captions."""
-        return f"that of robot {self.model.name}"
 
     @property
     def spec(self) -> str:
@@ -328,23 +312,3 @@ class SimSettings(SimulatedPlatform):
 def _without_start(numbers: Mapping[str, T]) -> dict[str, T]:
     """Return the numbers without those of the start."""
     return {name: value for name, value in numbers.items() if not name.startswith("arena.start.")}
-
-
-def hull(points: list[tuple[float, float]]) -> tuple[tuple[float, float], ...]:
-    """Return the corners of the convex outline around points, counter-clockwise."""
-
-    def half(ordered: list[tuple[float, float]]) -> list[tuple[float, float]]:
-        kept: list[tuple[float, float]] = []
-        for point in ordered:
-            while len(kept) > 1 and _turn(kept[-2], kept[-1], point) <= 0:
-                kept.pop()
-            kept.append(point)
-        return kept[:-1]
-
-    ordered = sorted(set(points))
-    return tuple(half(ordered) + half(ordered[::-1]))
-
-
-def _turn(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> float:
-    """Return a number above 0 if a, b, c turn to the left."""
-    return math.fsum(((b[0] - a[0]) * (c[1] - a[1]), -(b[1] - a[1]) * (c[0] - a[0])))

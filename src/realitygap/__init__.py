@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from . import trials as trials
     from . import vision as vision
     from . import world as world
-    from .evolution import Genome, NearestArchive, NeatSettings, PaperArchive, Population
+    from .evolution import Genome, MapElites, NearestArchive, NeatSettings, PaperArchive, Population
     from .records import ResultsFolder
     from .report import summarize, watch, write_movie, write_report
     from .runs import Condition, replay
@@ -49,6 +49,7 @@ _HOME = {
     "Case": "world",
     "Condition": "runs",
     "Genome": "evolution",
+    "MapElites": "evolution",
     "NearestArchive": "evolution",
     "NeatSettings": "evolution",
     "PaperArchive": "evolution",
@@ -75,6 +76,7 @@ __all__ = [
     "Case",
     "Condition",
     "Genome",
+    "MapElites",
     "NearestArchive",
     "NeatSettings",
     "PaperArchive",

@@ -24,6 +24,7 @@ from ._interface import (
     paper_interface,
 )
 from ._json import interface_to_dict, to_text
+from ._map_elites import Elite, MapElites, cvt_centroids
 from ._novelty import (
     NearestArchive,
     NoveltySettings,
@@ -45,8 +46,10 @@ __all__ = [
     "CellOrder",
     "Channels",
     "ControllerInterface",
+    "Elite",
     "Genome",
     "GenomeRecord",
+    "MapElites",
     "Member",
     "NearestArchive",
     "NeatSettings",
@@ -57,6 +60,7 @@ __all__ = [
     "Population",
     "archive_members",
     "behavior_distance",
+    "cvt_centroids",
     "decode_all",
     "distance_kind",
     "genome_from_record",

@@ -18,17 +18,11 @@ from realitygap.records import read_checkpoint, write_checkpoint
 
 from ._genome import Genome
 from ._settings import NeatSettings
+from ._tables import MOST_NUMBER, arrays_of, check_shapes, genomes_of, table_of
 
 # Room beyond the first genes; doubled whenever a child does not fit.
 FIRST_ROOM = 32
 FIRST_HIDDEN_ROOM = 8
-
-
-_MOST_NUMBER = 2**31 - 2**16
-"""Numbers of genes, nodes and species have 32 bits. A run never counts this far."""
-
-# What kernels write to before they read it.
-_ROOM = {"genomes.reached", "genomes.cursor", "species.numbers", "species.shares"}
 
 
 def random_key(seed: int, name: str | None = None) -> int:
@@ -233,7 +227,7 @@ class Population:
                 key=about["key"],
             )
             population._restore(arrays)
-            population.generation = whole_number("generation", about["generation"], 0, _MOST_NUMBER)
+            population.generation = whole_number("generation", about["generation"], 0, MOST_NUMBER)
         except (IndexError, KeyError, OverflowError, RecordError, TypeError, ValueError) as error:
             raise RecordError(
                 f"{path} is a checkpoint, but not one of a population as this version has it ({error})."
@@ -247,10 +241,7 @@ class Population:
             "innovations": self._innovations,
             "species": self._species,
         }
-        arrays: dict[str, NDArray[Any]] = {"species_of": self._species_of, "parents": self._parents}
-        for prefix, table in tables.items():
-            arrays |= {f"{prefix}.{name}": array for name, array in table._asdict().items()}
-        return {name: array for name, array in arrays.items() if name not in _ROOM}
+        return arrays_of(tables) | {"species_of": self._species_of, "parents": self._parents}
 
     def _restore(self, arrays: dict[str, NDArray[Any]]) -> None:
         """Put `_arrays` back; only the room for genes may differ.
@@ -261,43 +252,15 @@ class Population:
             RecordError: A genome is not one that evolution can make.
             ValueError: Names, types, sizes or numbers do not fit.
         """
-        own = self._arrays()
-        if arrays.keys() != own.keys():
-            raise ValueError(f"it lacks {sorted(own.keys() - arrays.keys())} or holds something else")
-        room, hidden_room = (arrays[f"genomes.{name}"].shape[-1] for name in ("innovation", "hidden"))
-        widths = {"genomes.hidden": hidden_room, "genomes.bias": self._rules.n_outputs + hidden_room}
-        for name, array in arrays.items():
-            if array.dtype != own[name].dtype or array.ndim != own[name].ndim:
-                raise ValueError(f"{name} is {array.dtype} with {array.ndim} dimensions")
-            expected = own[name].shape
-            if name.startswith("genomes.") and array.ndim == 2:
-                expected = (expected[0], widths.get(name, room))
-            if array.shape != expected:
-                raise ValueError(f"{name} has shape {array.shape}, expected {expected}")
-
-        def table(like: Any, prefix: str) -> Any:
-            names = [name for name in like._fields if f"{prefix}.{name}" not in _ROOM]
-            return like._replace(**{name: np.ascontiguousarray(arrays[f"{prefix}.{name}"]) for name in names})
-
-        genomes: Genomes = table(self._genomes, "genomes")
-        genomes = genomes._replace(reached=np.zeros(genomes.innovation.shape[1] + 1, np.int32))
-        for count, most in ((genomes.n_connections, room), (genomes.n_hidden, hidden_room)):
-            if count.min() < 0 or count.max() > most:
-                raise ValueError("a genome has more genes than room")
-        for row in range(len(self)):
-            Genome.from_dict(Genome(genomes, row, self._rules).to_dict())
-        next_number, next_node = (int(number) for number in arrays["innovations.counters"][:2])
-        if not (genomes.innovation.max(initial=0) < next_number < _MOST_NUMBER):
-            raise ValueError(f"the next innovation number is {next_number}")
-        if not (genomes.hidden.max(initial=0) < next_node < _MOST_NUMBER):
-            raise ValueError(f"the next node is {next_node}")
+        check_shapes(arrays, self._arrays(), self._rules.n_outputs)
+        genomes = genomes_of(self._genomes, "genomes", arrays, self._rules, arrays["innovations.counters"])
         n_species, next_identity = (int(number) for number in arrays["species.counts"])
         identities = arrays["species.identity"][: max(n_species, 0)].tolist()
         if len(identities) != n_species or sorted(identities) != sorted({*arrays["species_of"].tolist()}):
             raise ValueError("species and their members do not agree")
-        if not (max(identities) < next_identity < _MOST_NUMBER):
+        if not (max(identities) < next_identity < MOST_NUMBER):
             raise ValueError(f"the next species is {next_identity}")
         self._genomes = genomes
-        self._innovations = table(self._innovations, "innovations")
-        self._species = table(self._species, "species")
+        self._innovations = table_of(self._innovations, "innovations", arrays)
+        self._species = table_of(self._species, "species", arrays)
         self._species_of, self._parents = arrays["species_of"], arrays["parents"]

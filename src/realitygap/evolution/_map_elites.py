@@ -1,0 +1,402 @@
+"""MAP-Elites with an ask-and-tell interface: the best genome of each cell of a space of descriptors."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from realitygap.errors import RecordError, check_told_once, finite_numbers, whole_number
+from realitygap.kernels.neat import elites as kernels
+from realitygap.kernels.neat.elites import Cells, Elites, make_elites
+from realitygap.kernels.neat.genome import Genomes, first_genomes, make_genomes
+from realitygap.kernels.neat.mutation import Innovations, make_innovations
+from realitygap.records import read_checkpoint, write_checkpoint
+
+from ._genome import Genome
+from ._population import FIRST_HIDDEN_ROOM, FIRST_ROOM, random_key
+from ._settings import NeatSettings
+from ._tables import MOST_NUMBER, arrays_of, check_shapes, genomes_of, table_of, widened
+
+MOST_CELLS = 1_000_000
+"""Largest number of cells of a grid: with 32 genes each, 0.8 GB."""
+MOST_CENTROIDS = 10_000
+"""Largest number of cells of a CVT, whose distances are all computed for each genome."""
+CVT_POINTS = 20
+"""Random points for each centroid of a CVT."""
+CVT_ROUNDS = 20
+"""Rounds of Lloyd's algorithm."""
+
+
+class Elite(NamedTuple):
+    """The best genome of a cell.
+
+    Attributes:
+        cell: Number of its cell; of a grid, in row-major order of the descriptors.
+        fitness: Its fitness, as told.
+        descriptor: (d,) its descriptors, as told.
+        batch: Number of the batch in which it was told.
+        genome: The genome.
+    """
+
+    cell: int
+    fitness: float
+    descriptor: NDArray[np.float64]
+    batch: int
+    genome: Genome
+
+
+class MapElites:
+    """An archive of elites by MAP-Elites, for any task: `ask` for genomes, `tell` their fitness and descriptors.
+
+        archive = MapElites(n_inputs=4, n_outputs=2, cells=(20, 10), ranges=((-1, 1), (0, 1)), seed=1)
+        for _ in range(100):
+            genomes = archive.ask()
+            archive.tell([fitness_of(genome) for genome in genomes], [descriptor_of(genome) for genome in genomes])
+
+    The first batch is NEAT's first genomes. Each later one is made of elites that are drawn with equal chances, by
+    NEAT's crossover and mutation (Mouret & Clune 2015, with other variation). Settings of species have no effect,
+    because cells protect diversity. Parents are elites of before the batch. So the archive is a function of the
+    seed, the settings, and what was told, on any machine, also if it was saved and loaded in between.
+
+    Fitness is compared as told. If it is noisy, elites are lucky ones: try them again before you trust them.
+
+    Attributes:
+        settings: NEAT's settings; `population` is the size of a batch.
+        share: Share of children with two parents.
+        ranges: Lowest and highest value of each descriptor.
+        cells: Cells along each descriptor of a grid, or the number of cells of a CVT.
+        batch: Number of the present batch.
+    """
+
+    def __init__(
+        self,
+        n_inputs: int,
+        n_outputs: int,
+        cells: int | Sequence[int],
+        ranges: Sequence[tuple[float, float]],
+        settings: NeatSettings | None = None,
+        *,
+        crossover: float = 0.25,
+        seed: int = 0,
+        replicate: int = 0,
+        bias: bool = True,
+        key: int | None = None,
+    ) -> None:
+        """Make an empty archive, and the first batch.
+
+        Args:
+            n_inputs: Inputs that the task gives, >= 1.
+            n_outputs: Outputs that it reads, >= 1.
+            cells: Cells along each descriptor, for a grid; or one number, for that many cells of a CVT, whose centroids
+                depend on the seed.
+            ranges: Lowest and highest value of each of d descriptors. One out of its range counts as at the end.
+            settings: NEAT's settings, 'default' if not given.
+            crossover: Share of children with two parents, 0 to 1.
+            seed: Seed of the random numbers, 0 to 2**63 - 1.
+            replicate: Number of the run with this seed, 0 to 2**32 - 1.
+            bias: True for a constant input, which is the last one.
+            key: Key of the random numbers, which replaces the seed's, 0 to 2**64 - 1.
+
+        Raises:
+            TypeError: A number is not a whole one, or the settings are something else.
+            ValueError: A number is out of its range, a range is empty, or there are too many cells.
+        """
+        self._n_inputs = whole_number("n_inputs", n_inputs, 1)
+        n_outputs = whole_number("n_outputs", n_outputs, 1)
+        self._replicate = whole_number("replicate", replicate, 0, 2**32 - 1)
+        seed = whole_number("seed", seed, 0, 2**63 - 1)
+        self._key = np.uint64(random_key(seed) if key is None else whole_number("key", key, 0, 2**64 - 1))
+        if not isinstance(settings, NeatSettings | None):
+            raise TypeError(
+                f"settings is {settings!r}, expected NeatSettings, such as NeatSettings.named('default')."
+            )
+        self.settings = settings or NeatSettings()
+        self.share = float(finite_numbers("crossover", crossover))
+        if not 0 <= self.share <= 1:
+            raise ValueError(f"crossover is {crossover}, expected 0 to 1.")
+        limits = _checked_ranges(ranges)
+        self.ranges = tuple(map(tuple, limits.tolist()))
+        self._cells, self.cells = _cells(cells, limits, int(self._key))
+        self._rules = self.settings.rules(n_inputs + bias, n_outputs, bias_input=n_inputs if bias else -1)
+        self.batch = 0
+        self._asked: int | None = None
+        n = self.settings.population
+        room = self._rules.n_first_genes + FIRST_ROOM
+        hidden_room = self._rules.start_hidden + FIRST_HIDDEN_ROOM
+        self._genomes: Genomes = make_genomes(n, n_outputs, room, hidden_room)
+        self._innovations: Innovations = make_innovations(self._rules, n)
+        for array in self._innovations[1:]:  # room that is not read yet, but saved
+            array[:] = 0
+        self._elites: Elites = make_elites(self.n_cells, len(self.ranges), n_outputs, room, hidden_room)
+        self._parents = np.full((n, 2), -1, np.int32)
+        first_genomes(self._genomes, self._rules, self._key, self._replicate, 0)
+
+    @property
+    def n_cells(self) -> int:
+        """Number of cells."""
+        return self.cells if isinstance(self.cells, int) else math.prod(self.cells)
+
+    @property
+    def centroids(self) -> NDArray[np.float64] | None:
+        """Centroids of a CVT in the units of the descriptors, (c, d); None for a grid."""
+        if isinstance(self.cells, tuple):
+            return None
+        low, high = np.array(self.ranges).T
+        return np.asarray(low + self._cells.centroids * (high - low), np.float64)
+
+    def __len__(self) -> int:
+        return int(self._elites.n_filled[0])
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({len(self)} of {self.n_cells} cells, batch {self.batch})"
+
+    @property
+    def parents(self) -> NDArray[np.int32]:
+        """The cells of each genome's parents, (n, 2); -1 for a missing parent."""
+        return self._parents.copy()
+
+    def ask(self) -> list[Genome]:
+        """Return the genomes of this batch, in the order in which `tell` wants what they did."""
+        self._asked = self.batch
+        value = float(self.settings.bias_value)
+        return [Genome(self._genomes, row, self._rules, value) for row in range(self.settings.population)]
+
+    def tell(self, fitness: ArrayLike, descriptors: ArrayLike) -> None:
+        """Take the fitness and the descriptors of this batch, keep new elites, and make the next batch.
+
+        Args:
+            fitness: (n,) finite; more is fitter. Of equally fit genomes the earlier one stays.
+            descriptors: (n, d) finite.
+
+        Raises:
+            RuntimeError: The batch for which `ask` was last called has been told.
+            TypeError: Something else than real numbers.
+            ValueError: Another shape, or a value that is not finite. The archive stays as it is.
+        """
+        n, d = self.settings.population, len(self.ranges)
+        check_told_once(self._asked, self.batch)
+        values = np.ascontiguousarray(finite_numbers("fitness", fitness))
+        places = np.ascontiguousarray(finite_numbers("descriptors", descriptors))
+        if values.shape != (n,):
+            raise ValueError(
+                f"fitness has shape {values.shape}, expected ({n},): one number for each genome asked."
+            )
+        if places.shape != (n, d):
+            raise ValueError(
+                f"descriptors has shape {places.shape}, expected ({n}, {d}): {d} numbers for each genome asked."
+            )
+        kernels.place_elites(self._genomes, values, places, self._cells, self._elites, self.batch)
+        room, hidden_room = self._genomes.innovation.shape[1], self._genomes.hidden.shape[1]
+        while True:
+            children = make_genomes(n, self._rules.n_outputs, room, hidden_room)
+            innovations = Innovations._make(array.copy() for array in self._innovations)
+            kernels.vary_elites(
+                self._elites,
+                self.share,
+                self._rules,
+                innovations,
+                self._key,
+                self._replicate,
+                self.batch + 1,
+                children,
+                self._parents,
+            )
+            if not children.full[0]:
+                break
+            room, hidden_room = 2 * room, 2 * hidden_room
+            wide = widened(self._elites.genomes, self._rules.n_outputs, room, hidden_room)
+            self._elites = self._elites._replace(genomes=wide)
+        self._genomes, self._innovations = children, innovations
+        self.batch += 1
+
+    def cells_of(self, descriptors: ArrayLike) -> NDArray[np.int64]:
+        """Return the number of the cell of each of n descriptors, (n, d).
+
+        Raises:
+            TypeError: Something else than real numbers.
+            ValueError: Another shape, or a value that is not finite.
+        """
+        places = np.ascontiguousarray(finite_numbers("descriptors", descriptors))
+        if places.ndim != 2 or places.shape[1] != len(self.ranges):
+            raise ValueError(f"descriptors has shape {places.shape}, expected (n, {len(self.ranges)}).")
+        found = np.empty(len(places), np.int64)
+        kernels.cells_of(places, self._cells, found)
+        return found
+
+    def elites(self) -> list[Elite]:
+        """Return the elites in the order in which their cells were filled."""
+        held, value = self._elites, float(self.settings.bias_value)
+        return [
+            Elite(
+                int(cell),
+                float(held.fitness[cell]),
+                held.descriptors[cell].copy(),
+                int(held.batch[cell]),
+                Genome(held.genomes, int(cell), self._rules, value),
+            )
+            for cell in held.filled[: len(self)]
+        ]
+
+    @property
+    def fitness(self) -> NDArray[np.float64]:
+        """Fitness of the elite of each cell, in the shape of the grid or (c,); NaN for an empty cell."""
+        values = np.where(self._elites.batch < 0, np.nan, self._elites.fitness)
+        return values if isinstance(self.cells, int) else values.reshape(self.cells)
+
+    @property
+    def coverage(self) -> float:
+        """Share of cells that are filled."""
+        return len(self) / self.n_cells
+
+    def qd_score(self, offset: float = 0.0) -> float:
+        """Return the sum of the elites' fitness above an offset.
+
+        Args:
+            offset: Fitness that counts as 0, such as the lowest one that is possible; otherwise an elite of negative
+                fitness lowers the score.
+        """
+        return float(np.nansum(self.fitness - offset))
+
+    def save(self, path: str | Path) -> None:
+        """Write a checkpoint. An existing file is replaced once the new one is complete.
+
+        Args:
+            path: The file, a NumPy .npz whatever its name.
+
+        Raises:
+            RecordError: It cannot be written; a file that was there is as it was.
+        """
+        about = {
+            "n_inputs": self._n_inputs,
+            "n_outputs": self._rules.n_outputs,
+            "bias": self._rules.bias_input >= 0,
+            "settings": self.settings.model_dump(mode="json"),
+            "cells": self.cells,
+            "ranges": self.ranges,
+            "crossover": self.share,
+            "key": int(self._key),
+            "replicate": self._replicate,
+            "batch": self.batch,
+        }
+        write_checkpoint(Path(path), "map-elites", about, self._arrays())
+
+    @classmethod
+    def load(cls, path: str | Path) -> Self:
+        """Return the archive that `save` wrote.
+
+        Raises:
+            RecordError: There is no such file, it is cut off or damaged, or no checkpoint of an archive.
+            RecordVersionError: A version wrote it whose numbers may differ.
+        """
+        about, arrays = read_checkpoint(Path(path), "map-elites")
+        try:
+            archive = cls(
+                about["n_inputs"],
+                about["n_outputs"],
+                about["cells"],
+                about["ranges"],
+                NeatSettings(**about["settings"]),
+                crossover=about["crossover"],
+                replicate=about["replicate"],
+                bias=about["bias"],
+                key=about["key"],
+            )
+            archive._restore(arrays)
+            archive.batch = whole_number("batch", about["batch"], 0, MOST_NUMBER)
+        except (IndexError, KeyError, OverflowError, RecordError, TypeError, ValueError) as error:
+            raise RecordError(
+                f"{path} is a checkpoint, but not one of an archive as this version has it ({error})."
+            ) from error
+        return archive
+
+    def _arrays(self) -> dict[str, NDArray[Any]]:
+        """Return all that changes from batch to batch, by name; views."""
+        held = self._elites
+        tables = {"genomes": self._genomes, "innovations": self._innovations, "elites.genomes": held.genomes}
+        parts = {f"elites.{name}": array for name, array in held._asdict().items() if name != "genomes"}
+        return arrays_of(tables) | parts | {"parents": self._parents}
+
+    def _restore(self, arrays: dict[str, NDArray[Any]]) -> None:
+        """Put `_arrays` back; only the room for genes may differ.
+
+        Raises:
+            RecordError: A genome is not one that evolution can make.
+            ValueError: Names, types, sizes or numbers do not fit.
+        """
+        check_shapes(arrays, self._arrays(), self._rules.n_outputs)
+        counters = arrays["innovations.counters"]
+        genomes = genomes_of(self._genomes, "genomes", arrays, self._rules, counters)
+        n_filled = int(arrays["elites.n_filled"][0])
+        filled = arrays["elites.filled"][: max(n_filled, 0)].tolist()
+        if len(filled) != n_filled or sorted(filled) != np.flatnonzero(arrays["elites.batch"] >= 0).tolist():
+            raise ValueError("cells and their elites do not agree")
+        held = genomes_of(self._elites.genomes, "elites.genomes", arrays, self._rules, counters, filled)
+        if held.innovation.shape != (self.n_cells, genomes.innovation.shape[1]):
+            raise ValueError("elites and children have different room")
+        finite_numbers("fitness", arrays["elites.fitness"][filled])
+        finite_numbers("descriptors", arrays["elites.descriptors"])
+        self._genomes, self._innovations = genomes, table_of(self._innovations, "innovations", arrays)
+        self._elites = table_of(self._elites, "elites", arrays)._replace(genomes=held)
+        self._parents = arrays["parents"]
+
+
+def _checked_ranges(ranges: Sequence[tuple[float, float]]) -> NDArray[np.float64]:
+    """Return the ranges, (d, 2)."""
+    limits = finite_numbers("ranges", ranges)
+    if limits.ndim != 2 or limits.shape[1:] != (2,) or not len(limits):
+        raise ValueError(
+            f"ranges has shape {limits.shape}, expected (d, 2): lowest and highest of each descriptor."
+        )
+    for low, high in limits:
+        if not low < high:
+            raise ValueError(f"A range is {low:g} to {high:g}, expected the lowest value first.")
+    return limits
+
+
+def _cells(
+    cells: int | Sequence[int], limits: NDArray[np.float64], key: int
+) -> tuple[Cells, int | tuple[int, ...]]:
+    """Return the cells as kernels read them, and how many there are, along each descriptor for a grid."""
+    low, high = np.ascontiguousarray(limits.T)
+    d = len(limits)
+    if isinstance(cells, Sequence):
+        size = tuple(whole_number(f"cells[{k}]", n, 1, MOST_CELLS) for k, n in enumerate(cells))
+        if len(size) != d:
+            raise ValueError(
+                f"cells has {len(size)} numbers, and ranges has {d}: expected one for each descriptor."
+            )
+        if math.prod(size) > MOST_CELLS:
+            raise ValueError(f"The grid has {math.prod(size):,} cells, expected at most {MOST_CELLS:,}.")
+        return Cells(low, high, np.array(size, np.int64), np.empty((0, d))), size
+    n = whole_number("cells", cells, 1, MOST_CENTROIDS)
+    return Cells(low, high, np.ones(d, np.int64), cvt_centroids(n, d, key)), n
+
+
+def cvt_centroids(n: int, d: int, key: int = 0) -> NDArray[np.float64]:
+    """Return n centroids of a centroidal Voronoi tessellation of the unit cube, (n, d).
+
+    Lloyd's algorithm on random points, as Vassiliades, Chatzilygeroudis & Mouret (2018) use k-means. Sums have one
+    order, so that centroids are the same on any machine.
+
+    Args:
+        n: Number of centroids.
+        d: Number of dimensions.
+        key: Seed of the points.
+    """
+    points = np.random.Generator(np.random.Philox(key=key)).random((n * CVT_POINTS, d))
+    centroids = points[:n].copy()
+    found, unit = (
+        np.empty(len(points), np.int64),
+        Cells(np.zeros(d), np.ones(d), np.ones(d, np.int64), centroids),
+    )
+    for _ in range(CVT_ROUNDS):
+        kernels.cells_of(points, unit._replace(centroids=centroids), found)
+        count = np.bincount(found, minlength=n)
+        sums = np.stack([np.bincount(found, points[:, k], n) for k in range(d)], axis=1)
+        centroids = np.where(count[:, None] > 0, sums / np.maximum(count, 1)[:, None], centroids)
+    return centroids

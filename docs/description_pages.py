@@ -17,6 +17,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from realitygap.drawing import Picture
+from realitygap.families.ros2._wiring import Scan, Wiring
 from realitygap.robots.twin import FAMILIES, TwinModel, family_rows, sample_twin, twin_picture
 from realitygap.settings import is_hidden
 from realitygap.world import (
@@ -48,6 +49,9 @@ def description_parts() -> dict[str, str]:
     """Parts of the pages by file name."""
     parts = {
         "parts/robot-keys.md": keys_of(RobotModel, "robot"),
+        "parts/ros2-keys.md": "\n\n".join(
+            ["## `[driver]` of a robot on ROS 2", table_of(Wiring), "## `[driver.scan]`", table_of(Scan)]
+        ),
         "parts/arena-keys.md": keys_of(ArenaFile, "arena"),
         "parts/twin-keys.md": keys_of(TwinModel, "twin"),
         "parts/twin-families.md": twin_families(),

@@ -186,6 +186,32 @@ def test_robot_stops_if_the_gateway_dies_or_is_frozen(connect, number):
     wait_until(lambda: rests(fast))
 
 
+def test_robot_stops_if_the_program_and_its_gateway_are_killed(start_robot, domain, tmp_path):
+    fast = start_robot(range=MOUNTS, timeout=0)
+    open_driver(tmp_path, domain).close()
+    program = (
+        "from realitygap.families.ros2 import Ros2Robot; from realitygap.robots import Command\n"
+        f"robot = Ros2Robot('/?domain={domain}&interface=lo', robot={str(tmp_path / 'fast.toml')!r}, step_s=30)\n"
+        "print(robot.link.port.process_id, flush=True)\n"
+        "robot.drive(Command(0.1, 0.0))"
+    )
+    with subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True) as driver:
+        gateway = int(driver.stdout.readline())
+        wait_until(lambda: not rests(fast))
+        os.kill(gateway, signal.SIGSTOP)
+        driver.kill()
+        os.kill(gateway, signal.SIGKILL)
+    wait_until(lambda: rests(fast))
+
+
+def test_long_drive_fails_if_the_robot_leaves(connect):
+    fast, robot = connect()
+    robot.step_s = 60.0
+    fast.ask("leave")
+    with pytest.raises(RobotError, match="silent"):
+        robot.drive(Command(0.0, 0.1))
+
+
 def test_two_robots_in_two_namespaces_are_told_apart(start_robot, domain, tmp_path):
     one = start_robot(range=MOUNTS, namespace="/one", timeout=0)
     two = start_robot(range=MOUNTS, namespace="/two", timeout=0)
@@ -387,7 +413,9 @@ def test_range_that_is_no_number_is_nothing_in_range(connect, value):
 
 def test_no_program_is_left_when_it_is_closed(connect: Callable[..., Any]) -> None:
     _, robot = connect()
-    number = robot.link.port.process_id
+    numbers = [process.pid for process in robot.link.port.processes]
+    assert len(numbers) == 2
     robot.close()
-    with pytest.raises(ProcessLookupError):
-        os.kill(number, 0)
+    for number in numbers:
+        with pytest.raises(ProcessLookupError):
+            os.kill(number, 0)

@@ -19,6 +19,7 @@ from realitygap.emulator import connect_witness
 from realitygap.errors import RobotError
 from realitygap.families.ros2 import Ros2Robot
 from realitygap.robots import Command, read_recording
+from realitygap.world import Pose
 
 from .fast_dds import wait_until
 
@@ -43,6 +44,13 @@ def emulated(domain: int) -> Iterator[Emulated]:
         with connect_witness(witness) as connected:
             yield Emulated(process, port, connected)
         process.terminate()
+
+
+def test_scan_of_walls_out_of_reach_is_published(emulated):
+    with Ros2Robot(emulated.port) as robot:
+        emulated.witness.place(Pose(0.1, 0.1, 0.5), 0)  # the corner is farther than 1 m
+        wait_until(lambda: robot.observe().readings[2] == 0.0)
+        assert emulated.process.poll() is None
 
 
 def test_driver_finds_it_and_its_robot_is_recorded(emulated, tmp_path):

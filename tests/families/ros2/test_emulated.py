@@ -19,7 +19,7 @@ from realitygap.robots import Command
 from realitygap.study import OwnPosesObserver
 from realitygap.testing import check_platform, check_robot
 from realitygap.trials import TrialPlan, WitnessObserver
-from realitygap.world import RangeSensor, load_robot, paper_arena, robot_names
+from realitygap.world import Pose, RangeSensor, load_robot, paper_arena, robot_names
 
 PORT = "emulator://ros2?speed=off"
 ROBOTS = [name for name in robot_names() if load_robot(name).driver.get("family") == "ros2"]
@@ -54,6 +54,55 @@ def test_robot_drives_as_its_body_and_odometry_tells_it(tmp_path):
 def test_address_decides_the_robot_that_calibrations_build_on(tmp_path):
     assert base_robot_of(f"ros2:{PORT}") == "turtlebot3-burger"
     assert base_robot_of("ros2:/one?robot=mine.toml&domain=3") == "mine.toml"
+
+
+def wired(folder, driver):
+    file = folder / "mine.toml"
+    file.write_text(f'base = "turtlebot3-burger"\n[driver]\n{driver}\n')
+    return str(file)
+
+
+@pytest.mark.parametrize(
+    ("driver", "message"),
+    [
+        ('odometri = "odom"', "driver.odometri: unknown setting. Did you mean 'odometry'"),
+        ('odometry = "odom 1"', "'odom 1' is no name of a topic"),
+        ('odometry = "scan"', "topic 'scan' is named twice"),
+        ('pose_frames = ["map", "base_link"]', "set pose, such as '/tf'"),
+        ('pose = "/tf"', "set pose_frames"),
+        ('ranges = ["a", "b", "c", "d", "e"]', "ranges and scan both tell the range sensors"),
+    ],
+)
+def test_wrong_topics_get_one_message(tmp_path, driver, message):
+    with pytest.raises(RobotError, match=message):
+        Ros2Robot(f"{PORT}&robot={wired(tmp_path, driver)}")
+
+
+@pytest.mark.parametrize("driver", ['pose = "/mocap"', 'pose = "/tf"\npose_frames = ["map", "base_link"]'])
+def test_emulated_motion_capture_tells_true_poses(tmp_path, driver):
+    driver += '\npose_frame = "arena"'
+    with Ros2Robot(f"{PORT}&robot={wired(tmp_path, driver)}", step_s=1.0) as robot:
+        robot.reset()
+        robot.begin_path(Pose(0.0, 0.0, 0.0))
+        robot.drive(Command(0.5, 0.3))
+        assert robot.path()[-1, 1:] == pytest.approx(tuple(robot.port.witness.pose()))
+
+
+def test_drive_that_stood_still_fails(monkeypatch):
+    with Ros2Robot(PORT, step_s=10.0) as robot:
+        sleep = robot.clock.sleep
+        monkeypatch.setattr(robot.clock, "sleep", lambda seconds: sleep(seconds + 5))
+        with pytest.raises(RobotError, match=r"stood still for 5\.0 s"):
+            robot.drive(Command(0.1, 0.0))
+
+
+def test_battery_that_is_not_told_is_an_error(tmp_path):
+    file = wired(tmp_path, 'battery = ""')
+    with (
+        Ros2Robot(f"{PORT}&robot={file}") as robot,
+        pytest.raises(RobotError, match="does not tell the voltage"),
+    ):
+        robot.volts()
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ import pytest
 pytest.importorskip("cyclonedds", reason="needs the Python package cyclonedds")
 
 from realitygap.families.ros2._dds import MALFORMED, filled, n_values, plain, type_of
-from realitygap.families.ros2._messages import DEFINITIONS, ODOMETRY, POSE, SCAN, TWIST, TWIST_STAMPED
+from realitygap.families.ros2._messages import DEFINITIONS, ODOMETRY, POSE, SCAN, TF, TWIST, TWIST_STAMPED
 
 STAMP = {"stamp": {"sec": -2, "nanosec": 7}, "frame_id": "map"}
 
@@ -43,9 +43,13 @@ CASES = {
         [*HEADER, *(("d", value) for value in (1.0, 2.0, 0, 0, 0, 0, 1.0))],
     ),
     SCAN: (
-        {"header": STAMP, "angle_min": -1.0, "range_max": 3.5, "ranges": [0.5, math.inf], "intensities": []},
+        {"header": STAMP, "angle_min": -1.0, "range_max": 3.5, "ranges": [0.5, None], "intensities": []},
         [*HEADER, *(("f", value) for value in (-1.0, 0, 0, 0, 0, 0, 3.5)),
          ("I", 2), ("f", 0.5), ("f", math.inf), ("I", 0)],
+    ),
+    TF: (
+        {"transforms": [{"header": STAMP, "child_frame_id": "cup", "transform": {"translation": {"x": 3.0}}}]},
+        [("I", 1), *HEADER, ("s", "cup"), *(("d", value) for value in (3.0, 0, 0, 0, 0, 0, 1.0))],
     ),
 }  # fmt: skip
 

@@ -66,16 +66,16 @@ def type_of(message: str) -> type[IdlStruct]:
 
 
 def filled(message: str, values: Mapping[str, Any]) -> Any:
-    """Return a message with some values; the others are 0, empty, or identity."""
+    """Return a message with some values; the others are 0, empty, or identity. A number that is None is infinite."""
     parts: dict[str, Any] = {}
     values = _IDENTITIES.get(message, {}) | dict(values)
     for field in fields_of(message):
         given = values.get(field.name)
         if field.kind in _PRIMITIVES:
             default = _PRIMITIVES[field.kind][1]
-            parts[field.name] = (
-                given if given is not None else default if field.size is None else [default] * field.size
-            )
+            if field.name not in values:
+                given = default if field.size is None else [default] * field.size
+            parts[field.name] = _infinite(given)
         elif field.size is None:
             parts[field.name] = filled(field.kind, given or {})
         else:
@@ -101,6 +101,12 @@ def plain(message: str, value: Any) -> dict[str, Any]:
         else:
             parts[field.name] = _finite(given)
     return parts
+
+
+def _infinite(value: Any) -> Any:
+    if isinstance(value, list):
+        return [_infinite(each) for each in value]
+    return math.inf if value is None else value
 
 
 def _finite(value: Any) -> Any:

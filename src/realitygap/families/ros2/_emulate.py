@@ -12,7 +12,7 @@ import typer
 
 from realitygap.emulator import SECOND, DirectWitness, WitnessDoor, open_arena
 from realitygap.emulator import command as served
-from realitygap.emulator.command import ArenaOption, QuietOption, TcpOption, WitnessOption
+from realitygap.emulator.command import ArenaOption, QuietOption, WitnessOption
 from realitygap.errors import RobotError
 
 from ._address import read_address
@@ -48,7 +48,15 @@ def emulate(
     stamped: Annotated[
         bool, typer.Option("--stamped", help="Take TwistStamped instead of Twist, as robots since Jazzy do.")
     ] = False,
-    tcp: TcpOption = None,
+    tcp: Annotated[
+        int | None,
+        typer.Option(
+            min=0,
+            max=65535,
+            metavar="PORT",
+            help="Serve realitygap at a TCP port of this machine, without DDS; 0 for any.",
+        ),
+    ] = None,
     witness: WitnessOption = None,
     quiet: QuietOption = False,
 ) -> None:
@@ -139,7 +147,7 @@ class DdsServer:
     def _take(self) -> None:
         for _, message in self._node.take():
             twist = message.twist if self._kind == TWIST_STAMPED else message
-            life_s = self._emulator.wiring.timeout_s or FOREVER_S
+            life_s = self._emulator.timeout_s or FOREVER_S
             with contextlib.suppress(ValueError):  # of a number that is infinite or NaN
                 self._emulator.command(twist.linear.x, twist.angular.z, life_s)
 

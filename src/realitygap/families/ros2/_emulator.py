@@ -31,6 +31,8 @@ SCAN_TICKS = 10
 SCAN_POINTS = 360
 SPEED_TICKS = 5
 """Ticks over which odometry averages speeds."""
+USUAL_TIMEOUT_S = 0.5
+"""Timeout of a robot whose file has none [s]: that of `diff_drive_controller`."""
 KEY = 2**40
 """Key of the noise; that of a trial is its seed."""
 
@@ -74,6 +76,11 @@ class EmulatedRos2(EmulatedRobot):
         self.place(arena.start, 0)
 
     @property
+    def timeout_s(self) -> float:
+        """Time after which it stops without commands [s]; 0: never."""
+        return USUAL_TIMEOUT_S if self.wiring.timeout_s is None else self.wiring.timeout_s
+
+    @property
     def now_ns(self) -> int:
         """The time since it was switched on [ns]."""
         return self._now
@@ -91,6 +98,7 @@ class EmulatedRos2(EmulatedRobot):
         self._twist, self._until = (0.0, 0.0), 0
         self._steps = 0
         self._trail: list[list[float]] = []
+        self._true: list[list[float]] = []
         self._passed = [self._odometry] * (SPEED_TICKS + 1)
         self._seen = self._sim.observe()
         self._scan = self._new_scan()
@@ -127,8 +135,9 @@ class EmulatedRos2(EmulatedRobot):
         heading = self._from.heading + there.heading - self._start.heading
         self._odometry = Pose(*point, math.remainder(heading, math.tau))
         self._passed = [*self._passed[1:], self._odometry]
-        self._trail.append([self.now, *self._odometry])
-        del self._trail[:-MOST_TRAIL]
+        for trail, pose in ((self._trail, self._odometry), (self._true, self.pose)):
+            trail.append([self.now, *pose])
+            del trail[:-MOST_TRAIL]
 
     # the lines of a gateway
 
@@ -157,14 +166,15 @@ class EmulatedRos2(EmulatedRobot):
     def _answer(self, request: Mapping[str, Any]) -> dict[str, Any]:
         what = request["do"]
         if what == "drive":
-            most = (self.wiring.timeout_s or ONCE_S) if request.get("once") else LIFE_S
+            most = (self.timeout_s or ONCE_S) if request.get("once") else LIFE_S
             self.command(float(request["ahead"]), float(request["turn"]), min(float(request["life"]), most))
             return {}
         if what == "stop":
             self.command(0.0, 0.0, 0.0)
             return {}
         if what == "read":
-            trail, self._trail = self._trail, []
+            trails = {self.wiring.odometry: self._trail, self.wiring.pose: self._true}
+            self._trail, self._true = [], []
             topics = {
                 topic: {"n": self._steps, "age": 0.0, "message": message}
                 for topic, (_, message) in self.messages().items()
@@ -172,7 +182,7 @@ class EmulatedRos2(EmulatedRobot):
             return {
                 "now": self.now,
                 "topics": topics,
-                "trails": {self._full(self.wiring.odometry): trail} if self.wiring.odometry else {},
+                "trails": {self._full(topic): trail for topic, trail in trails.items() if topic},
             }
         if what == "graph":
             ends = [{"role": "subscriber", "topic": self._full(self.wiring.command), "kind": m.TWIST}]
@@ -196,6 +206,8 @@ class EmulatedRos2(EmulatedRobot):
         found: dict[str, tuple[str, dict[str, Any]]] = {}
         if wiring.odometry:
             found[self._full(wiring.odometry)] = m.ODOMETRY, self._odometry_message()
+        if wiring.pose:
+            found[self._full(wiring.pose)] = self._pose_message()
         if wiring.scan is not None:
             found[self._full(wiring.scan.topic)] = m.SCAN, self._scan
         sensors = zip(wiring.ranges, self._body.range, self._seen.readings, strict=False)
@@ -244,6 +256,21 @@ class EmulatedRos2(EmulatedRobot):
                 }
             },
         }
+
+    def _pose_message(self) -> tuple[str, dict[str, Any]]:
+        """Return the type and the message of a motion capture, which sees the robot in the frame of the arena."""
+        x, y, heading = self.pose
+        way = {"x": 0.0, "y": 0.0, "z": math.sin(heading / 2), "w": math.cos(heading / 2)}
+        at = {"x": x, "y": y, "z": 0.0}
+        if not self.wiring.pose_frames:
+            return m.POSE, {"header": self.stamp(), "pose": {"position": at, "orientation": way}}
+        parent, child = self.wiring.pose_frames
+        step = {
+            "header": self.stamp() | {"frame_id": parent},
+            "child_frame_id": child,
+            "transform": {"translation": at, "rotation": way},
+        }
+        return m.TF, {"transforms": [step]}
 
     def _new_scan(self) -> dict[str, Any]:
         """Return a scan of now; empty without a scanner."""

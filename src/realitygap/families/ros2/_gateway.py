@@ -21,7 +21,7 @@ from realitygap._limits import parse_json
 
 from ._dds import Node
 from ._frames import Frames, planar
-from ._lines import LIFE_S, MOST_TRAIL, ONCE_S, REPEAT_S, TICK_S, ZEROS_S
+from ._lines import IDLE, LIFE_S, MOST_TRAIL, ONCE_S, REPEAT_S, TICK_S, ZEROS_S
 from ._messages import ODOMETRY, POSE, TF, TWIST_STAMPED
 
 PIECE = 1 << 16
@@ -194,11 +194,16 @@ def main() -> None:
     except ValueError as error:  # it answers the first request
         sys.stdout.write(json.dumps({"error": str(error), "id": 1}) + "\n")
         return
-    if settings.get("halts"):  # another gateway was lost
+    is_needed = True
+    if settings.get(
+        "halts"
+    ):  # it stands by until the program and its gateway are lost, or it is told that they ended
         gateway.node.wait_for_subscriber(settings["command"])
+        is_needed = os.read(0, PIECE) != IDLE
     else:
         serve(gateway, int(settings["program"]))
-    gateway.halt()
+    if is_needed:
+        gateway.halt()
     gateway.node.close()
 
 

@@ -31,6 +31,10 @@ class Ends:
         """Return those with a role on a topic."""
         return [end for end in self.all if end["role"] == role and end["topic"] == topic]
 
+    def n_programs(self, topic: str) -> int:
+        """Return how many programs publish a topic, if one program of a robot does."""
+        return len({end["who"] for end in self.of("publisher", topic) if end["kind"] in SENSORS})
+
     def robots(self) -> dict[str, list[str]]:
         """Return the topics of what takes commands, by namespace."""
         found: dict[str, list[str]] = {}
@@ -68,7 +72,7 @@ def refuse_graph(
         RobotError: Something is missing, or two robots share the topics.
     """
     interface = address.interface or "of CYCLONEDDS_URI"
-    where = f"{address.namespace or address.port} (domain {address.domain}, interface {interface})"
+    where = address.port or f"{address.namespace} (domain {address.domain}, interface {interface})"
     for topic, kind in topics.items():
         publishers = ends.of("publisher", topic)
         wrong = sorted({end["kind"] for end in publishers if end["kind"] != kind})

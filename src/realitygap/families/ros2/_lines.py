@@ -12,6 +12,8 @@ A request may have an `id`, which its answer repeats. An answer to a wrong reque
 infinite or NaN is null.
 """
 
+IDLE = b"idle"
+"""Tells a spare gateway to end without zeros. If its input ends without it, it publishes them."""
 REPEAT_S = 0.05
 """Time between two messages of a command that lasts [s]: `diff_drive_controller` stops after 0.5 s by default."""
 ZEROS_S = 0.5

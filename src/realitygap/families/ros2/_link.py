@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import select
@@ -18,6 +19,7 @@ from realitygap.errors import RobotError
 from realitygap.robots import Port, reason_of, serial_port
 
 from ._address import Address
+from ._lines import IDLE
 
 ANSWER_S = 2.0
 """Longest wait for an answer [s]."""
@@ -50,6 +52,15 @@ class GatewayPort:
         with theirs:
             self._process = self._start(theirs.fileno(), {"program": os.getpid()})
         self._ours.settimeout(ANSWER_S)
+        self._spare: subprocess.Popen[bytes] | None = None
+
+    def stand_by(self) -> None:
+        """Start another gateway, which publishes zeros if the gateway, or it and this program, die or are frozen.
+
+        Raises:
+            RobotError: It cannot be started.
+        """
+        self._spare = self._start(subprocess.PIPE, {"halts": True, "topics": {}})
 
     def _start(self, stream: int, more: dict[str, Any]) -> subprocess.Popen[bytes]:
         try:
@@ -59,7 +70,7 @@ class GatewayPort:
                     json.dumps(self._settings | more),
                 ],
                 stdin=stream,
-                stdout=stream,
+                stdout=subprocess.DEVNULL if stream == subprocess.PIPE else stream,
                 stderr=subprocess.DEVNULL,
                 start_new_session=True,  # so that Ctrl-C and a closed terminal do not reach it
             )
@@ -72,6 +83,11 @@ class GatewayPort:
     def process_id(self) -> int:
         """Number of the gateway's process."""
         return self._process.pid
+
+    @property
+    def processes(self) -> list[subprocess.Popen[bytes]]:
+        """The gateway, and the spare one if it was started."""
+        return [self._process, *([self._spare] if self._spare else [])]
 
     @property
     def in_waiting(self) -> int:
@@ -106,13 +122,21 @@ class GatewayPort:
             self._process.wait(ANSWER_S)
         except subprocess.TimeoutExpired:
             self.replace()
+            return
+        if self._spare is not None:
+            _tell(self._spare, IDLE)
+            self._spare.wait()
+            self._spare = None
 
     def replace(self) -> None:
         """End a gateway that is frozen or lost, and let another one stop the robot."""
+        if self._spare is None:
+            self._spare = self._start(subprocess.PIPE, {"halts": True, "topics": {}})
+        _tell(self._spare, b"")
         self._process.kill()
         self._process.wait()
         self._ours.close()
-        self._process = self._start(subprocess.DEVNULL, {"halts": True})
+        self._process, self._spare = self._spare, None
 
 
 class Link:
@@ -183,6 +207,14 @@ class Link:
         if self.is_open:
             self.is_open = False
             self.port.close()
+
+
+def _tell(spare: subprocess.Popen[bytes], word: bytes) -> None:
+    """Tell a spare gateway that there is nothing to do, or by the end of its input that its time has come."""
+    with contextlib.suppress(OSError):  # it was killed
+        if spare.stdin is not None:
+            spare.stdin.write(word)
+            spare.stdin.close()
 
 
 def open_link(address: Address, settings: dict[str, Any]) -> Link:

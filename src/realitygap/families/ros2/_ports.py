@@ -12,13 +12,16 @@ import time
 from importlib.util import find_spec
 
 from realitygap._limits import parse_json
+from realitygap.errors import RobotError
 from realitygap.robots import PortGuess
 
-from ._address import read_address
+from ._address import LOOPBACK, read_address
 from ._graph import COMMANDS, Ends
 
 LOOK_S = 15.0
 """Longest time of a look [s]: it imports DDS, and waits a second for answers."""
+MOST_LISTED = 24
+"""Largest number of topics that are listed."""
 FRESH_S = 10.0
 """Time for which a look counts [s]: pages of the lab ask often."""
 
@@ -74,7 +77,10 @@ def find_ports() -> list[PortGuess]:
 
 
 def _look() -> list[PortGuess]:
-    address = read_address("/")
+    try:
+        address = read_address("/")
+    except RobotError as error:
+        return [PortGuess("/", f"robots on ROS 2 were not looked for: {error}", "")]
     settings = {"looks": True, "domain": address.domain, "interface": address.interface}
     command = [sys.executable, "-P", "-m", "realitygap.families.ros2._gateway", json.dumps(settings)]
     try:
@@ -84,6 +90,9 @@ def _look() -> list[PortGuess]:
         ends = Ends(tuple(parse_json(done.stdout)))
     except (OSError, ValueError, subprocess.SubprocessError):
         return []
+    options = [f"domain={address.domain}"] * (address.domain != 0)
+    options += [f"interface={address.interface}"] * (address.interface not in ("", LOOPBACK))
+    query = "?" + "&".join(options) if options else ""
     guesses = []
     for namespace, topics in ends.robots().items():
         kinds = {
@@ -91,6 +100,10 @@ def _look() -> list[PortGuess]:
             for end in ends.all
             if end["role"] == "subscriber" and end["kind"] in COMMANDS and end["topic"] in topics
         }
-        listed = ", ".join(topic.removeprefix(namespace.rstrip("/") + "/") for topic in topics[:6])
-        guesses.append(PortGuess(namespace, f"a robot on ROS 2 ({', '.join(sorted(kinds))})", listed))
+        what = f"a robot on ROS 2 ({', '.join(sorted(kinds))})"
+        if any(ends.n_programs(topic) > 1 for topic in topics):
+            what = "several robots on ROS 2 in one namespace, which cannot be driven"
+        listed = ", ".join(topic.removeprefix(namespace.rstrip("/") + "/") for topic in topics[:MOST_LISTED])
+        more = f" and {len(topics) - MOST_LISTED} more" if len(topics) > MOST_LISTED else ""
+        guesses.append(PortGuess(f"{namespace}{query}", what, listed + more))
     return guesses

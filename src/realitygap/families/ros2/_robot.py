@@ -30,7 +30,7 @@ from realitygap.world import Pose
 from ._address import Address, read_address
 from ._graph import SENSORS, Ends, refuse_graph, refuse_two
 from ._lines import LIFE_S, ONCE_S
-from ._link import START_S, Link, open_link, open_port
+from ._link import START_S, GatewayPort, Link, open_link, open_port
 from ._messages import full_topic
 from ._wiring import intensities_of, is_bumped, load_wired, range_of, respond, sectors_of
 
@@ -62,7 +62,7 @@ class Ros2Info:
         name: Namespace of its topics, or its port.
         robot: Name or file of its description.
         command: Types of the commands that it takes.
-        timeout_s: Time after which it stops without commands, as its file says [s]; 0: never.
+        timeout_s: Time after which it stops without commands, as its file says [s]; 0: never, None: it does not say.
         port: Address.
         label: REAL or EMULATED.
     """
@@ -70,7 +70,7 @@ class Ros2Info:
     name: str
     robot: str
     command: str
-    timeout_s: float
+    timeout_s: float | None
     port: str
     label: Label
 
@@ -158,6 +158,8 @@ class Ros2Robot(PortDriver):
         EXITS.hold()
         try:
             kinds = self._find()
+            if isinstance(self.link.port, GatewayPort):
+                self.link.port.stand_by()
         except BaseException as error:
             self.link.close()
             EXITS.release()
@@ -166,7 +168,7 @@ class Ros2Robot(PortDriver):
         self._released = weakref.finalize(self, _let_go, self.link)
         self.info: Ros2Info = Ros2Info(
             self._address.namespace or self._name, self.model.name, ", ".join(kinds), self.wiring.timeout_s,
-            self._name, self.label,
+            self._shown, self.label,
         )  # fmt: skip
         self._record_set_up(self._name)
 
@@ -177,6 +179,11 @@ class Ros2Robot(PortDriver):
     def port(self) -> Any:
         """The open port; that of an emulated robot in this program has a `witness`."""
         return self.link.port
+
+    @property
+    def _shown(self) -> str:
+        """The address as a command takes it."""
+        return f"ros2:{self._name.removeprefix('ros2:')}"
 
     @property
     def name(self) -> str:
@@ -374,9 +381,18 @@ class Ros2Robot(PortDriver):
         return {topic: _short(message) for topic, message in self._read().items()}
 
     def volts(self) -> float:
-        """Return the voltage of the battery [V]; nan if no message told it."""
+        """Return the voltage of the battery [V].
+
+        Raises:
+            RobotError: No message tells it.
+        """
         message = self._read().get(self._full(self.wiring.battery))
-        return math.nan if message is None or message["voltage"] is None else float(message["voltage"])
+        if message is None or message["voltage"] is None:
+            raise RobotError(
+                "The robot does not tell the voltage of its battery. Name the topic of its BatteryState in [driver] of "
+                "the robot file: battery = 'battery_state'."
+            )
+        return float(message["voltage"])
 
     def timeout(self) -> float:
         """Return the time for which the robot follows a command that is not repeated [s]; inf: 5 s and longer.
@@ -422,7 +438,8 @@ class Ros2Robot(PortDriver):
         The robot drives on until the next command, or for 0.2 s.
 
         Raises:
-            RobotError: The link is lost.
+            RobotError: The link is lost, a sensor is silent, or this program was stopped for so long that the robot
+                stopped.
         """
         command = check_command(command)
         self._recorder.call("drive", move=command.move, turn=command.turn)
@@ -430,12 +447,19 @@ class Ros2Robot(PortDriver):
             until = self.clock.now() + self.step_s
             while True:
                 left = max(until - self.clock.now(), 0.0)
-                self._send(command, max(left, self.lasts_s) + LIFE_MARGIN_S)
-                piece = min(left, LIFE_S / 2)
+                life_s = min(max(left, self.lasts_s) + LIFE_MARGIN_S, LIFE_S)
+                self._send(command, life_s)
+                sent, piece = self.clock.now(), min(left, LIFE_S / 2)
                 if piece:
                     self.clock.sleep(piece)
+                if left > LIFE_S / 2 and (passed := self.clock.now() - sent) > life_s:
+                    raise RobotError(
+                        f"This program stood still for {passed - piece:.1f} s. So the robot stopped before the end of "
+                        "the command."
+                    )
                 if left <= LIFE_S / 2:
                     return
+                self._read()  # a robot that is gone is silent
 
     def motors(self, left: float, right: float) -> None:
         """Turn the wheels, each -1 (full back) to 1 (full ahead), until the next command, or for 0.4 s at most.

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from typing import Any, Literal
+from typing import Any, Literal, Self
 
-from pydantic import Field
+from pydantic import Field, ValidationError, model_validator
 
 from realitygap.errors import RobotError
-from realitygap.settings import Settings
+from realitygap.settings import Settings, mistakes
 from realitygap.world import RangeSensor, RobotModel, load_robot
 
 from . import _messages as m
@@ -19,6 +20,7 @@ from ._messages import full_topic
 BumpKind = Literal[
     "std_msgs/msg/Bool", "irobot_create_msgs/msg/HazardDetectionVector", "turtlebot3_msgs/msg/SensorState"
 ]
+_TOPIC = r"[/~]?[A-Za-z_]\w*(/\w+)*"
 BUMP = 1
 """Type of a hazard that is a bump; source: irobot_create_msgs/msg/HazardDetection."""
 
@@ -77,16 +79,46 @@ class Wiring(Settings):
     silent_s: float = Field(
         1.0, gt=0, le=60, description="Age of a reading after which its sensor counts as silent [s]."
     )
-    timeout_s: float = Field(
-        0.5,
+    timeout_s: float | None = Field(
+        None,
         ge=0,
         le=60,
-        description="Time after which the robot stops without commands, as documented [s]. 0: never.",
+        description="Time after which the robot stops without commands, as documented [s]. 0: never. The driver does "
+        "not depend on it.",
     )
+
+    @model_validator(mode="after")
+    def _poses_have_frames_if_they_are_transforms(self) -> Self:
+        if self.pose_frames and not self.pose:
+            raise ValueError("pose_frames is for a topic of TF: set pose, such as '/tf'")
+        if self.pose.rpartition("/")[2] == "tf" and not self.pose_frames:
+            raise ValueError(
+                f"pose is {self.pose!r}, a topic of TF: set pose_frames, such as ['map', 'base_link']"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _topics_can_be(self) -> Self:
+        names = [name for name, _ in self._kinds() if name] + [self.command]
+        for name in names:
+            if not re.fullmatch(_TOPIC, name):
+                raise ValueError(
+                    f"{name!r} is no name of a topic, expected letters, digits, '_' and '/', such as 'scan'"
+                )
+            if names.count(name) > 1:
+                raise ValueError(f"topic {name!r} is named twice")
+        kinds = [kind for kind in ("ranges", "scan", "intensity") if getattr(self, kind)]
+        if len(kinds) > 1:
+            raise ValueError(f"{' and '.join(kinds)} both tell the range sensors, expected one of them")
+        return self
 
     def topics(self, namespace: str) -> dict[str, str]:
         """Return the types of all topics that the driver reads, by full name."""
-        kinds = [
+        return {full_topic(namespace, topic): kind for topic, kind in self._kinds() if topic}
+
+    def _kinds(self) -> list[tuple[str, str]]:
+        """Return the topics that the driver reads, with empty ones, and their types."""
+        return [
             (self.odometry, m.ODOMETRY),
             (self.pose, m.TF if self.pose_frames else m.POSE),
             (self.scan.topic if self.scan else "", m.SCAN),
@@ -95,7 +127,6 @@ class Wiring(Settings):
             (self.bump, self.bump_kind),
             (self.battery, m.BATTERY),
         ]
-        return {full_topic(namespace, topic): kind for topic, kind in kinds if topic}
 
     def needed(self, namespace: str) -> tuple[str, ...]:
         """Return the topics without which trials cannot be driven."""
@@ -117,9 +148,10 @@ def load_wired(robot: str) -> tuple[RobotModel, Wiring]:
             "another robot: ros2:/?robot=turtlebot3-burger."
         )
     try:
-        wiring = Wiring(**model.driver)
-    except ValueError as error:
-        raise RobotError(f"Robot {robot}, [driver]: {error}") from error
+        wiring = Wiring.model_validate(model.driver)
+    except ValidationError as error:
+        found = [f"driver.{place}: {text}" for place, text in mistakes(error, Wiring, model.driver)]
+        raise RobotError(f"Robot {robot}: {' '.join(found)}") from error
     n, named = len(model.range), wiring.intensity_frames if wiring.intensity else wiring.ranges
     if named and len(named) != n:
         raise RobotError(f"Robot {robot} has {n} range sensors, and [driver] names {len(named)} of them.")

@@ -157,9 +157,9 @@ class Ros2Robot(PortDriver):
             self.link.tell = lambda name, sent, came: recorder.wire(clock.now(), 0.0, name, sent, came, "ok")
         EXITS.hold()
         try:
-            kinds = self._find()
             if isinstance(self.link.port, GatewayPort):
-                self.link.port.stand_by()
+                self.link.port.stand_by()  # before it drives: a program that starts takes time from others
+            kinds = self._find()
         except BaseException as error:
             self.link.close()
             EXITS.release()

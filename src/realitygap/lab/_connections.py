@@ -1,4 +1,4 @@
-"""Limits of connections: how many may not have shown the token, and which messages a page may send.
+"""Connections: how many may not have shown the token, which messages a page may send, and when they end.
 
 A connection without the token is limited in time and bytes, so that it cuts nobody else off.
 """
@@ -6,6 +6,7 @@ A connection without the token is limited in time and bytes, so that it cuts nob
 from __future__ import annotations
 
 import asyncio
+import functools
 import sys
 from collections.abc import Awaitable, Callable, MutableMapping
 from functools import partial
@@ -98,6 +99,28 @@ def guarded_protocol(strangers: Strangers) -> type[asyncio.Protocol]:
             super().connection_lost(error)
 
     return GuardedProtocol
+
+
+def end_lost_sockets() -> None:
+    """Have Engine.IO close the websocket of a page that answered too late, so that the page connects again soon.
+
+    Engine.IO forgets such a page, and does not tell it (its issue 323). Until the page misses the next sign of life, up
+    to 24 s later, all presses on it are lost, and meanwhile NiceGUI deletes what it shows.
+    """
+    from engineio.async_socket import AsyncSocket
+
+    check = AsyncSocket.check_ping_timeout
+    if hasattr(check, "__wrapped__"):
+        return
+
+    @functools.wraps(check)
+    async def check_and_end(socket: AsyncSocket) -> bool:
+        is_there: bool = await check(socket)
+        if not is_there:
+            await socket.queue.put(None)  # ends the task that sends, which closes the websocket
+        return is_there
+
+    AsyncSocket.check_ping_timeout = check_and_end
 
 
 Message = MutableMapping[str, Any]

@@ -206,7 +206,7 @@ def _prepare(
 
     from ._class import Classroom
     from ._class_turns import Turns
-    from ._connections import Strangers, guarded_protocol, most_strangers
+    from ._connections import Strangers, end_lost_sockets, guarded_protocol, most_strangers
     from ._lab import Lab
     from ._shared_robot import SharedRobot
     from .pages import add_pages
@@ -220,6 +220,7 @@ def _prepare(
         True  # pages show by themselves how far an upload is
     )
     _clean_pages()
+    end_lost_sockets()
     app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
     add_pages(lab)
     ui.run_with(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 
 from realitygap.errors import RealityGapError, RobotError
 from realitygap.families import ros2
-from realitygap.families.ros2 import Ros2Robot
+from realitygap.families.ros2 import Ros2Robot, _ports
 from realitygap.families.ros2._address import read_address
 from realitygap.families.ros2._messages import DEFINITIONS, fields_of, message_of, name_on_wire
 from realitygap.families.ros2._wiring import Scan, load_wired, respond, sectors_of
@@ -103,6 +104,21 @@ def test_battery_that_is_not_told_is_an_error(tmp_path):
         pytest.raises(RobotError, match="does not tell the voltage"),
     ):
         robot.volts()
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("ROS_DOMAIN_ID", "300", "from 0 to 232"),
+        ("ROS_AUTOMATIC_DISCOVERY_RANGE", "everywhere", "expected SUBNET, LOCALHOST"),
+    ],
+)
+def test_wrong_variable_of_ros_gets_one_message(monkeypatch, name, value, message):
+    monkeypatch.setenv(name, value)
+    with pytest.raises(RobotError, match=message):
+        read_address("/")
+    if find_spec("cyclonedds"):
+        assert any(message in guess.seems for guess in _ports._look())
 
 
 @pytest.mark.parametrize(

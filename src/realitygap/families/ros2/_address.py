@@ -11,6 +11,8 @@ from realitygap.robots import Label
 
 LOOPBACK = "lo"
 OPTIONS = ("domain", "interface", "robot", "label")
+RANGES = ("", "SUBNET", "LOCALHOST", "OFF", "SYSTEM_DEFAULT")
+"""Values of `ROS_AUTOMATIC_DISCOVERY_RANGE`."""
 _MOST_DOMAIN = 232
 
 
@@ -84,6 +86,9 @@ def _domain(options: dict[str, str]) -> int:
 def _usual_interface() -> str:
     if os.environ.get("CYCLONEDDS_URI"):
         return ""
-    if os.environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "").upper() == "SUBNET":
-        return "auto"
-    return LOOPBACK
+    given = os.environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "")
+    if given.upper() not in RANGES:
+        raise RobotError(
+            f"ROS_AUTOMATIC_DISCOVERY_RANGE is {given!r}, expected {', '.join(filter(None, RANGES))}."
+        )
+    return "auto" if given.upper() == "SUBNET" else LOOPBACK

@@ -121,7 +121,7 @@ def info(
         found = terminal.info(opened)
         if probe:
             lasts_s = opened.timeout()
-            found |= {"measured_timeout_s": lasts_s if isfinite(lasts_s) else "5 or more"}
+            found |= {"measured_timeout_s": lasts_s if isfinite(lasts_s) else "none found"}
     _print(found, as_json)
 
 

@@ -23,7 +23,7 @@ from ._settings import NeatSettings
 from ._tables import MOST_NUMBER, arrays_of, check_shapes, genomes_of, table_of, widened
 
 MOST_CELLS = 1_000_000
-"""Largest number of cells of a grid: with 32 genes each, 0.8 GB."""
+"""Largest number of cells of a grid: with room for 40 genes each, 1 GB."""
 MOST_CENTROIDS = 10_000
 """Largest number of cells of a CVT, whose distances are all computed for each genome."""
 CVT_POINTS = 20

@@ -193,16 +193,20 @@ def test_robot_stops_if_the_program_and_its_gateway_are_killed(start_robot, doma
     program = (
         "from realitygap.families.ros2 import Ros2Robot; from realitygap.robots import Command\n"
         f"robot = Ros2Robot('/?domain={domain}&interface=lo', robot={str(tmp_path / 'fast.toml')!r}, step_s=30)\n"
-        "print(robot.link.port.process_id, flush=True)\n"
+        "import os, time; child = os.fork(); child or time.sleep(600)\n"  # it holds all that the program has opened
+        "print(robot.link.port.process_id, child, flush=True)\n"
         "robot.drive(Command(0.1, 0.0))"
     )
     with subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True) as driver:
-        gateway = int(driver.stdout.readline())
-        wait_until(lambda: not rests(fast))
-        os.kill(gateway, signal.SIGSTOP)
-        driver.kill()
-        os.kill(gateway, signal.SIGKILL)
-    wait_until(lambda: rests(fast))
+        gateway, child = map(int, driver.stdout.readline().split())
+        try:
+            wait_until(lambda: not rests(fast))
+            os.kill(gateway, signal.SIGSTOP)
+            driver.kill()
+            os.kill(gateway, signal.SIGKILL)
+            wait_until(lambda: rests(fast))
+        finally:
+            os.kill(child, signal.SIGKILL)
 
 
 def test_long_drive_fails_if_the_robot_leaves(connect):

@@ -173,6 +173,14 @@ def serve(gateway: Gateway, program: int) -> None:
         gateway.tick()
 
 
+def stand_by(program: int) -> bool:
+    """Wait for the program's word, or its end; return whether the robot has to be stopped."""
+    while not select.select([0], [], [], TICK_S)[0]:
+        if os.getppid() != program:  # a child of the program may hold the other end of the pipe
+            return True
+    return os.read(0, PIECE) != IDLE
+
+
 def look(settings: dict[str, Any]) -> None:
     """Print who publishes and subscribes in a domain."""
     node = Node(settings["domain"], settings["interface"])
@@ -194,14 +202,13 @@ def main() -> None:
     except ValueError as error:  # it answers the first request
         sys.stdout.write(json.dumps({"error": str(error), "id": 1}) + "\n")
         return
-    is_needed = True
-    if settings.get(
-        "halts"
-    ):  # it stands by until the program and its gateway are lost, or it is told that they ended
+    program = int(settings["program"])
+    if settings.get("halts"):
         gateway.node.wait_for_subscriber(settings["command"])
-        is_needed = os.read(0, PIECE) != IDLE
+        is_needed = stand_by(program)
     else:
-        serve(gateway, int(settings["program"]))
+        serve(gateway, program)
+        is_needed = True
     if is_needed:
         gateway.halt()
     gateway.node.close()

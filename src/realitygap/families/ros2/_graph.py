@@ -32,7 +32,7 @@ class Ends:
         return [end for end in self.all if end["role"] == role and end["topic"] == topic]
 
     def n_programs(self, topic: str) -> int:
-        """Return how many programs publish a topic, if one program of a robot does."""
+        """Return how many programs publish a topic of a robot's sensor; 0 for other topics."""
         return len({end["who"] for end in self.of("publisher", topic) if end["kind"] in SENSORS})
 
     def robots(self) -> dict[str, list[str]]:

@@ -60,7 +60,8 @@ class GatewayPort:
         Raises:
             RobotError: It cannot be started.
         """
-        self._spare = self._start(subprocess.PIPE, {"halts": True, "topics": {}})
+        more = {"halts": True, "topics": {}, "program": os.getpid()}
+        self._spare = self._start(subprocess.PIPE, more)
 
     def _start(self, stream: int, more: dict[str, Any]) -> subprocess.Popen[bytes]:
         try:
@@ -125,18 +126,23 @@ class GatewayPort:
             return
         if self._spare is not None:
             _tell(self._spare, IDLE)
-            self._spare.wait()
+            try:
+                self._spare.wait(ANSWER_S)
+            except subprocess.TimeoutExpired:  # it is frozen, and there is nothing to do
+                self._spare.kill()
+                self._spare.wait()
             self._spare = None
 
     def replace(self) -> None:
         """End a gateway that is frozen or lost, and let another one stop the robot."""
         if self._spare is None:
-            self._spare = self._start(subprocess.PIPE, {"halts": True, "topics": {}})
-        _tell(self._spare, b"")
+            self.stand_by()
+        if self._spare is not None:
+            _tell(self._spare, b"")
         self._process.kill()
         self._process.wait()
         self._ours.close()
-        self._process, self._spare = self._spare, None
+        self._process, self._spare = self._spare or self._process, None
 
 
 class Link:

@@ -20,7 +20,7 @@ from ._messages import full_topic
 BumpKind = Literal[
     "std_msgs/msg/Bool", "irobot_create_msgs/msg/HazardDetectionVector", "turtlebot3_msgs/msg/SensorState"
 ]
-_TOPIC = r"[/~]?[A-Za-z_]\w*(/\w+)*"
+_TOPIC = r"/?[A-Za-z_]\w*(/\w+)*"
 BUMP = 1
 """Type of a hazard that is a bump; source: irobot_create_msgs/msg/HazardDetection."""
 

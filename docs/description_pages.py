@@ -173,7 +173,7 @@ def words_of(annotation: Any) -> str:
         parts = typing.get_args(annotation)
         if parts[-1] is Ellipsis:
             return "texts" if parts[0] is str else "numbers"
-        return f"{len(parts)} numbers"
+        return f"{len(parts)} {'texts' if parts[0] is str else 'numbers'}"
     if origin is dict:
         return "table"
     return {bool: "true or false", int: "whole number", float: "number", str: "text"}[annotation]

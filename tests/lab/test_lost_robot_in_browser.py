@@ -114,8 +114,7 @@ def test_robot_lost_in_a_trial_of_a_study_is_shown_and_the_study_resumes(lab, vi
     assert states == ["driven", "planned", "void"]
     open_fold(page, "Robot")
     page.get_by_role("button", name="Disconnect").click()
-    fold = page.locator("[data-fold=Robot]")  # it closes: the step is Score
-    fold.get_by_text("Connect a robot").wait_for()
+    page.locator("[data-fold=Robot]").get_by_text("Connect a robot").wait_for()
 
 
 def test_robot_lost_in_a_gap_keeps_its_trials_and_the_gap_resumes(lab, visit, robot):

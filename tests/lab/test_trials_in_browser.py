@@ -111,6 +111,20 @@ def test_only_the_current_step_is_open_and_its_action_is_in_view(lab, visit, siz
     check("Close", "Close generation", [])
 
 
+def test_section_that_the_visitor_opened_stays_open_when_the_step_turns(lab, visit):
+    make_study(lab.root, steps=40)
+    page = visit(PAGE)
+    begin_sitting(page, "emulator://s2?fluke=2&speed=4")
+    start_trial(page, 1)
+    start_trial(page, 2)
+    open_fold(page, "Robot")
+    page.get_by_text("Score the trials").wait_for()
+    page.locator('[data-fold="Score"].q-expansion-item--expanded').wait_for()
+    assert open_folds(page) == ["Score", "Robot"]
+    page.get_by_role("button", name="Disconnect").click()
+    page.locator('[data-fold="Robot"]').get_by_text("Connect a robot").wait_for()
+
+
 def test_cells_are_marked_and_saved_with_the_keyboard(lab, visit):
     drive_sheet(lab.root)
     page = visit(PAGE)

@@ -105,6 +105,7 @@ class _Page:
         self._videos = Videos(lab, counts, self._look_at)
         self._sheets = SheetPhotos(lab, counts, photos, lambda: self._visitor.who, self._look_at)
         self._is_looking = self._is_shown = False
+        self._current_fold: ui.expansion | None = None
         self._can_begin: _Beginning | None = None
         self._agreement = self._looks = ""
         self._emulated = counts.emulated_robot or default_family().emulated
@@ -162,7 +163,7 @@ class _Page:
         ui.timer(1.0, self._look)  # another program may write to the ledger
 
     def _fold(self, title: str) -> ui.expansion:
-        """A section that is open only during its step, or if the visitor opens it."""
+        """A section that is open during its step, or if the visitor opens it."""
         return (
             ui.expansion(title).classes("lab-expansion").props(f'header-class="lab-fold" data-fold="{title}"')
         )
@@ -216,7 +217,7 @@ class _Page:
         show_steps(_STEPS, step, {"Score": f"Score: {n_waiting}"} if n_waiting else {})
 
     def _turn_to(self, at: tuple[str, bool]) -> None:
-        """Open the section of the current step and close the others."""
+        """Open the section of the current step and close that of the step before."""
         step, _ = at
         if self._is_shown:
             was_open = self._score_fold.value
@@ -228,13 +229,19 @@ class _Page:
                 ui.run_javascript(_TO_GRID)
 
     def _open_step(self, step: str) -> None:
-        is_free = self._job() is None
-        for fold, is_current in (
-            (self._score_fold, step == "Score"),
-            (self._robot_fold, is_free and step == "Place"),
-        ):
-            fold.value = is_current
-            fold.classes(**{"add" if is_current else "remove": "lab-current"})
+        """Open the section of a step. A section that the visitor opened stays: a hand may be on a button in it."""
+        current = None
+        if step == "Score":
+            current = self._score_fold
+        elif step == "Place" and self._job() is None:
+            current = self._robot_fold
+        for fold in (self._score_fold, self._robot_fold):
+            if fold is current:
+                fold.value = True
+            elif fold is self._current_fold:
+                fold.value = False
+            fold.classes(**{"add" if fold is current else "remove": "lab-current"})
+        self._current_fold = current
         if step == "Score" and self._sheets.has_photos:
             self._photo_fold.value = True
 

@@ -100,10 +100,10 @@ def test_robot_lost_in_a_trial_of_a_study_is_shown_and_the_study_resumes(lab, vi
     robot.start(speed=8)
     page.get_by_role("button", name="Reconnect").click()
     problem = page.locator(".lab-problem", has_text="The trial was interrupted")
-    pass_preflight(page, problem)
+    problem.wait_for()
     assert not problem.inner_text().endswith("?.")
     page.get_by_role("button", name="Void and repeat").click()
-    page.get_by_text("placed at its start automatically").wait_for()  # the witness is known
+    pass_preflight(page, page.get_by_text("placed at its start automatically"))  # the witness is known
     start_trial(page, 3)
     for _ in range(600):
         with ledger_of(lab.root) as ledger:

@@ -214,11 +214,9 @@ def test_readings_that_the_model_cannot_make_are_flagged():
     assert wrong.misfit > 0.1
 
 
-def test_other_sensors_and_no_readings_are_refused():
+def test_no_readings_are_refused():
     rng = np.random.default_rng(0)
     blank = [Placement(np.array([0.2]), np.empty(0))]
-    with pytest.raises(ValueError, match="has the response 'table', expected ir, pulses or lorentz"):
-        fit_sensor(load_robot("scribbler-s2"), 0, blank, rng)
     with pytest.raises(ValueError, match=r"There are no readings of range\.1"):
         fit_sensor(load_robot("scribbler-s2-fluke2"), 1, blank, rng)
 

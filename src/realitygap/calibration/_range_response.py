@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -12,6 +13,8 @@ from realitygap.world import RangeSensor, RobotModel
 
 from ._prior import Deviation
 from ._simulate import Bools, Floats
+
+Value = TypeVar("Value", float, Floats)
 
 LEAST_COSINE = 1e-3
 """Minimum cosine of the angle between a ray and the normal of a wall. A flatter ray meets no wall."""
@@ -93,8 +96,8 @@ def numbers_in_file(robot: RobotModel, k: int) -> dict[str, float]:
     return own | {TABLE_DISTANCE: 1.0}
 
 
-def file_numbers(values: Mapping[str, float], sensor: RangeSensor) -> dict[str, float]:
-    """Return values of `numbers_to_fit` by the names of the robot file."""
+def file_numbers(values: Mapping[str, Value], sensor: RangeSensor) -> dict[str, Value]:
+    """Return values of `numbers_to_fit`, or arrays of them, by the names of the robot file."""
     own = dict(values)
     scale = own.pop(TABLE_DISTANCE, None)
     if scale is not None:

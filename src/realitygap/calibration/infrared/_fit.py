@@ -9,16 +9,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from realitygap.calibration._posterior import level_ends, sample_posterior
-from realitygap.world import Fitted, RobotModel
+from realitygap.world import Fitted, RangeSensor, RobotModel
 
 from .._one_thread import one_blas_thread
 from .._posterior import N_DRAWS
 from .._prior import ENDS, Parameter, is_identified
+from .._range_response import file_numbers
 from ._checks import Independence, independence, predictive_check
-from ._mixture import LorentzReadings, MixtureReadings
+from ._mixture import LorentzReadings, MixtureReadings, NearestReadings
 from ._parameters import BATTERY
 from ._pulses import PulseReadings
-from ._readings import Array, Placement, refuse_response
+from ._readings import Array, Placement
 
 LEAST_PLACEMENTS = 3
 """Minimum number of placements with which the correlation of readings is distinguished from their placement."""
@@ -47,7 +48,7 @@ class SensorFit:
         independence: Test of the independence of its readings.
         p: P value of the posterior predictive check.
         misfit: Share of the readings that differ from the fit, beyond chance.
-        curve: Distances to a wall ahead [m], mean, and ends of the 90 % band of readings.
+        curve: Distances to a wall ahead along the nearest ray [m], mean, and ends of the 90 % band of readings.
     """
 
     name: str
@@ -76,10 +77,9 @@ def fit_sensor(
         rng: Random numbers.
 
     Raises:
-        ValueError: No readings, or a sensor whose response is no infrared one.
+        ValueError: There are no readings.
     """
     sensor = robot.range[number]
-    refuse_response(robot, number, sensor.response)
     placements = [placement for placement in placements if len(placement.readings)]
     if not placements:
         raise ValueError(
@@ -109,16 +109,17 @@ def fit_sensor(
         parameter.name: parameter.name != BATTERY.name and (row.identified or not advice)
         for parameter, row in zip(model.parameters, fitted, strict=True)
     }
+    numbers = {key: value for key, value in centers.items() if is_own[key]}
+    draws = {
+        parameter.name: values[chosen, k]
+        for k, parameter in enumerate(model.parameters)
+        if is_own[parameter.name]
+    }
     return SensorFit(
         name,
-        fitted
-        + (() if model.places.battery_varied or sensor.response == "lorentz" else (_unknown_battery(name),)),
-        {f"{name}.{key}": value for key, value in centers.items() if is_own[key]},
-        {
-            f"{name}.{parameter.name}": values[chosen, k]
-            for k, parameter in enumerate(model.parameters)
-            if is_own[parameter.name]
-        },
+        fitted + ((_unknown_battery(name),) if _may_sag(sensor) and not model.places.battery_varied else ()),
+        {f"{name}.{key}": value for key, value in file_numbers(numbers, sensor).items()},
+        {f"{name}.{key}": drawn for key, drawn in file_numbers(draws, sensor).items()},
         apart,
         *predictive_check(model.probabilities(values[chosen]), model.counts, rng),
         _curve(model, sensor.cone, sensor.rays, sensor.direction, values[chosen]),
@@ -131,7 +132,14 @@ def _model(robot: RobotModel, number: int, placements: list[Placement], weight: 
         return PulseReadings(placements, sensor.reach, sensor.pulses, weight, sensor)
     if sensor.response == "lorentz":
         return LorentzReadings(placements, sensor, weight)
+    if sensor.response in ("linear", "table"):
+        return NearestReadings(placements, sensor, weight)
     return MixtureReadings(placements, sensor.reach, weight, sensor)
+
+
+def _may_sag(sensor: RangeSensor) -> bool:
+    """Return whether readings may change with the battery: those of light that comes back do."""
+    return sensor.response in ("ir", "pulses")
 
 
 def _values(model: SensorModel, places: Array) -> Array:
@@ -193,11 +201,11 @@ def _curve(model: SensorModel, cone: float, rays: int, direction: float, values:
     """Return the reading of the fit before a wall: one that the robot faces, or turns its back to for a rear sensor."""
     if math.cos(direction) < 0:
         direction += math.pi
-    ahead = np.linspace(0.0, 1.1 * max(model.places.near.max(), 0.1), CURVE)
+    near = np.linspace(0.0, 1.1 * max(model.places.near.max(), 0.1), CURVE)
     angles = direction + (np.linspace(-cone, cone, rays) if rays > 1 else np.zeros(1))
     cosines = np.maximum(np.cos(angles), 1e-3)
-    distances = np.minimum(ahead[:, None] / cosines, model.places.reach)
+    distances = np.minimum(near[:, None] * cosines.max() / cosines, model.places.reach)
     mean, (low, high) = model.quantiles(
         values, distances, np.broadcast_to(cosines, distances.shape), np.array(ENDS)
     )
-    return {"distances_m": ahead, "mean": mean, "low": low, "high": high}
+    return {"distances_m": near, "mean": mean, "low": low, "high": high}

@@ -14,7 +14,21 @@ from numpy.typing import NDArray
 
 from realitygap.world import RangeSensor
 
-from ._parameters import AMPLITUDE, DECAY, DROP, GAIN, HALF_WIDTH, NOISE, OUTLIER
+from .._prior import Parameter
+from ._parameters import (
+    AMPLITUDE,
+    DECAY,
+    DROP,
+    FARTHEST,
+    GAIN,
+    HALF_WIDTH,
+    NOISE,
+    OUTLIER,
+    SCALE,
+    WIDE_NOISE,
+    column,
+    reach_of,
+)
 from ._readings import Array, Placement, Places, Readings, logistic
 
 Parts = tuple[Array, Array, Array, Array]
@@ -33,6 +47,9 @@ ROWS = 32
 
 BINS = 20
 """Number of bins between 0 and 1, for checks and figures, if a sensor answers in finer steps."""
+
+SHOWN_BINS = 500
+"""Number of bins in figures of a sensor with even noise."""
 
 
 def resolution_of(readings: Array) -> float:
@@ -146,10 +163,76 @@ def _inner_edges(step: float) -> Array:
     return edges
 
 
-class LorentzReadings(MixtureReadings):
-    """Readings whose mean follows `lorentz` of kernels/sim/ranges.py, with noise of one spread at all distances.
+class EvenReadings(MixtureReadings):
+    """Base of readings with even noise of one width at all distances, and normal noise in proportion to the response.
 
-    The noise of `sim` is even; here it is normal with the same standard deviation.
+    They are `noise_uniform` and `noise_gain` of a sensor. The likelihood takes normal noise of the same standard
+    deviation, so that a few readings farther out than even noise allows do not decide its width. Bins, and so the check
+    and the figure, have the sum of both, as `sim` draws it.
+
+    Args:
+        placements: Placements with their readings.
+        reach: Reach of the sensor [m].
+        sensor: Sensor, whose `noise_gain` counts unless it is fitted.
+        parameters: Parameters that are fitted.
+        weight: Weight of a reading: below 1 if readings have less information than as many independent ones.
+    """
+
+    def __init__(
+        self,
+        placements: list[Placement],
+        reach: float,
+        sensor: RangeSensor,
+        parameters: tuple[Parameter, ...],
+        weight: float,
+    ) -> None:
+        super().__init__(placements, reach, weight)
+        self.parameters = parameters
+        self._sensor = sensor
+
+    def _mean(self, places: Places, values: Array) -> Array:
+        """Return the mean readings before the noise, (m, p), for parameters (m, d)."""
+        raise NotImplementedError
+
+    def _noise(self, values: Array) -> tuple[Array, Array]:
+        """Return half widths and gains (m, 1): the first positive, so that readings without noise have a likelihood."""
+        width = np.maximum(column(self.parameters, values, NOISE), FINEST)
+        return width[:, None], column(self.parameters, values, GAIN, self._sensor.noise_gain)[:, None]
+
+    def parts(self, places: Places, values: Array) -> Parts:
+        """Return (m, p) mean and standard deviation; nothing is missed, and nothing is any number."""
+        back, (width, gain) = self._mean(places, values), self._noise(values)
+        none = np.zeros_like(back)
+        return back, np.hypot(width / math.sqrt(3), gain * back), none, none
+
+    def _at(self, places: Places, values: Array) -> Array:
+        return self._chances(places, values, self._edges)
+
+    def _shown(self, places: Places, values: Array) -> tuple[Array, Array]:
+        """As `Readings`, with finer bins: the noise of a distance is less than a bin of the check."""
+        edges = np.linspace(0.0, 1.0, SHOWN_BINS + 1)[1:-1]
+        return np.concatenate([[0.0], (edges[1:] + edges[:-1]) / 2, [1.0]]), self._chances(
+            places, values, edges
+        )
+
+    def _chances(self, places: Places, values: Array, edges: Array) -> Array:
+        """Return the probability of each bin between edges at each of the places, (m, q, b)."""
+        back, (width, gain) = self._mean(places, values)[..., None], self._noise(values)
+        width, spread = width[..., None], np.maximum(gain[..., None] * back, FINEST)
+        past = (edges - back) / spread
+        below = (_summed_normal(past + width / spread) - _summed_normal(past - width / spread)) * spread
+        below = np.clip(below / (2 * width), 0.0, 1.0)
+        below = np.concatenate([np.zeros_like(back), below, np.ones_like(back)], axis=2)
+        return np.asarray((1.0 - STRAY) * np.diff(below, axis=2) + STRAY / (below.shape[2] - 1))
+
+
+def _summed_normal(z: Array) -> Array:
+    """Return the integral of the normal distribution function up to z."""
+    return np.asarray(z * scipy.special.ndtr(z) + np.exp(-(z**2) / 2) / math.sqrt(2 * math.pi))
+
+
+class LorentzReadings(EvenReadings):
+    """Readings whose mean follows `lorentz` of kernels/sim/ranges.py.
 
     Args:
         placements: Placements with their readings.
@@ -158,14 +241,10 @@ class LorentzReadings(MixtureReadings):
     """
 
     def __init__(self, placements: list[Placement], sensor: RangeSensor, weight: float = 1.0) -> None:
-        super().__init__(placements, sensor.reach, weight)
-        self.parameters = (AMPLITUDE, HALF_WIDTH, NOISE)
-        self._sensor = sensor
+        super().__init__(placements, sensor.reach, sensor, (AMPLITUDE, HALF_WIDTH, NOISE), weight)
 
-    def parts(self, places: Places, values: Array) -> Parts:
-        """Return (m, p) mean and standard deviation; nothing is missed, and nothing is any number."""
-        amplitude, half_width, noise = (values[:, k, None, None] for k in range(3))
-
+    def _mean(self, places: Places, values: Array) -> Array:
+        amplitude, half_width = (values[:, k, None, None] for k in range(2))
         peak = self._sensor.peak
 
         def uncut(distances: Array) -> Array:
@@ -185,6 +264,30 @@ class LorentzReadings(MixtureReadings):
             meets = places.distances < places.reach
             lost = np.where(meets.any(axis=1), (~meets).sum(axis=1), 0)
             back = back + lost * uncut(np.full((1, 1, 1), places.reach))[..., 0]
-        spread = np.broadcast_to(noise[..., 0] / math.sqrt(3), back.shape)
-        none = np.zeros_like(back)
-        return back, spread, none, none
+        return np.asarray(back)
+
+
+class NearestReadings(EvenReadings):
+    """Readings of what is nearest, whose mean follows `linear` or `table` of kernels/sim/ranges.py.
+
+    Fitted are both kinds of noise and one factor of all distances: the reach of `linear`, and `table_distance` of
+    `table`. A sensor that measures a time of flight has no other number in a robot file.
+
+    Args:
+        placements: Placements with their readings.
+        sensor: Sensor, whose table and cone are not fitted.
+        weight: Weight of a reading: below 1 if readings have less information than as many independent ones.
+    """
+
+    def __init__(self, placements: list[Placement], sensor: RangeSensor, weight: float = 1.0) -> None:
+        is_linear = sensor.response == "linear"
+        reach = FARTHEST * sensor.reach if is_linear else sensor.reach
+        size = reach_of(sensor) if is_linear else SCALE
+        super().__init__(placements, reach, sensor, (size, *WIDE_NOISE), weight)
+        self._table = np.array([(sample.distance, sample.reading) for sample in sensor.table], np.float64)
+
+    def _mean(self, places: Places, values: Array) -> Array:
+        size = values[:, :1]
+        if len(self._table):
+            return np.interp(places.near / size, *self._table.T)
+        return np.maximum(1.0 - places.near / size, 0.0)

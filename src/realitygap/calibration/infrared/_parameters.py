@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from realitygap.world import RangeSensor
 
 from .._prior import Parameter, even, ratio
+from .._range_response import TABLE_DISTANCE
 
 Array = NDArray[np.float64]
 
@@ -27,6 +28,11 @@ DECAY = Parameter("decay", ratio(0.03, 0.8), "m", advice=_BETWEEN)
 HALF_WIDTH = Parameter("half_width", ratio(0.02, 0.5), "m", advice=_BETWEEN)
 GAIN = Parameter("noise_gain", ratio(0.002, 0.5), advice=_BETWEEN)
 NOISE = Parameter("noise_uniform", ratio(0.0002, 0.1), advice="Record more readings in one place.")
+WIDE_NOISE = tuple(replace(each, prior=even(0.0, 0.5)) for each in (NOISE, GAIN))
+"""Noise of a sensor that may have none: a simulated one, or one that answers 0 or 1."""
+SCALE = Parameter(TABLE_DISTANCE, ratio(0.5, 2.0), advice=_BETWEEN)
+FARTHEST = 2.0
+"""Largest factor between the reach of a `linear` sensor and that in its robot file, up or down."""
 DROP = (
     Parameter(
         "drop_most", even(0.0, 1.0), advice="Record at larger distances at which something is still seen."
@@ -64,6 +70,11 @@ def scaled(parameter: Parameter, sensor: RangeSensor) -> Parameter:
     if parameter.name == "incidence":
         high = max(high, 2 * sensor.incidence)
     return replace(parameter, prior=ratio(low, high) if parameter.is_ratio else even(low, high))
+
+
+def reach_of(sensor: RangeSensor) -> Parameter:
+    """Return the reach of a `linear` sensor. It decides the slope of the readings, and so their scale, too."""
+    return Parameter("reach", ratio(sensor.reach / FARTHEST, sensor.reach * FARTHEST), "m", advice=_BETWEEN)
 
 
 def column(parameters: tuple[Parameter, ...], values: Array, parameter: Parameter, own: float = 0.0) -> Array:

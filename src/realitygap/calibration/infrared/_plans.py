@@ -18,7 +18,8 @@ from realitygap.records import TrialRecord
 from realitygap.trials import TrialPlan
 from realitygap.world import INCH, Arena, Pose, RobotModel
 
-from ._readings import Placement, refuse_response
+from ._parameters import FARTHEST
+from ._readings import Placement
 
 READINGS = 50
 """Readings at each placement."""
@@ -82,8 +83,6 @@ def sensor_plans(arena: Arena, robot: RobotModel, n: int | None = None) -> list[
     Raises:
         ValueError: The arena or the robot does not allow it.
     """
-    for k, sensor in enumerate(robot.range):
-        refuse_response(robot, k, sensor.response)
     nearest = sensor_distances(robot)[0]
     if not arena.walls:
         raise ValueError(f"Arena {arena.name!r} has no wall to face.")
@@ -95,7 +94,8 @@ def sensor_plans(arena: Arena, robot: RobotModel, n: int | None = None) -> list[
     for distances in zip(*(sensor_distances(robot, heading) for heading in headings), strict=True):
         for distance, heading in zip(distances, headings, strict=True):
             front = _foremost(robot, heading)
-            if distance <= max(xs) - min(xs) - front - robot.radius:
+            rim = max(math.cos(heading) * x for part in robot.body for x, _ in part.outline())
+            if rim - front < distance <= max(xs) - min(xs) - front - robot.radius:
                 starts.append(Pose(max(xs) - front - distance, middle, heading))
     if not starts:
         raise ValueError(f"Arena {arena.name!r} is too short to place a robot {nearest:.3g} m from a wall.")
@@ -131,6 +131,8 @@ def placements_of(trials: Sequence[TrialRecord], robot: RobotModel, arena: Arena
             continue
         pose = np.array([trial.poses[0] if len(trial.poses) else trial.start], np.float64)
         for k, sensor in enumerate(robot.range):
+            if sensor.response == "linear":  # its own reach is fitted, and may be farther
+                sensor = sensor.model_copy(update={"reach": FARTHEST * sensor.reach})
             (distances,), (cosines,) = rays_of(sensor, pose, arena)
             readings = trial.readings[:, k]
             placements[k].append(

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from realitygap.world import Arena, RangeSensor, RobotModel
+from realitygap.world import Arena, RangeSensor
 
 from .._prior import Parameter
 from ._parameters import BATTERY, INCIDENCE, column, scaled
@@ -27,19 +27,6 @@ VARIED = 0.05
 
 SLANTED = 0.9
 """Cosine of the angle to its normal from which on a wall counts as slanted."""
-
-
-def refuse_response(robot: RobotModel, number: int, response: str) -> None:
-    """Raise an error if a range sensor is not an infrared one.
-
-    Raises:
-        ValueError: It is another.
-    """
-    if response not in ("ir", "pulses", "lorentz"):
-        raise ValueError(
-            f"range.{number} of robot {robot.name!r} has the response {response!r}, expected ir, pulses or lorentz: of "
-            "others there is no noise to fit."
-        )
 
 
 def rays_of(sensor: RangeSensor, poses: Array, arena: Arena) -> tuple[Array, Array]:
@@ -89,7 +76,7 @@ class Placement:
     """One placement of the robot, and the readings of the sensor there.
 
     Attributes:
-        distances: (rays,) along the sensor's rays to what is nearest [m], at most its reach.
+        distances: (rays,) along the rays to what is nearest [m], at most the reach; of `linear` `FARTHEST` times that.
         readings: (n,) one after the other, 0..1.
         battery_v: Battery voltage [V]; nan if unknown.
         cosines: (rays,) cosine between each ray and the normal of its wall; 1 for all if the wall is faced.
@@ -213,6 +200,10 @@ class Readings:
         """Return the probability of each bin at each of the places, (m, q, b)."""
         raise NotImplementedError
 
+    def _shown(self, places: Places, values: Array) -> tuple[Array, Array]:
+        """Return the values (b,) and probabilities (m, q, b) of bins for a figure."""
+        return self.bins, self._at(places, values)
+
     def _response(self, places: Places, values: Array) -> tuple[Array, Array]:
         """Return `Places.response` for parameters (m, d), of which the first are amplitude and decay."""
         per_volt = column(self.parameters, values, BATTERY)
@@ -232,7 +223,8 @@ class Readings:
     ) -> tuple[Array, Array]:
         """Return means (q,) and quantiles (s, q) of readings at distances (q, rays) [m], over parameters (m, d)."""
         blank = [Placement(row, np.empty(0), cosines=c) for row, c in zip(distances, cosines, strict=True)]
-        chances = self._at(Places.of(blank, self.places.reach), values).mean(axis=0)
+        bins, each = self._shown(Places.of(blank, self.places.reach), values)
+        chances = each.mean(axis=0)
         summed = np.cumsum(chances, axis=1)
         place = np.array([(summed < share).sum(axis=1) for share in shares])
-        return chances @ self.bins, self.bins[np.minimum(place, len(self.bins) - 1)]
+        return chances @ bins, bins[np.minimum(place, len(bins) - 1)]

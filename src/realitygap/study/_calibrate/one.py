@@ -90,11 +90,16 @@ def calibrate(
             f"--budget is {budget}, but choosing the last trials needs at least {LEAST_TO_CHOOSE}, because the "
             "choice depends on the first ones. Give more, or leave out --choose."
         )
+    plans = (
+        [] if choose else _plans(KINDS[kind], target, robot, budget, seed)
+    )  # refuses before a file is made
     file = None if trials_file is None else open_trials(trials_file, target, observe, robot=str(robot))
     with KeptTarget(target, file, operator=operator) as kept:
         if file is not None and hold is not None:
             hold(file)
-        return _calibrated(kind, kept, robot, observe, budget, seed, tell, choose=choose)
+        if choose:
+            return _chosen(kept, robot, observe, ALL_TRIALS if budget is None else budget, seed, tell)
+        return _calibrated(kind, kept, robot, observe, plans, seed, tell)
 
 
 def _calibrated(
@@ -102,19 +107,12 @@ def _calibrated(
     target: Target,
     robot: str | Path,
     observe: Observe,
-    budget: int | None,
+    plans: Sequence[TrialPlan],
     seed: int,
     tell: Tell | None,
-    *,
-    choose: bool,
 ) -> Calibration:
-    if choose:
-        return _chosen(target, robot, observe, ALL_TRIALS if budget is None else budget, seed, tell)
-    paced = load_robot(robot).model_copy(update={"step_s": target.step_s})
-    plans = _plans(KINDS[kind], target.arena, paced, budget)
-    numbered = [replace(plan, number=plan.number + SEED_STRIDE * (seed % 1000)) for plan in plans]
     count = _counting(len(plans), tell)
-    trials = target.carry_out(numbered, observe, lambda _, trial: count(trial))
+    trials = target.carry_out(plans, observe, lambda _, trial: count(trial))
     parts = _fit(
         kind, trials, robot, target.arena, observe, seed, is_under_camera(target.name, target.label, observe)
     )
@@ -298,11 +296,15 @@ def _check_kind(kind: str) -> None:
         raise StudyError(f"Cannot calibrate {kind!r}. {did_you_mean(kind, KINDS)}")
 
 
-def _plans(kind: Kind, arena: Arena, robot: RobotModel, budget: int | None) -> Sequence[TrialPlan]:
+def _plans(
+    kind: Kind, target: Target, robot: str | Path, budget: int | None, seed: int
+) -> Sequence[TrialPlan]:
+    paced = load_robot(robot).model_copy(update={"step_s": target.step_s})
     try:
-        return kind.plans(arena, robot, *([] if budget is None else [budget]))
+        plans = kind.plans(target.arena, paced, *([] if budget is None else [budget]))
     except ValueError as error:
         raise StudyError(str(error)) from error
+    return [replace(plan, number=plan.number + SEED_STRIDE * (seed % 1000)) for plan in plans]
 
 
 def _fit(

@@ -24,7 +24,7 @@ from ._interface import (
     paper_interface,
 )
 from ._json import interface_to_dict, to_text
-from ._map_elites import Elite, MapElites, cvt_centroids
+from ._map_elites import MOST_CELLS, MOST_CENTROIDS, Elite, MapElites, cells_of, cvt_centroids, place_in_cells
 from ._novelty import (
     NearestArchive,
     NoveltySettings,
@@ -38,6 +38,8 @@ from ._settings import NAMED_SETTINGS, NeatSettings
 
 __all__ = [
     "DISTANCES",
+    "MOST_CELLS",
+    "MOST_CENTROIDS",
     "NAMED_SETTINGS",
     "OUTPUTS",
     "PAPER_INPUTS",
@@ -60,6 +62,7 @@ __all__ = [
     "Population",
     "archive_members",
     "behavior_distance",
+    "cells_of",
     "cvt_centroids",
     "decode_all",
     "distance_kind",
@@ -73,6 +76,7 @@ __all__ = [
     "network_picture",
     "pack_behaviors",
     "paper_interface",
+    "place_in_cells",
     "random_key",
     "sorted_cells_distance",
     "to_c",

@@ -121,7 +121,8 @@ class MapElites:
             raise ValueError(f"crossover is {crossover}, expected 0 to 1.")
         limits = _checked_ranges(ranges)
         self.ranges = tuple(map(tuple, limits.tolist()))
-        self._cells, self.cells = _cells(cells, limits, int(self._key))
+        self._cells = cells_of(cells, limits, int(self._key))
+        self.cells = tuple(map(int, cells)) if isinstance(cells, Sequence) else int(cells)
         self._rules = self.settings.rules(n_inputs + bias, n_outputs, bias_input=n_inputs if bias else -1)
         self.batch = 0
         self._asked: int | None = None
@@ -224,9 +225,7 @@ class MapElites:
         places = np.ascontiguousarray(finite_numbers("descriptors", descriptors))
         if places.ndim != 2 or places.shape[1] != len(self.ranges):
             raise ValueError(f"descriptors has shape {places.shape}, expected (n, {len(self.ranges)}).")
-        found = np.empty(len(places), np.int64)
-        kernels.cells_of(places, self._cells, found)
-        return found
+        return place_in_cells(places, self._cells)
 
     def elites(self) -> list[Elite]:
         """Return the elites in the order in which their cells were filled."""
@@ -358,23 +357,38 @@ def _checked_ranges(ranges: Sequence[tuple[float, float]]) -> NDArray[np.float64
     return limits
 
 
-def _cells(
-    cells: int | Sequence[int], limits: NDArray[np.float64], key: int
-) -> tuple[Cells, int | tuple[int, ...]]:
-    """Return the cells as kernels read them, and how many there are, along each descriptor for a grid."""
+def cells_of(cells: int | Sequence[int], limits: NDArray[np.float64], key: int) -> Cells:
+    """Return cells as kernels read them.
+
+    Args:
+        cells: Cells along each descriptor of a grid, or the number of cells of a CVT.
+        limits: (d, 2) lowest and highest value of each descriptor.
+        key: Key of the centroids.
+
+    Raises:
+        TypeError: A number is not a whole one.
+        ValueError: There are too many cells, or not as many numbers as descriptors.
+    """
     low, high = np.ascontiguousarray(limits.T)
     d = len(limits)
-    if isinstance(cells, Sequence):
-        size = tuple(whole_number(f"cells[{k}]", n, 1, MOST_CELLS) for k, n in enumerate(cells))
-        if len(size) != d:
-            raise ValueError(
-                f"cells has {len(size)} numbers, and ranges has {d}: expected one for each descriptor."
-            )
-        if math.prod(size) > MOST_CELLS:
-            raise ValueError(f"The grid has {math.prod(size):,} cells, expected at most {MOST_CELLS:,}.")
-        return Cells(low, high, np.array(size, np.int64), np.empty((0, d))), size
-    n = whole_number("cells", cells, 1, MOST_CENTROIDS)
-    return Cells(low, high, np.ones(d, np.int64), cvt_centroids(n, d, key)), n
+    if not isinstance(cells, Sequence):
+        n = whole_number("cells", cells, 1, MOST_CENTROIDS)
+        return Cells(low, high, np.ones(d, np.int64), cvt_centroids(n, d, key))
+    size = tuple(whole_number(f"cells[{k}]", n, 1, MOST_CELLS) for k, n in enumerate(cells))
+    if len(size) != d:
+        raise ValueError(
+            f"cells has {len(size)} numbers, and ranges has {d}: expected one for each descriptor."
+        )
+    if math.prod(size) > MOST_CELLS:
+        raise ValueError(f"The grid has {math.prod(size):,} cells, expected at most {MOST_CELLS:,}.")
+    return Cells(low, high, np.array(size, np.int64), np.empty((0, d)))
+
+
+def place_in_cells(descriptors: NDArray[np.float64], cells: Cells) -> NDArray[np.int64]:
+    """Return the number of the cell of each of n descriptors, (n, d), in memory row by row."""
+    found = np.empty(len(descriptors), np.int64)
+    kernels.cells_of(descriptors, cells, found)
+    return found
 
 
 def cvt_centroids(n: int, d: int, key: int = 0) -> NDArray[np.float64]:
@@ -390,12 +404,9 @@ def cvt_centroids(n: int, d: int, key: int = 0) -> NDArray[np.float64]:
     """
     points = np.random.Generator(np.random.Philox(key=key)).random((n * CVT_POINTS, d))
     centroids = points[:n].copy()
-    found, unit = (
-        np.empty(len(points), np.int64),
-        Cells(np.zeros(d), np.ones(d), np.ones(d, np.int64), centroids),
-    )
+    unit = Cells(np.zeros(d), np.ones(d), np.ones(d, np.int64), centroids)
     for _ in range(CVT_ROUNDS):
-        kernels.cells_of(points, unit._replace(centroids=centroids), found)
+        found = place_in_cells(points, unit._replace(centroids=centroids))
         count = np.bincount(found, minlength=n)
         sums = np.stack([np.bincount(found, points[:, k], n) for k in range(d)], axis=1)
         centroids = np.where(count[:, None] > 0, sums / np.maximum(count, 1)[:, None], centroids)

@@ -18,7 +18,7 @@ GROUP = "realitygap.platforms"
 RESERVED = frozenset(
     {
         *("python", "platform", "study", "report", "trials", "condition", "arena", "task", "neat", "novelty"),
-        "controller",
+        *("archive", "controller"),
         *("name", "selection", "noise", "seed", "pair", "on", "baseline", "change"),
         *("published", "published_source"),
     }

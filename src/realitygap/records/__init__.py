@@ -16,6 +16,7 @@ from realitygap.records._columns import (
     SCHEMA,
     Column,
     column_table,
+    has_far_parents,
     list_column,
     schema_with,
 )
@@ -134,6 +135,7 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     "TrialRecord",
     "EndReason",
     "is_whole",
+    "has_far_parents",
     "is_taken_back",
     "taken_back",
     "those_that_count",

@@ -82,6 +82,9 @@ COLUMNS: tuple[Column, ...] = (
     Column("key", pl.UInt64(), "Key of the random numbers, with which the study repeats the trial."),
 )
 
+FAR_PARENTS = "descriptor"
+"""Column of runs whose parents are of any generation."""
+
 EXTRA: tuple[Column, ...] = (
     Column(
         "drawn",
@@ -98,6 +101,12 @@ EXTRA: tuple[Column, ...] = (
         "behavior",
         pl.List(pl.Float64()),
         "Distances that do not compare cells: the behavior, such as the final x and y [m].",
+    ),
+    Column(
+        FAR_PARENTS,
+        pl.List(pl.Float64()),
+        'With `selection = "map-elites"`: numbers that describe the individual, means over its trials. Its parents are '
+        "then counted from the first individual of the run, and `fitness` is a mean over its trials.",
     ),
     Column(
         "partners",
@@ -250,9 +259,16 @@ def _check_ranges(frame: pl.DataFrame) -> None:
             raise ValueError(f"Column {name!r} holds a value that is not from 0 to 1.")
     if {"parents", "individual"} <= set(frame.columns) and not frame.is_empty():
         n = len(frame["individual"].unique())
+        if has_far_parents(frame):
+            n *= int(frame["generation"].to_numpy().max()) + 1 if "generation" in frame.columns else 2**32
         last = frame["parents"].explode().drop_nulls().to_numpy().max(initial=0)
         if last >= n:
             raise ValueError(f"Column 'parents' holds individual {last}, expected at most {n - 1}.")
+
+
+def has_far_parents(rows: pl.DataFrame) -> bool:
+    """Return whether parents are of any generation, counted from the first individual of the run (MAP-Elites)."""
+    return FAR_PARENTS in rows.columns and rows[FAR_PARENTS].null_count() < rows.height
 
 
 def _check_order(frame: pl.DataFrame, first: int) -> int:

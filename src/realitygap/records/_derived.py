@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import polars as pl
 
-from realitygap.records._columns import Column
+from realitygap.records._columns import Column, has_far_parents
 
 DerivedFrame = Literal["species", "innovations", "lineage"]
 
@@ -121,6 +121,9 @@ def parent_rows(rows: pl.DataFrame) -> tuple[npt.NDArray[np.int64], npt.NDArray[
     starts_generation = (rows["individual"] == 0).to_numpy()
     generation_starts = np.flatnonzero(starts_generation)
     before = generation_starts[np.maximum(np.cumsum(starts_generation) - 2, 0)]
+    if has_far_parents(rows):
+        starts_run = starts_generation & (rows["generation"] == 0).to_numpy()
+        before = np.flatnonzero(starts_run)[np.cumsum(starts_run) - 1]
     found = []
     for k in (0, 1):
         parent = rows["parents"].list.get(k, null_on_oob=True).cast(pl.Int64).fill_null(-1).to_numpy()
@@ -243,7 +246,16 @@ DERIVED: Mapping[str, Derived] = {
                 "ancestors.",
             ),
         ),
-        (*_INDIVIDUAL, "species", "parents", "fitness", "coverage_line", "coverage_ends", "genome"),
+        (
+            *_INDIVIDUAL,
+            "species",
+            "parents",
+            "fitness",
+            "coverage_line",
+            "coverage_ends",
+            "genome",
+            "descriptor",
+        ),
         _lineage,
     ),
 }

@@ -12,6 +12,7 @@ import numpy.typing as npt
 import polars as pl
 
 from realitygap.drawing import Ink
+from realitygap.records import has_far_parents
 from realitygap.report._tally import Results, largest, read_tally
 from realitygap.report._trial_figure import ChosenTrial, choose_trial
 from realitygap.report.charts.house import Drawing, draw_wide, shorten
@@ -52,7 +53,7 @@ class Ancestor:
 
     Attributes:
         generation, individual, species: Identity of the ancestor.
-        parents: Parents in the generation before.
+        parents: Generation and individual of each parent.
         origin: first, copy, mutation or crossover.
         coverage: Coverage of its trial [0..1].
         brought: Structure that no parent has, in words.
@@ -61,7 +62,7 @@ class Ancestor:
     generation: int
     individual: int
     species: int
-    parents: tuple[int, ...]
+    parents: tuple[tuple[int, int], ...]
     origin: str
     coverage: float
     brought: str
@@ -133,25 +134,27 @@ def _ancestors(trial: ChosenTrial, rows: pl.DataFrame, lineage: pl.DataFrame) ->
         for each in lineage.filter(pl.col("generation") <= chosen).iter_rows(named=True)
     }
     found: list[Ancestor] = []
-    wanted = {int(trial.row["individual"])}
+    n = largest(rows, "individual") + 1
+    is_far = has_far_parents(rows)
+    wanted: dict[int, set[int]] = {chosen: {int(trial.row["individual"])}}
     for generation in range(chosen, -1, -1):
-        parents: set[int] = set()
-        for individual in sorted(wanted, reverse=True):
+        for individual in sorted(wanted.get(generation, ()), reverse=True):
             row, origin = by_key[generation, individual], origins[generation, individual]
-            before = [by_key[generation - 1, parent] for parent in row["parents"]]
+            parents = tuple(divmod(one, n) if is_far else (generation - 1, one) for one in row["parents"])
+            before = [by_key[parent] for parent in parents]
             found.append(
                 Ancestor(
                     generation,
                     individual,
                     row["species"],
-                    tuple(row["parents"]),
+                    parents,
                     origin["origin"],
                     row[trial.measure],
                     _brought(trial, row, origin["new"], before) if before else "",
                 )
             )
-            parents |= set(row["parents"])
-        wanted = parents
+            for parent_generation, parent in parents:
+                wanted.setdefault(parent_generation, set()).add(parent)
     return found[::-1]
 
 
@@ -223,7 +226,7 @@ def _places(ancestors: list[Ancestor], shows_all: bool) -> dict[tuple[int, int],
         for each, height in zip(here, _apart(np.array(wanted)), strict=True):
             places[generation, each.individual] = float(height)
             for parent in set(each.parents):
-                of_children.setdefault((generation - 1, parent), []).append(float(height))
+                of_children.setdefault(parent, []).append(float(height))
     return places
 
 
@@ -245,7 +248,7 @@ def _draw_links(
     links: dict[tuple[bool, int], list[tuple[tuple[int, float], tuple[int, float]]]] = {}
     for each in ancestors:
         for rank, parent in enumerate(each.parents):
-            before = (each.generation - 1, places[each.generation - 1, parent])
+            before = (parent[0], places[parent])
             here = (each.generation, places[each.generation, each.individual])
             links.setdefault((each.origin == "copy", rank), []).append((before, here))
     for (is_copy, rank), ends in links.items():

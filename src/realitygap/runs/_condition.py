@@ -39,13 +39,15 @@ from realitygap.tasks import ControllerSettings, CoverageTask, Task, as_task
 from realitygap.trials import MOST_TEAMS, Trajectory
 from realitygap.world import Arena, ArenaSettings
 
+from ._map_elites import ArchiveSettings
+
 # A condition's name is part of file names.
 NAME_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._-]*$"
 
 # Trials of a run: with some 600 bytes for the row of each, 3 GB.
 MOST_TRIALS = 5_000_000
 
-Selection = Literal["coverage", "fitness", "novelty", "random"]
+Selection = Literal["coverage", "fitness", "novelty", "random", "map-elites"]
 
 
 class Condition(Settings):
@@ -61,7 +63,7 @@ class Condition(Settings):
         "coverage",
         description="Rule that selects parents. coverage: the paper's objective NEAT. fitness: the fitness of another "
         "task. novelty: novelty search. random: no selection, a control that the paper lacks. It tries the same "
-        "number of random networks.",
+        "number of random networks. map-elites: the fittest of each cell of an archive of descriptors.",
     )
     platform: str = Field(
         "jyro",
@@ -88,6 +90,7 @@ class Condition(Settings):
     controller: ControllerSettings = ControllerSettings()
     neat: NeatSettings = NeatSettings.named("rosenzweig-remy")
     novelty: NoveltySettings = NoveltySettings()
+    archive: ArchiveSettings = ArchiveSettings()
     on: SerializeAsAny[Platform] = Field(
         default_factory=JyroPlatform,
         description="The settings of the platform, `[platform.NAME]`.",
@@ -256,6 +259,22 @@ class Condition(Settings):
         return self
 
     @model_validator(mode="after")
+    def _an_archive_can_be_filled(self) -> Self:
+        if self.selection != "map-elites":
+            return self
+        if self.is_physical:
+            raise ValueError(
+                f"selection is 'map-elites', expected another one with platform {self.platform!r}: it takes "
+                "thousands of trials. Simulate it, and try its elites on the robot"
+            )
+        if self.arena.robots > 1:
+            raise ValueError(
+                f"selection is 'map-elites', expected another one with arena.robots = {self.arena.robots}: a trial "
+                "of several robots has no descriptor"
+            )
+        return self
+
+    @model_validator(mode="after")
     def _robot_and_arena_have_what_networks_see(self) -> Self:
         self.on.check_robots(self.arena.arena())
         self.on.check(self.arena.arena(), self.network_inputs, self.noise)
@@ -318,6 +337,16 @@ class Condition(Settings):
         return self.placed_arena.with_numbers(changed) if changed else self.placed_arena
 
     @property
+    def repeats(self) -> int:
+        """Number of trials of each individual."""
+        return self.archive.repeats if self.selection == "map-elites" else 1
+
+    @property
+    def descriptor_names(self) -> tuple[str, ...]:
+        """Names of the numbers that describe its trials; none unless selection is map-elites."""
+        return self.archive.names if self.selection == "map-elites" else ()
+
+    @property
     def records_behavior(self) -> bool:
         """True if its distance of behaviors compares final positions, which need their own column."""
         return self.selection == "novelty" and DISTANCES[self.novelty.distance].compares != "cells"
@@ -369,6 +398,8 @@ class Condition(Settings):
         values[self.platform] = values.pop("on")
         if not values["controller"]:
             del values["controller"]
+        if self.selection != "map-elites":  # as older conditions, whose hashes stay
+            del values["archive"]
         return values
 
     def hash(self) -> str:

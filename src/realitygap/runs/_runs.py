@@ -40,6 +40,7 @@ def run_rules(condition: Condition) -> RunRules:
         "fitness": block.COVERAGE,
         "novelty": block.NOVELTY,
         "random": block.RANDOM,
+        "map-elites": block.ELITES,
     }[condition.selection]
     if condition.selection == "novelty" and novelty.kind == "lehman-stanley":
         selection = block.NEAREST_NOVELTY
@@ -83,6 +84,7 @@ def _empty_rows(condition: Condition, n_runs: int, n_cells: int, room: int, hidd
         ended=zeros(np.float64, 2),
         drawn=zeros(np.float64, len(condition.drawn_names)),
         task_fitness=zeros(np.float64),
+        descriptor=zeros(np.float64, len(condition.descriptor_names)),
     )
 
 
@@ -133,7 +135,7 @@ def run_rows(condition: Condition, first_replicate: int, n_runs: int, *, staged:
 
 def _is_whole(condition: Condition) -> bool:
     """Return whether its platform computes whole evolutions of its task."""
-    return condition.on.runs_whole and condition.coverage is not None
+    return condition.on.runs_whole and condition.coverage is not None and condition.selection != "map-elites"
 
 
 def _run_whole(
@@ -167,6 +169,7 @@ def prepare_kernels(conditions: Iterable[Condition] = ()) -> None:
         like: dict[str, Any] = {"platform": condition.platform, "is_single": condition.on.is_single}
         like |= {"task": condition.task.model_dump(), "whole": _is_whole(condition)}
         like["several"] = condition.arena.robots > 1
+        like["archive"] = condition.selection == "map-elites"
         if like not in done:
             done.append(like)
             run_rows(condition, 0, 1)
@@ -239,6 +242,8 @@ def _frame_of(condition: Condition, first_replicate: int, rows: RunRows) -> pl.D
     if condition.records_behavior:
         start = condition.placed_arena.start
         extra["behavior"] = list_column(flat(rows.ended) + np.array([start.x, start.y]), np.full(total, 2))
+    if condition.descriptor_names:
+        extra["descriptor"] = list_column(flat(rows.descriptor), np.full(total, rows.descriptor.shape[-1]))
     if condition.arena.networks == "each":
         extra["partners"] = _partners(condition, genome, first_replicate, n_runs)
     return pl.DataFrame(

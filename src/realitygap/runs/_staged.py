@@ -19,11 +19,15 @@ from realitygap.kernels.neat.network import Networks, make_networks
 from realitygap.platforms import open_trials, scores_of, traced_at_once
 
 from ._condition import Condition
+from ._map_elites import Archives
 from ._teams import draw_teams, mean_of_teams
 
 # Trials of a block: enough that the overhead of calls from Python is small, but few enough to fit into the cache.
 BLOCK_TRIALS = 4096
 LEAST_RUNS = 32
+
+# Cells of the archives of a block: with some 1,000 bytes for the elite of each, 100 MB.
+MOST_ELITES = 100_000
 
 
 class _Block(NamedTuple):
@@ -47,6 +51,7 @@ class _Scored(NamedTuple):
     ended: NDArray[np.float64]  # (t, 2)
     drawn: NDArray[np.float64]  # (t, d)
     fitness: NDArray[np.float64]  # (t,) by the task; (0,) where that is coverage
+    descriptors: NDArray[np.float64]  # (t, d) where selection is by elites
 
 
 def runs_together(population: int) -> int:
@@ -73,7 +78,10 @@ def run_staged(
         TaskError: A function of the user's own failed.
     """
     total = rows.fitness.shape[0]
-    staged = _Staged(condition, rules, min(runs_together(rules.population), total), room, hidden_room)
+    together = min(runs_together(rules.population * condition.repeats), total)
+    if condition.selection == "map-elites":
+        together = min(together, max(1, MOST_ELITES // condition.archive.n_cells))
+    staged = _Staged(condition, rules, together, room, hidden_room)
     for first_run in range(0, total, staged.together):
         n_runs = min(staged.together, total - first_run)
         if not staged.carry_out(first_replicate + first_run, n_runs, rows, first_run):
@@ -110,6 +118,13 @@ class _Staged:
             novelty=block_kernels.make_novelty_room(rules, grid.columns, grid.rows),
         )
         self.which = self.block.which
+        self.needs_trace = self.task is not None and self.task.needs_trace
+        self.archives: Archives | None = None
+        if condition.selection == "map-elites":
+            self.needs_trace |= condition.archive.needs_trace
+            self.archives = Archives(
+                condition.archive, self.trials.arena, condition.key, together, self.neat, room, hidden_room
+            )
         self.teams = np.empty((0, rules.population, self.arena.n_robots), np.int32)
 
     def carry_out(self, first_replicate: int, n_runs: int, rows: RunRows, first_row: int) -> bool:
@@ -118,6 +133,8 @@ class _Staged:
         key, first = np.uint64(self.condition.key), np.int64(first_replicate)
         runs, genomes, children = block.runs, block.genomes, block.children
         block_kernels.begin_runs(runs, genomes, n_runs, neat, rules, key, first)
+        if self.archives is not None:
+            self.archives.empty()
         if genomes.full[0]:
             return False
         for generation in range(rules.n_generations):
@@ -126,7 +143,7 @@ class _Staged:
             )
             self._choose_teams(first_replicate, n_runs, generation)
             scored = self._try(n_runs * rules.population)
-            self._select(scored, n_runs)
+            scored = self._select(scored, n_runs)
             block_kernels.keep_runs(
                 runs,
                 genomes,
@@ -139,7 +156,20 @@ class _Staged:
                 generation,
             )
             self._keep(scored, n_runs, rows, first_row, generation)
-            if generation + 1 < rules.n_generations:
+            if generation + 1 < rules.n_generations and self.archives is not None:
+                places = scored.descriptors.reshape(n_runs, rules.population, -1)
+                self.archives.breed(
+                    runs,
+                    genomes,
+                    children,
+                    places,
+                    neat,
+                    rules,
+                    self.condition.key,
+                    first_replicate,
+                    generation,
+                )
+            elif generation + 1 < rules.n_generations:
                 block_kernels.breed_runs(runs, genomes, children, n_runs, neat, rules, key, first, generation)
             if children.full[0]:
                 return False
@@ -158,8 +188,9 @@ class _Staged:
         self.which = (self.teams + first).reshape(-1, n_robots)
 
     def _try(self, n: int) -> _Scored:
-        """Run all trials of a generation: together, or in portions if every step is kept."""
-        if self.task is None or not self.task.needs_trace:
+        """Run all trials of n individuals: together, or in portions if every step is kept."""
+        n *= self.condition.repeats
+        if not self.needs_trace:
             return self._try_some(0, n)
         size = traced_at_once(self.trials, self.neat.n_inputs, is_single=self.condition.on.is_single)
         parts = [self._try_some(first, min(first + size, n)) for first in range(0, n, size)]
@@ -167,28 +198,42 @@ class _Staged:
 
     def _try_some(self, first: int, last: int) -> _Scored:
         """Return trials `first` up to `last` of a generation, scored by the task."""
+        which, counters = self.which[first:last], self.block.counters[first:last]
+        if self.condition.repeats > 1:
+            who, repeat = np.divmod(np.arange(first, last), self.condition.repeats)
+            which, counters = self.which[who], self.block.counters[who]
+            counters[:, 1] += repeat.astype(np.uint32)  # as `make_stream` numbers repeats
         tried = self.trials.carry_out(
             self.block.networks,
-            self.which[first:last],
+            which,
             self.condition.key,
-            self.block.counters[first:last],
+            counters,
             ends=self._is_novelty and self.rules.count_ends,
-            trace=self.task is not None and self.task.needs_trace,
+            trace=self.needs_trace,
         )
         batch = tried.batch
         fitness = np.empty(0)
         if self.task is not None:
             fitness = scores_of(self.task, self.trials, tried, self.condition.network_inputs)
         counts = np.stack([batch.n_line, batch.n_ends, batch.n_stalls], axis=1)
-        return _Scored(batch.cells, tried.ends, counts, tried.ended, batch.drawn, fitness)
+        descriptors = np.empty((len(which), 0))
+        if self.archives is not None:
+            descriptors = self.condition.archive.describe(tried, self.trials.arena, self.trials.n_steps)
+        return _Scored(batch.cells, tried.ends, counts, tried.ended, batch.drawn, fitness, descriptors)
 
     @property
     def _is_novelty(self) -> bool:
         return self.rules.selection in (block_kernels.NOVELTY, block_kernels.NEAREST_NOVELTY)
 
-    def _select(self, scored: _Scored, n_runs: int) -> None:
-        """Write the values that selection uses into the block's fitness."""
+    def _select(self, scored: _Scored, n_runs: int) -> _Scored:
+        """Write the values that selection uses into the block's fitness.
+
+        Returns:
+            One trial of each individual, its first, with the means of its descriptors.
+        """
         runs, rules = self.block.runs, self.rules
+        if self.archives is not None:
+            return self._average(scored, n_runs)
         if self.task is None:
             block_kernels.cover_runs(runs, n_runs, scored.counts, rules, self.arena.grid.n_cells)
         else:
@@ -202,10 +247,23 @@ class _Staged:
                 runs, n_runs, visited, scored.counts, scored.ended, rules, self.block.novelty
             )
 
+        return scored
+
+    def _average(self, scored: _Scored, n_runs: int) -> _Scored:
+        """As `_select`, of individuals that were each tried several times."""
+        repeats, fitness = self.condition.repeats, scored.fitness
+        if self.task is None:
+            fitness = scored.counts[:, int(self.rules.count_ends)] / self.arena.grid.n_cells
+        self.block.runs.fitness[:n_runs] = fitness.reshape(n_runs, -1, repeats).mean(axis=2)
+        first = _Scored._make(np.ascontiguousarray(values[::repeats]) for values in scored)
+        means = scored.descriptors.reshape(len(first.counts), repeats, -1).mean(axis=1)
+        return first._replace(descriptors=means)
+
     def _keep(self, scored: _Scored, n_runs: int, rows: RunRows, first_row: int, generation: int) -> None:
         """Copy the values that the kernels do not keep into the rows."""
         place = (slice(first_row, first_row + n_runs), generation)
         n = self.rules.population
         rows.drawn[place] = scored.drawn.reshape(n_runs, n, -1)
+        rows.descriptor[place] = scored.descriptors.reshape(n_runs, n, -1)
         if self.task is not None:
             rows.task_fitness[place] = scored.fitness.reshape(n_runs, n)

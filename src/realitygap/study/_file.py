@@ -23,7 +23,7 @@ from realitygap.platforms import (
     split_spec,
     study_platforms,
 )
-from realitygap.runs import Condition
+from realitygap.runs import ArchiveSettings, Condition
 from realitygap.settings import MISSING, mistakes
 from realitygap.tasks import ControllerSettings, CoverageTask, task_model
 from realitygap.world import ArenaSettings
@@ -39,6 +39,7 @@ SECTIONS: dict[str, type[BaseModel]] = {
     "controller": ControllerSettings,
     "neat": NeatSettings,
     "novelty": NoveltySettings,
+    "archive": ArchiveSettings,
 }
 
 

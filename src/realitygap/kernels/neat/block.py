@@ -12,6 +12,7 @@ from realitygap.kernels.compile.decorators import inlined, kernel, shared
 from realitygap.kernels.math.philox import FIRST, PURPOSE_NOISE, make_stream
 
 from .distances import Behaviors, Measure, describe, make_behaviors, make_measure
+from .elites import place_elites, vary_elites
 from .genome import Genomes, first_genomes
 from .mutation import Innovations, clear_innovations
 from .network import decode
@@ -23,6 +24,7 @@ COVERAGE = 0
 NOVELTY = 1
 NEAREST_NOVELTY = 2
 RANDOM = 3
+ELITES = 4
 
 
 class RunRules(NamedTuple):
@@ -63,6 +65,7 @@ class RunRows(NamedTuple):
     # Written by the staged road only
     drawn: NDArray[np.float64]  # (r, g, n, d)
     task_fitness: NDArray[np.float64]  # (r, g, n)
+    descriptor: NDArray[np.float64]  # (r, g, n, d) where selection is by elites
 
 
 class Runs(NamedTuple):
@@ -214,7 +217,7 @@ def _begin(runs, genomes, run, neat, rules, key, replicate):
         runs.parents[run, row, 0] = runs.parents[run, row, 1] = -1
     own = rows_of(genomes, run * n, n)
     first_genomes(own, neat, key, replicate, FIRST)
-    if rules.selection != RANDOM:
+    if rules.selection != RANDOM and rules.selection != ELITES:
         speciate(own, own, runs.fitness[run], runs.species_of[run], species, neat, key, replicate, FIRST)
 
 
@@ -383,3 +386,48 @@ def breed_runs(runs, genomes, children, n_runs, neat, rules, key, first_replicat
     """The next generation of all runs, into `children`; `children.full` as in `begin_runs`."""
     for run in range(n_runs):
         _go_on(runs, genomes, children, run, neat, rules, key, first_replicate + run, generation)
+
+
+@shared
+def breed_elites(
+    runs,
+    genomes,
+    children,
+    run,
+    descriptors,
+    cells,
+    elites,
+    share,
+    neat,
+    rules,
+    key,
+    replicate,
+    generation,
+):
+    """Keep the elites of a batch of one run, and write their children; `children.full` as in `begin_runs`.
+
+    Args:
+        descriptors: (n, d) of the batch.
+        cells, elites, share: As in `place_elites` and `vary_elites`.
+        runs: Parents are written: numbers of individuals, counted from the first of the run.
+    """
+    n = rules.population
+    own = rows_of(genomes, run * n, n)
+    place_elites(own, runs.fitness[run], descriptors, cells, elites, generation)
+    parents = runs.parents[run]
+    vary_elites(
+        elites,
+        share,
+        neat,
+        _innovations_of(runs.innovations, run),
+        key,
+        replicate,
+        generation + 1,
+        rows_of(children, run * n, n),
+        parents,
+    )
+    for child in range(n):
+        for k in range(2):
+            cell = parents[child, k]
+            if cell >= 0:
+                parents[child, k] = elites.batch[cell] * n + elites.individual[cell]

@@ -36,6 +36,7 @@ class Elites(NamedTuple):
     fitness: NDArray[np.float64]  # (c,)
     descriptors: NDArray[np.float64]  # (c, d)
     batch: NDArray[np.int32]  # (c,) in which the elite was told; -1: empty
+    individual: NDArray[np.int32]  # (c,) its place in that batch
     filled: NDArray[np.int32]  # (c,) cells, the first filled one first
     n_filled: NDArray[np.int64]  # (1,)
 
@@ -47,6 +48,7 @@ def make_elites(n_cells, n_descriptors, n_outputs, room, hidden_room):
         np.full(n_cells, -math.inf),
         np.zeros((n_cells, n_descriptors)),
         np.full(n_cells, -1, np.int32),
+        np.zeros(n_cells, np.int32),
         np.zeros(n_cells, np.int32),
         np.zeros(1, np.int64),
     )
@@ -106,6 +108,7 @@ def place_elites(genomes, fitness, descriptors, cells, elites, batch):
         copy_genome(genomes, row, elites.genomes, cell)
         elites.fitness[cell] = fitness[row]
         elites.batch[cell] = batch
+        elites.individual[cell] = row
         for k in range(cells.low.size):
             elites.descriptors[cell, k] = descriptors[row, k]
 

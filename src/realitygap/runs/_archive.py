@@ -1,0 +1,169 @@
+"""The archives of runs with MAP-Elites, from their rows: as found, over the batches, and corrected by more trials."""
+
+from __future__ import annotations
+
+import numpy as np
+import polars as pl
+from numpy.typing import NDArray
+
+from realitygap.evolution import decode_all, place_in_cells
+from realitygap.kernels.math.philox import MAX_REPEATS
+from realitygap.platforms import open_trials, scores_of, traced_at_once
+from realitygap.trials import NoiseKey, counters_of
+
+from ._condition import Condition
+from ._replay import genome_of
+
+Floats = NDArray[np.float64]
+
+RETRIES = 64
+"""Trials with fresh noise by which an archive is corrected."""
+
+
+def elites_of(condition: Condition, rows: pl.DataFrame) -> pl.DataFrame:
+    """Return the elites of runs: the rows of the fittest individual of each cell, the first of equally fit ones.
+
+    Args:
+        condition: Condition with selection map-elites.
+        rows: Rows of whole runs of it.
+
+    Returns:
+        The rows, with the column `cell`: its number, of a grid in row-major order of the descriptors. Sorted by
+        replicate and cell.
+
+    Raises:
+        ValueError: Selection is another one.
+    """
+    return _best(rows.with_columns(cell=_cells(condition, rows["descriptor"])), "cell", "fitness")
+
+
+def _best(rows: pl.DataFrame, cell: str, fitness: str) -> pl.DataFrame:
+    """Return the fittest row of each cell of each run."""
+    ranked = rows.with_row_index("order").sort(
+        "replicate", cell, fitness, "order", descending=[False, False, True, False]
+    )
+    return ranked.unique(["replicate", cell], keep="first", maintain_order=True).drop("order")
+
+
+def _cells(condition: Condition, descriptors: pl.Series) -> NDArray[np.uint32]:
+    """Return the cell of each list of descriptors, (n,)."""
+    if condition.selection != "map-elites":
+        raise ValueError(
+            f"Condition {condition.name!r} has selection {condition.selection!r}, expected 'map-elites'."
+        )
+    values = descriptors.explode().to_numpy().reshape(len(descriptors), -1)
+    cells = condition.archive.cells_in(condition.placed_arena, condition.key)
+    return place_in_cells(np.ascontiguousarray(values, np.float64), cells).astype(np.uint32)
+
+
+def archive_progress(condition: Condition, rows: pl.DataFrame) -> pl.DataFrame:
+    """Return what archives hold after each batch.
+
+    Args:
+        condition: Condition with selection map-elites.
+        rows: Rows of whole runs of it.
+
+    Returns:
+        A row for each replicate and generation: `trials` so far, `filled` share of the cells, `qd_score`, the sum of
+        the elites' fitness divided by the number of cells, and `best` fitness.
+
+    Raises:
+        ValueError: Selection is another one.
+    """
+    n_cells, per_batch = condition.archive.n_cells, condition.neat.population * condition.repeats
+    cells = _cells(condition, rows["descriptor"])
+    replicate, generation, fitness = (
+        rows[name].to_numpy() for name in ("replicate", "generation", "fitness")
+    )
+    lines = []
+    for run in np.unique(replicate):
+        elites = np.full(n_cells, -np.inf)
+        for batch in range(condition.neat.generations):
+            here = (replicate == run) & (generation == batch)
+            np.maximum.at(elites, cells[here], fitness[here])
+            held = elites[elites > -np.inf]
+            lines.append(
+                {
+                    "replicate": int(run),
+                    "generation": batch,
+                    "trials": (batch + 1) * per_batch,
+                    "filled": len(held) / n_cells,
+                    "qd_score": float(held.sum()) / n_cells,
+                    "best": float(held.max()),
+                }
+            )
+    return pl.DataFrame(lines)
+
+
+def retry_elites(condition: Condition, elites: pl.DataFrame, trials: int = RETRIES) -> pl.DataFrame:
+    """Return elites with the means of trials with fresh noise.
+
+    An archive keeps the fittest of many noisy trials, so its elites are lucky ones: in fitness, and in the cell that
+    they were placed in.
+
+    Args:
+        condition: Condition with selection map-elites.
+        elites: Rows of `elites_of`.
+        trials: Number of trials of each, 1 to 4096.
+
+    Returns:
+        The rows, with `again_fitness`, `again_descriptor`, and `again_cell`.
+
+    Raises:
+        ValueError: Another number of trials.
+    """
+    if not 1 <= trials <= MAX_REPEATS:
+        raise ValueError(f"trials is {trials}, expected 1 to {MAX_REPEATS}.")
+    fitness, descriptors = np.empty(elites.height), np.empty((elites.height, len(condition.descriptor_names)))
+    first = 0
+    for part in elites.partition_by("replicate", maintain_order=True):
+        last = first + part.height
+        fitness[first:last], descriptors[first:last] = _tried_again(condition, part, trials)
+        first = last
+    again = pl.Series("again_descriptor", descriptors).arr.to_list()
+    placed = elites.with_columns(pl.Series("again_fitness", fitness), again)
+    return placed.with_columns(again_cell=_cells(condition, again))
+
+
+def _tried_again(condition: Condition, elites: pl.DataFrame, n_trials: int) -> tuple[Floats, Floats]:
+    """Return mean fitness (n,) and descriptors (n, d) of the elites of one run."""
+    genomes = [genome_of(condition, row) for row in elites.iter_rows(named=True)]
+    trials = open_trials(
+        condition.on,
+        condition.arena.arena(),
+        condition.neat_rules,
+        inputs=condition.network_inputs,
+        noise=condition.noise,
+        bias_value=condition.neat.bias_value,
+    )
+    task, names = condition.task_of_trials, condition.network_inputs
+    needs_trace = task.needs_trace or condition.archive.needs_trace
+    # beyond the batches of the evolution, so that the noise is fresh
+    key = NoiseKey(condition.key, int(elites["replicate"][0]), condition.neat.generations)
+    networks, counters = decode_all(genomes), counters_of(key, len(genomes))
+    total = len(genomes) * n_trials
+    together = traced_at_once(trials, len(names), is_single=condition.on.is_single) if needs_trace else total
+    fitness, descriptors = np.empty(total), np.empty((total, len(condition.descriptor_names)))
+    for first in range(0, total, together):
+        part = slice(first, min(first + together, total))
+        who, repeat = np.divmod(np.arange(total)[part], n_trials)
+        words = counters[who]
+        words[:, 1] += repeat.astype(np.uint32)
+        tried = trials.carry_out(networks, who.astype(np.int32), condition.key, words, trace=needs_trace)
+        fitness[part] = scores_of(task, trials, tried, names)
+        descriptors[part] = condition.archive.describe(tried, trials.arena, trials.n_steps)
+    return fitness.reshape(-1, n_trials).mean(axis=1), descriptors.reshape(len(genomes), n_trials, -1).mean(
+        axis=1
+    )
+
+
+def corrected_archive(retried: pl.DataFrame) -> pl.DataFrame:
+    """Return the archive that elites make by their fresh trials alone: the best of each cell in which they belong.
+
+    Args:
+        retried: Rows of `retry_elites`.
+
+    Returns:
+        Some of the rows, sorted by replicate and `again_cell`.
+    """
+    return _best(retried, "again_cell", "again_fitness")

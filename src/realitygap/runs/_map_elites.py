@@ -1,0 +1,239 @@
+"""MAP-Elites as the selection of runs: its settings, its descriptors, and the archives of a block of runs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Literal, NamedTuple, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+
+from realitygap.evolution import MOST_CELLS, MOST_CENTROIDS, cells_of
+from realitygap.kernels.neat import block as block_kernels
+from realitygap.kernels.neat.block import RunRules, Runs
+from realitygap.kernels.neat.elites import Cells, Elites, make_elites
+from realitygap.kernels.neat.genome import Genomes, NeatRules
+from realitygap.settings import Settings
+from realitygap.trials import Tried
+from realitygap.world import Arena
+
+Floats = NDArray[np.float64]
+
+REGIONS = (3, 2)
+"""Columns and rows of regions of an arena whose shares of the visited cells are descriptors."""
+
+DescriptorName = Literal["mean_turn", "mean_move", "stall_share", "end", "region_share"]
+
+
+class Descriptor(NamedTuple):
+    """A way to describe a trial by numbers.
+
+    Attributes:
+        names: Names of its numbers.
+        ranges: Returns lowest and highest value of each in an arena.
+        of: Returns the numbers, (t, d), of t trials with a number of steps in an arena.
+        needs_trace: True if it needs every step.
+    """
+
+    names: tuple[str, ...]
+    ranges: Callable[[Arena], tuple[tuple[float, float], ...]]
+    of: Callable[[Tried, Arena, int], Floats]
+    needs_trace: bool = False
+
+
+def _ended(tried: Tried, arena: Arena, n_steps: int) -> Floats:
+    return np.add(tried.ended, [arena.start.x, arena.start.y])
+
+
+def _limits(arena: Arena) -> tuple[tuple[float, float], ...]:
+    return (arena.grid.x, arena.grid.right_end), (arena.grid.y, arena.grid.upper_end)
+
+
+def _region_shares(tried: Tried, arena: Arena, n_steps: int) -> Floats:
+    """Shares of the visited cells, whose sum is 1: their number itself would be coverage."""
+    grid, (across, up) = arena.grid, REGIONS
+    row, column = np.divmod(np.arange(grid.n_cells), grid.columns)
+    region = (column * across // grid.columns) + across * (row * up // grid.rows)
+    cells, n = tried.batch.cells, tried.batch.n_line
+    is_seen = np.arange(cells.shape[1]) < n[:, None]
+    counts = np.zeros((len(n), across * up))
+    np.add.at(counts, (np.nonzero(is_seen)[0], region[cells[is_seen]]), 1.0)
+    return counts / np.maximum(n, 1)[:, None]
+
+
+def _stall_shares(tried: Tried, arena: Arena, n_steps: int) -> Floats:
+    return np.divide(tried.batch.n_stalls, n_steps)[:, None]
+
+
+def _mean_over_steps(values: NDArray[np.floating]) -> Floats:
+    return np.asarray(values.mean(axis=0, dtype=np.float64)[:, None], np.float64)
+
+
+def _mean_move(tried: Tried, arena: Arena, n_steps: int) -> Floats:
+    return _mean_over_steps(np.abs(tried.trace.commands[:, 0]))
+
+
+def _mean_turn(tried: Tried, arena: Arena, n_steps: int) -> Floats:
+    return _mean_over_steps(tried.trace.commands[:, 1])
+
+
+def _unit(n: int) -> Callable[[Arena], tuple[tuple[float, float], ...]]:
+    return lambda arena: ((0.0, 1.0),) * n
+
+
+DESCRIPTORS: dict[DescriptorName, Descriptor] = {
+    "mean_turn": Descriptor(("mean_turn",), lambda arena: ((-1.0, 1.0),), _mean_turn, needs_trace=True),
+    "mean_move": Descriptor(("mean_move",), _unit(1), _mean_move, needs_trace=True),
+    "stall_share": Descriptor(("stall_share",), _unit(1), _stall_shares),
+    "end": Descriptor(("end_x", "end_y"), _limits, _ended),
+    "region_share": Descriptor(
+        tuple(f"region_{column}_{row}" for row in range(REGIONS[1]) for column in range(REGIONS[0])),
+        _unit(math.prod(REGIONS)),
+        _region_shares,
+    ),
+}
+
+
+class ArchiveSettings(Settings):
+    """The settings of MAP-Elites: what describes a trial, the cells, and how elites have children.
+
+    `neat.population` is the number of genomes in a batch, and `neat.generations` the number of batches. NEAT's settings
+    of species have no effect, because cells protect diversity.
+    """
+
+    kind: Literal["grid", "cvt"] = Field(
+        "grid",
+        description="Kind of cells. grid: each descriptor is divided evenly. cvt: cells around centroids that are "
+        "spread evenly over all descriptors, for more than three of them (Vassiliades and others 2018).",
+    )
+    descriptor: tuple[DescriptorName, ...] = Field(
+        ("mean_turn", "mean_move", "stall_share"),
+        min_length=1,
+        max_length=len(DESCRIPTORS),
+        description="What describes a trial. mean_turn: mean turn command, -1..1. mean_move: mean size of the move "
+        "command. stall_share: share of blocked steps. end: x and y at the end [m]. region_share: shares of the "
+        "visited cells in 3 x 2 regions of the arena.",
+    )
+    cells: tuple[int, ...] = Field(
+        (20, 10, 5),
+        min_length=1,
+        description="Cells along each number of the descriptors, in order; with cvt, the number of cells alone.",
+    )
+    crossover: float = Field(0.25, ge=0, le=1, description="Share of children with two parents.")
+    repeats: int = Field(
+        1,
+        ge=1,
+        le=1000,
+        description="Trials of each genome, with different noise. Its fitness and descriptors are their means.",
+    )
+
+    @model_validator(mode="after")
+    def _cells_fit_the_descriptors(self) -> Self:
+        if len(set(self.descriptor)) < len(self.descriptor):
+            raise ValueError("a descriptor is there twice, expected each once")
+        numbers = [name for each in self.descriptor for name in DESCRIPTORS[each].names]
+        expected = len(numbers) if self.kind == "grid" else 1
+        if len(self.cells) != expected:
+            raise ValueError(
+                f"cells has {len(self.cells)} numbers, expected {expected} with kind {self.kind!r} and the "
+                f"descriptors {', '.join(numbers)}"
+            )
+        most = MOST_CELLS if self.kind == "grid" else MOST_CENTROIDS
+        if min(self.cells) < 1 or self.n_cells > most:
+            raise ValueError(f"cells are {self.n_cells:,} in all, expected 1 to {most:,}")
+        return self
+
+    @property
+    def n_cells(self) -> int:
+        """Number of cells."""
+        return math.prod(self.cells)
+
+    @property
+    def needs_trace(self) -> bool:
+        """True if a descriptor needs every step of a trial."""
+        return any(DESCRIPTORS[each].needs_trace for each in self.descriptor)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the numbers that describe a trial, (d,)."""
+        return tuple(name for each in self.descriptor for name in DESCRIPTORS[each].names)
+
+    def ranges(self, arena: Arena) -> tuple[tuple[float, float], ...]:
+        """Return the lowest and the highest value of each number that describes a trial in an arena, (d, 2)."""
+        return tuple(limits for each in self.descriptor for limits in DESCRIPTORS[each].ranges(arena))
+
+    def describe(self, tried: Tried, arena: Arena, n_steps: int) -> Floats:
+        """Return the numbers that describe t trials in an arena, (t, d)."""
+        return np.concatenate(
+            [DESCRIPTORS[each].of(tried, arena, n_steps) for each in self.descriptor], axis=1
+        )
+
+    def cells_in(self, arena: Arena, key: int) -> Cells:
+        """Return the cells in an arena as kernels read them; the centroids of a CVT depend on a key."""
+        cells: int | Sequence[int] = self.cells if self.kind == "grid" else self.cells[0]
+        return cells_of(cells, np.array(self.ranges(arena), np.float64), key)
+
+
+class Archives:
+    """The archives of a block of runs.
+
+    Args:
+        settings: Settings of the archives.
+        arena: Arena of the trials.
+        key: Key of the runs' random numbers.
+        n_runs: Number of runs, each with an archive.
+        neat: NEAT's rules.
+        room, hidden_room: Genes and hidden nodes that a genome may have.
+    """
+
+    def __init__(
+        self,
+        settings: ArchiveSettings,
+        arena: Arena,
+        key: int,
+        n_runs: int,
+        neat: NeatRules,
+        room: int,
+        hidden_room: int,
+    ) -> None:
+        self._settings = settings
+        self._cells = settings.cells_in(arena, key)
+        d = len(self._cells.low)
+        self._each: list[Elites] = [
+            make_elites(settings.n_cells, d, neat.n_outputs, room, hidden_room) for _ in range(n_runs)
+        ]
+
+    def empty(self) -> None:
+        """Forget all elites."""
+        for elites in self._each:
+            elites.fitness[:], elites.batch[:], elites.n_filled[0] = -math.inf, -1, 0
+
+    def breed(
+        self,
+        runs: Runs,
+        genomes: Genomes,
+        children: Genomes,
+        descriptors: Floats,
+        neat: NeatRules,
+        rules: RunRules,
+        key: int,
+        first_replicate: int,
+        generation: int,
+    ) -> None:
+        """Keep the elites of a batch of each run, and write their children.
+
+        Args:
+            runs: Fitness is read; innovations and parents are written. Parents are numbers of individuals in the run.
+            genomes: (r * n,) genomes of the batch.
+            children: Written, as `genomes`; `children.full` as in `begin_runs`.
+            descriptors: (r, n, d) descriptors of the genomes.
+            neat, rules: Rules of the runs.
+            key, first_replicate, generation: Which random numbers.
+        """
+        for run, places in enumerate(descriptors):
+            block_kernels.breed_elites(
+                runs, genomes, children, run, places, self._cells, self._each[run], self._settings.crossover, neat,
+                rules, np.uint64(key), np.int64(first_replicate + run), generation,
+            )  # fmt: skip

@@ -27,7 +27,7 @@ from realitygap.cli import app
 from realitygap.evolution import DISTANCES, NAMED_SETTINGS, NeatSettings, NoveltySettings
 from realitygap.platforms import built_in_platforms
 from realitygap.records import column_table, derived_table, ledger_tables
-from realitygap.runs import Condition
+from realitygap.runs import ArchiveSettings, Condition
 from realitygap.settings import is_hidden
 from realitygap.study import (
     DEFAULT_NEAT,
@@ -61,6 +61,7 @@ TABLES: dict[str, type[BaseModel]] = {
     "[controller]": ControllerSettings,
     "[neat]": NeatSettings,
     "[novelty]": NoveltySettings,
+    "[archive]": ArchiveSettings,
     **{f"[platform.{model.name}]": model for model in built_in_platforms() if model.is_for_studies},
     "[trials]": TrialsSection,
     "[report]": ReportSection,

@@ -19,6 +19,7 @@ from realitygap.platforms import JyroPlatform
 from realitygap.records import column_table, derived_table
 from realitygap.records._derived import DERIVED
 from realitygap.report import audit_distance
+from realitygap.runs import ArchiveSettings
 from realitygap.settings import is_hidden
 from realitygap.study import ConditionNotes, ReportSection, StudySection
 from realitygap.tasks import ControllerSettings, CoverageTask
@@ -72,6 +73,7 @@ def test_examples_of_a_page_run_and_print_what_it_shows(path):
         JyroPlatform,
         NeatSettings,
         NoveltySettings,
+        ArchiveSettings,
         ReportSection,
         StudySection,
     ],

@@ -64,6 +64,11 @@ def _with_plain_numbers(schema: Any) -> Any:
     return {key: _with_plain_numbers(part) for key, part in schema.items()}
 
 
+def as_tuple(values: Any) -> Any:
+    """Return a list of a file as a tuple, which a field with several values is, and anything else as it is."""
+    return tuple(values) if isinstance(values, list) else values
+
+
 class Settings(BaseModel):
     """Immutable settings that refuse unknown names.
 

@@ -113,6 +113,8 @@ def show(
 
     Example: realitygap show lineage results/paper --condition novelty-50 -o lineage.svg
 
+    Example: realitygap show archive results/maps -o archive.svg
+
     Example: realitygap show divergence results/paper --condition novelty-50 --against novelty-10 -o divergence.svg
 
     Example: realitygap show divergence results/paper --against sim,twin:worn.toml -o divergence.svg
@@ -174,7 +176,7 @@ def show(
 
 def _subject(what: str, name: str | None, out: Path) -> tuple[Subject, str]:
     """Return the subject to show, and its folder."""
-    subjects: dict[str, Subject] = {"network": "network", "species": "species", "lineage": "lineage"}
+    subjects: dict[str, Subject] = {each: each for each in ("network", "species", "lineage", "archive")}
     if what in subjects:
         if name is None:
             raise StudyError(
@@ -183,8 +185,8 @@ def _subject(what: str, name: str | None, out: Path) -> tuple[Subject, str]:
         return subjects[what], name
     if name is not None:
         raise StudyError(
-            f"Cannot show {what!r} of {name!r}. Expected network, species, lineage, divergence, movie, arena or robot "
-            "first, or only a folder."
+            f"Cannot show {what!r} of {name!r}. Expected network, species, lineage, archive, divergence, movie, arena "
+            "or robot first, or only a folder."
         )
     return "run", what
 

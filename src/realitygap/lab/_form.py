@@ -37,6 +37,7 @@ TITLES = {
     "controller": "Controller",
     "neat": "NEAT",
     "novelty": "Novelty search",
+    "archive": "MAP-Elites",
     **{
         f"platform.{model.name}": f"Platform {model.name}: {model.summary.partition(':')[0]}"
         for model in platform_sections().values()

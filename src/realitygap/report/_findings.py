@@ -35,7 +35,12 @@ from realitygap.stats import median_interval, quartiles, runs_for_a_claim
 
 MOST_FINDINGS = 3
 
-_SEARCHES = {"coverage": "objective search", "novelty": "novelty search", "random": "random networks"}
+_SEARCHES = {
+    "coverage": "objective search",
+    "novelty": "novelty search",
+    "random": "random networks",
+    "map-elites": "MAP-Elites",
+}
 _PAIRS = (("novelty", "coverage"), ("coverage", "random"), ("novelty", "random"))
 _ORIGINS = {
     "SIM": "simulated",

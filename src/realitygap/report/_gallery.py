@@ -9,6 +9,7 @@ from realitygap._version import __version__
 from realitygap.errors import RecordVersionError
 from realitygap.report import _networks_figure
 from realitygap.report._arena_figure import draw_arena_and_robot
+from realitygap.report._elites_figure import draw_elites
 from realitygap.report._individuals_figure import draw_individuals
 from realitygap.report._placed import FigureOnPage
 from realitygap.report._species_figure import count_species, draw_species
@@ -52,6 +53,10 @@ def content(tally: Tally) -> dict[str, Any]:
         for search, counterpart in (("coverage", "Figure 5"), ("novelty", "Figure 8"))
         if (driven := [each["name"] for each in tally.selecting_by(search) if each["name"] in tally.driven])
     ] or [draw("individuals-coverage", _first(tally), draw_individuals, "Figure 5")]
+    found["elites"] = [
+        draw(f"elites-{k}", each["name"], draw_elites)
+        for k, each in enumerate(tally.selecting_by("map-elites"))
+    ]
     species = count_species(tally)
     drawing = draw_species(tally, _first(tally), species=species, name="figure-species")
     found["species"] = FigureOnPage("figure-species", drawing)

@@ -178,7 +178,7 @@ def _sections(content: Mapping[str, Any]) -> list[tuple[str, str, list[FigureOnP
         (
             "networks",
             "Paths, networks, and species",
-            [*gallery["individuals"], gallery["networks"], gallery["species"]],
+            [*gallery["individuals"], gallery["networks"], *gallery["elites"], gallery["species"]],
         ),
         ("questions", "The paper’s questions", []),
         ("methods", "Methods and settings", [gallery["arena"]]),

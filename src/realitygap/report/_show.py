@@ -1,4 +1,4 @@
-"""Files that `realitygap show` draws: a run, a trial, a network, species, a lineage, an arena or a robot."""
+"""Files that `realitygap show` draws: a run, trial, network, lineage, or archive, species, an arena or a robot."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from realitygap.errors import did_you_mean
 from realitygap.platforms import JyroPlatform
 from realitygap.playback import save_movie
 from realitygap.records import RecordWarning, ResultsFolder, refuse_results
+from realitygap.report._elites_figure import draw_elites
 from realitygap.report._formats import captioned, check_ending, save_drawing, save_picture
 from realitygap.report._lineage_figure import draw_lineage
 from realitygap.report._motion import choose_moving
@@ -22,7 +23,7 @@ from realitygap.report.charts.house import Drawing
 from realitygap.robots.twin import TwinModel, load_twin, twin_picture
 from realitygap.world import arena_picture, load_arena, load_robot, model_picture
 
-Subject = Literal["run", "network", "species", "lineage"]
+Subject = Literal["run", "network", "species", "lineage", "archive"]
 
 _STILL = (".pdf", ".png", ".svg")
 _MOVING = (".gif", ".mp4")
@@ -45,7 +46,7 @@ def save_view(
         out: Path that ends in .svg, .pdf, .png or, for one trial, .gif or .mp4. An existing file is replaced.
         subject: run, the best path of each generation, or with `generation` or `individual` (or a .gif) one trial;
             network, that of one individual; species, their shares in one run and their number in all; lineage, the
-            ancestors of one individual.
+            ancestors of one individual; archive, the elites of one run with MAP-Elites.
         condition: Condition. Default: the first one.
         replicate: Run. Default: the typical one, and for species the one with most of them.
         generation: Generation of a trial, network or lineage. Default: that of the run's best trial, and for a network
@@ -70,6 +71,12 @@ def save_view(
         if not isinstance(folder, ResultsFolder):
             warnings.simplefilter("default", RecordWarning)
         tally = read_tally(folder)
+    if subject == "archive":
+        if generation is not None or individual is not None:
+            raise ValueError(
+                "An archive is shown at the end of its run: leave out generation and individual."
+            )
+        return _save(draw_elites(tally, condition, replicate), out, "Archive")
     if subject == "species":
         if generation is not None or individual is not None:
             raise ValueError("Species are shown over all generations: leave out generation and individual.")

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import Literal, NamedTuple, Self
+from typing import Annotated, Literal, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from realitygap.evolution import MOST_CELLS, MOST_CENTROIDS, cells_of
 from realitygap.kernels.neat import block as block_kernels
 from realitygap.kernels.neat.block import RunRules, Runs
 from realitygap.kernels.neat.elites import Cells, Elites, make_elites
 from realitygap.kernels.neat.genome import Genomes, NeatRules
-from realitygap.settings import Settings
+from realitygap.settings import Settings, as_tuple
 from realitygap.trials import Tried
 from realitygap.world import Arena
 
@@ -108,15 +108,15 @@ class ArchiveSettings(Settings):
         description="Kind of cells. grid: each descriptor is divided evenly. cvt: cells around centroids that are "
         "spread evenly over all descriptors, for more than three of them (Vassiliades and others 2018).",
     )
-    descriptor: tuple[DescriptorName, ...] = Field(
+    descriptor: Annotated[tuple[DescriptorName, ...], BeforeValidator(as_tuple)] = Field(
         ("mean_turn", "mean_move", "stall_share"),
         min_length=1,
         max_length=len(DESCRIPTORS),
-        description="What describes a trial. mean_turn: mean turn command, -1..1. mean_move: mean size of the move "
-        "command. stall_share: share of blocked steps. end: x and y at the end [m]. region_share: shares of the "
+        description="Numbers that describe a trial. mean_turn: mean turn command, -1..1. mean_move: mean size of the "
+        "move command. stall_share: share of blocked steps. end: x and y at the end [m]. region_share: shares of the "
         "visited cells in 3 x 2 regions of the arena.",
     )
-    cells: tuple[int, ...] = Field(
+    cells: Annotated[tuple[int, ...], BeforeValidator(as_tuple)] = Field(
         (20, 10, 5),
         min_length=1,
         description="Cells along each number of the descriptors, in order; with cvt, the number of cells alone.",

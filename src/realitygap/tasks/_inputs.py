@@ -6,17 +6,12 @@ from typing import Annotated, Any, Self
 
 from pydantic import BeforeValidator, Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
-from realitygap.settings import Settings
+from realitygap.settings import Settings, as_tuple
 from realitygap.world import SENSORS
-
-
-def _as_tuple(names: Any) -> Any:
-    return tuple(names) if isinstance(names, list) else names
-
 
 Inputs = Annotated[
     tuple[str, ...],
-    BeforeValidator(_as_tuple),
+    BeforeValidator(as_tuple),
     Field(
         min_length=1,
         max_length=256,
@@ -29,7 +24,7 @@ Inputs = Annotated[
 class ControllerSettings(Settings):
     """The inputs and outputs of the networks of a study."""
 
-    inputs: Annotated[tuple[str, ...], BeforeValidator(_as_tuple)] = Field(
+    inputs: Annotated[tuple[str, ...], BeforeValidator(as_tuple)] = Field(
         (),
         max_length=256,
         description="Names of the inputs of networks, in order: obstacle (the largest range reading), stall, time, "
@@ -37,7 +32,7 @@ class ControllerSettings(Settings):
         + "encoder.K, goal_sector.K, goal_distance, last_move, last_turn. The "
         "constant input is bias, the last one. The robot and the arena must have them. Empty: those of the task.",
     )
-    outputs: Annotated[tuple[str, ...], BeforeValidator(_as_tuple)] = Field(
+    outputs: Annotated[tuple[str, ...], BeforeValidator(as_tuple)] = Field(
         ("move", "turn"),
         description="Outputs of networks, each -1..1: move and turn, or the wheel speeds left and right. With wheel "
         "speeds, move = (left + right) / 2 and turn = (right - left) / 2.",

@@ -1,0 +1,250 @@
+"""The archive of a run with MAP-Elites: the fitness of the elite of each cell, as found and by fresh trials."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+import polars as pl
+
+from realitygap._wording import counted
+from realitygap.drawing import Ink
+from realitygap.report._chosen_run import ChosenRun, choose_run
+from realitygap.report._tally import Results, Tally, read_tally
+from realitygap.report.charts.house import Drawing, draw_wide, shorten
+from realitygap.report.charts.lines import area_key, draw_band, draw_line, head, pen_style
+from realitygap.report.charts.sheet import IS_WIDE, Sheet
+from realitygap.runs import (
+    RETRIES,
+    Condition,
+    archive_progress,
+    corrected_archive,
+    elites_of,
+    retry_elites,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+Floats = npt.NDArray[np.float64]
+
+_SHADES = 10
+"""Number of shades of fitness."""
+
+_FAINTEST = 0.1
+"""Share of the full color of the worst elite, so that it differs from an empty cell."""
+
+_MOST_SLICES = 6
+"""Maximum number of maps side by side: of an archive with more dimensions the best of the hidden cells is shown."""
+
+_COLUMNS = ("condition", "replicate", "generation", "individual", "fitness", "descriptor")
+
+
+def draw_elites(
+    folder: Results, condition: str | None = None, replicate: int | None = None, *, name: str = "elites"
+) -> Drawing:
+    """Draw the archive of a run with MAP-Elites, as found and corrected, and its growth in all runs.
+
+    Args:
+        folder: Results of a study, or the path to them. Elites are tried again, `RETRIES` times each.
+        condition: Condition. Default: the first with selection map-elites.
+        replicate: Run. Default: the typical one, as in `draw_paths`.
+        name: First part of the ids in the drawing.
+
+    Raises:
+        RecordError: there is no such folder, a file in it is damaged, or it holds no trials yet.
+        ValueError: there is no such condition or run, or its selection is another one.
+    """
+    tally = read_tally(folder)
+    run = choose_run(tally, _chosen(tally, condition), replicate)
+    elites = elites_of(run.condition, run.rows)
+    again = retry_elites(run.condition, elites)
+    corrected = corrected_archive(again)
+    stayed = float((again["cell"] == again["again_cell"]).to_numpy().mean())
+    n_cells = run.condition.archive.n_cells
+    found_score, true_score = (
+        float(frame[name].sum()) / n_cells
+        for frame, name in ((elites, "fitness"), (corrected, "again_fitness"))
+    )
+    progress = _progress(tally, run)
+    n_runs = progress["replicate"].n_unique()
+    summary = (
+        f"{elites.height:,} of {n_cells:,} cells are filled, with a mean fitness per cell of {found_score:.3f}. By "
+        f"{RETRIES} fresh trials of each elite, {stayed:.0%} of them belong in their cell, and {corrected.height:,} "
+        f"cells with {true_score:.3f} are left (corrected)"
+    )
+    caption = (
+        f"Archive of {run.name}, run {run.replicate}: {summary}. Darker cells have fitter elites, and white ones are "
+        f"empty. {_hidden(run.condition)}{run.label}, n = 1 run. Below: mean fitness per cell (an empty one counts 0) "
+        f"as found, by trials; line: mean of {counted(n_runs, 'run')}, area: the range."
+    )
+    alt = f"Archive of run {run.replicate} of {run.name}. {summary}."
+    maps = [_map(run.condition, elites["cell"], elites["fitness"])]
+    maps.append(_map(run.condition, corrected["again_cell"], corrected["again_fitness"]))
+    most = max(float(np.nanmax(each, initial=0.0)) for each in maps) or 1.0
+
+    def draw(width: float) -> Sheet:
+        names = [[f"found {k}" for k in range(len(maps[0]))], [f"corrected {k}" for k in range(len(maps[0]))]]
+        wide = width >= IS_WIDE
+        if len(maps[0]) == 1:
+            places = [[*names[0], *names[1]]] if wide else [names[0], names[1]]
+        else:
+            places = names if wide else [list(row) for row in zip(*names, strict=True)]
+        heights: list[float | None] = [1.6 if wide else 1.3] * len(places)
+        places.append(["curve"] * len(places[0]))
+        sheet = Sheet(width, places, [*heights, 1.5], gap=0.2, pad=0.25)
+        for what, slices in zip(("found", "corrected"), maps, strict=True):
+            for k, shares in enumerate(slices):
+                axes = sheet.panels[f"{what} {k}"]
+                _draw_map(axes, run.condition, shares / most, is_first=k == 0 or not wide)
+                head(
+                    axes,
+                    "as found" if what == "found" else "corrected",
+                    _slice(run.condition, k, len(slices)),
+                    stacked=True,
+                )
+        _draw_curve(sheet.panels["curve"], progress)
+        head(sheet.panels["curve"], shorten(run.name, 28), f"{run.label}, n = {n_runs}")
+        keys = [
+            area_key(f"{share * most:.2f}", Ink.OURS, _alpha(share)) for share in (0.0, 0.25, 0.5, 0.75, 1.0)
+        ]
+        sheet.key(keys)
+        return sheet
+
+    return draw_wide(draw, name, caption, alt)
+
+
+def _chosen(tally: Tally, condition: str | None) -> str:
+    """A condition that has archives and runs."""
+    names = [each["name"] for each in tally.selecting_by("map-elites")]
+    if condition is None and names:
+        return names[0]
+    if condition is None:
+        raise ValueError("No condition with runs has selection map-elites, so there is no archive.")
+    if tally.condition(condition)["name"] not in names:
+        raise ValueError(
+            f"Condition {condition!r} has another selection than map-elites, so it has no archive."
+        )
+    return condition
+
+
+def _progress(tally: Tally, run: ChosenRun) -> pl.DataFrame:
+    frames = tally.folder.frames(run.name, columns=_COLUMNS)
+    return pl.concat([archive_progress(run.condition, frame) for frame in frames])
+
+
+def _shape(condition: Condition) -> tuple[int, int, int]:
+    """Return the number of maps, and of cells up and across: the first two descriptors and the third."""
+    archive = condition.archive
+    if archive.kind == "cvt":
+        across = math.ceil(math.sqrt(archive.n_cells))
+        return 1, -(-archive.n_cells // across), across
+    across, up, slices, *_ = (*archive.cells, 1, 1)
+    return (slices if slices <= _MOST_SLICES else 1), up, across
+
+
+def _map(condition: Condition, cells: pl.Series, fitness: pl.Series) -> Floats:
+    """Return the fitness of the elites of each map, (slices, up, across), NaN for empty cells.
+
+    Cells that differ in other descriptors only share a place; the fittest is shown. Those of a CVT are in the order of
+    their numbers.
+    """
+    slices, up, across = _shape(condition)
+    shown = np.full((slices, up, across), np.nan)
+    numbers, values = cells.to_numpy().astype(np.int64), fitness.to_numpy()
+    if condition.archive.kind == "cvt":
+        places: tuple[npt.NDArray[np.int64], ...] = (np.zeros_like(numbers), *np.divmod(numbers, across))
+    else:
+        x, *others = np.unravel_index(numbers, condition.archive.cells)
+        y, z, *_ = (*others, np.zeros_like(numbers), np.zeros_like(numbers))
+        places = (z if slices > 1 else np.zeros_like(numbers), y, x)
+    np.fmax.at(shown, places, values)
+    return shown
+
+
+def _hidden(condition: Condition) -> str:
+    """Say what a map does not tell apart."""
+    archive, (slices, *_) = condition.archive, _shape(condition)
+    if archive.kind == "cvt":
+        return "Cells are in the order of their numbers, which has no meaning. "
+    hidden = archive.names[3 if slices > 1 else 2 :]
+    return (
+        f"Cells that differ only in {', '.join(hidden)} share a place, and the fittest is shown. "
+        if hidden
+        else ""
+    )
+
+
+def _slice(condition: Condition, k: int, n_slices: int) -> str:
+    """Name the part of the third descriptor that a map shows."""
+    if n_slices == 1:
+        return ""
+    low, high = condition.archive.ranges(condition.placed_arena)[2]
+    edges = [low + (high - low) * each / n_slices for each in (k, k + 1)]
+    return f"{condition.archive.names[2]} {edges[0]:.2g}–{edges[1]:.2g}"
+
+
+def _alpha(share: float) -> float:
+    return round(_FAINTEST + (1.0 - _FAINTEST) * share, 3)
+
+
+def _draw_map(axes: Axes, condition: Condition, shares: Floats, *, is_first: bool) -> None:
+    """Shade the cells of a map, (up, across): one area for each shade, which is faster than one for each cell."""
+    from matplotlib.patches import PathPatch
+    from matplotlib.path import Path
+
+    up, across = shares.shape
+    shades = np.rint(np.clip(shares, 0.0, 1.0) * (_SHADES - 1))
+    square = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]])
+    for shade in np.unique(shades[np.isfinite(shades)]):
+        rows, columns = np.nonzero(shades == shade)
+        vertices = (np.column_stack([columns, rows])[:, None] + square).reshape(-1, 2).astype(float)
+        codes = np.tile([Path.MOVETO, *[Path.LINETO] * 3, Path.CLOSEPOLY], len(rows))
+        alpha = _alpha(float(shade) / (_SHADES - 1))
+        axes.add_artist(
+            PathPatch(Path(vertices, codes), linewidth=0, zorder=0, facecolor=Ink.OURS, alpha=alpha)
+        )
+    axes.set_xlim(0, across)
+    axes.set_ylim(0, up)
+    if condition.archive.kind == "cvt":
+        axes.set_xticks([])
+        axes.set_yticks([])
+        return
+    names, ranges = condition.archive.names, condition.archive.ranges(condition.placed_arena)
+    _label(axes, "x", across, names[:1], ranges[:1])
+    _label(axes, "y", up, names[1:2] if is_first else (), ranges[1:2])
+
+
+def _label(
+    axes: Axes, which: str, n: int, names: Sequence[str], ranges: Sequence[tuple[float, float]]
+) -> None:
+    """Name a descriptor at its axis, and write the ends and the middle of its range."""
+    axis = axes.xaxis if which == "x" else axes.yaxis
+    if not names:
+        axis.set_ticks([])
+        return
+    low, high = ranges[0]
+    axis.set_ticks([0, n / 2, n], [f"{value:.3g}" for value in (low, (low + high) / 2, high)])
+    axis.set_label_text(names[0])
+
+
+def _draw_curve(axes: Axes, progress: pl.DataFrame) -> None:
+    of_runs = (
+        progress.group_by("trials")
+        .agg(
+            pl.col("qd_score").mean().alias("mean"),
+            pl.col("qd_score").min().alias("low"),
+            pl.col("qd_score").max().alias("high"),
+        )
+        .sort("trials")
+    )
+    trials = of_runs["trials"].to_numpy()
+    axes.set_xlim(0, float(trials.max()))
+    axes.set_ylim(0, float(of_runs["high"].to_numpy().max()) * 1.1 or 1.0)
+    draw_band(axes, trials, of_runs["low"].to_numpy(), of_runs["high"].to_numpy())
+    draw_line(axes, trials, of_runs["mean"].to_numpy(), **pen_style(1, 1.6))
+    axes.set_xlabel("trials", labelpad=2)
+    axes.set_ylabel("fitness per cell")

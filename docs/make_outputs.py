@@ -10,7 +10,8 @@ In README.md and docs/**/*.md the blocks of a document are run in their order, i
 * ```python: is executed; where it has `>>>`, its outputs are compared as by doctest.
 * any block below a comment `<!-- file: NAME -->`: is written to NAME first.
 * a block below a comment that begins with `<!-- not run: `, and a reason, is left alone.
-* in a block below a comment `<!-- within 2 %: REASON -->`, numbers with a point may differ that much.
+* in a block below a comment `<!-- within 2 %: REASON -->`, numbers with a point may differ that much, or by a tenth
+  of the interval in their line.
 
 `tests/test_docs.py` does the same without writing.
 """
@@ -46,7 +47,8 @@ VOLATILE = [
     (re.compile(r"(Written: .*report\.html) \([\d.]+ s\)"), r"\1 (T s)"),
 ]
 FRACTION = re.compile(r"\d+\.\d+")
-NEARLY = 0.02
+INTERVAL = re.compile(r"(-?\d+\.\d+) to (-?\d+\.\d+)")
+NEARLY, NARROW = 0.02, 0.1
 # What stands where a terminal would have the progress bar.
 STARTING = re.compile(r"^Compiling or loading the kernels .*\n+", re.MULTILINE)
 
@@ -215,14 +217,25 @@ def differences(written: str, now: str, where: str, *, nearly: bool = False) -> 
 
 
 def are_near(written: str, now: str) -> bool:
-    """Whether two texts differ in nothing but numbers with a point, by 2 % or one in the last digit."""
+    """Whether two texts differ in nothing but spaces, and in numbers with a point.
+
+    Numbers may differ by 2 %, by one in the last digit, or by a tenth of the interval (`0.1 to 0.3`) in their line.
+    """
+    written, now = (re.sub(r" +", " ", re.sub("─+", "─", text)) for text in (written, now))
     if FRACTION.split(written) != FRACTION.split(now):
         return False
-    pairs = zip(FRACTION.findall(written), FRACTION.findall(now), strict=True)
     return all(
-        abs(float(a) - float(b)) <= max(NEARLY * float(a), 1.01 * 10.0 ** -len(a.partition(".")[2]))
-        for a, b in pairs
+        abs(float(a) - float(b))
+        <= max(NEARLY * float(a), 1.01 * 10.0 ** -len(a.partition(".")[2]), NARROW * width_in(one))
+        for one, other in zip(written.splitlines(), now.splitlines(), strict=True)
+        for a, b in zip(FRACTION.findall(one), FRACTION.findall(other), strict=True)
     )
+
+
+def width_in(line: str) -> float:
+    """Return the width of the first interval in a line; 0 without one."""
+    ends = INTERVAL.search(line)
+    return float(ends[2]) - float(ends[1]) if ends else 0.0
 
 
 def main() -> int:

@@ -678,7 +678,21 @@ def test_notebooks_are_stored_without_outputs(path):
         ("drive.gain 1.06 m", False),
         ("drive.gain 1.03 cm", False),
         ("drive.gain 1.03 m 0.1", False),
+        ("drive.gain   1.0305 m", True),
     ],
 )
 def test_fitted_numbers_of_a_page_may_differ_by_two_percent(now, is_near):
     assert make_outputs.are_near("drive.gain 1.030 m", now) == is_near
+
+
+@pytest.mark.parametrize(
+    ("now", "is_near"),
+    [
+        ("delay -0.0038 s -0.0216 to 0.0127", True),
+        ("delay -0.0038 s -0.0216 to 0.0170", False),
+        ("delay -0.0015 s -0.0212 to 0.0126", False),
+        ("delay 0.0042 s -0.0212 to 0.0126", False),
+    ],
+)
+def test_fitted_numbers_of_a_page_may_differ_by_a_tenth_of_their_interval(now, is_near):
+    assert make_outputs.are_near("delay -0.0042 s -0.0212 to 0.0126", now) == is_near

@@ -35,14 +35,20 @@ def connect_to(page, port: str) -> None:
     wait_connected(page, port)
 
 
-def drive_by(shown: playwright.Locator, press: Callable[[], None], let_go: Callable[[], None]) -> None:
-    """Press until something is shown: a robot that was silent is stopped, and waits for the next press."""
+def drive_by(page, shown: playwright.Locator, press: Callable[[], None], let_go: Callable[[], None]) -> None:
+    """Press until something is shown: a robot that was silent is stopped, and waits for the next press.
+
+    If the test itself stood still with a key held, the robot may be at a wall.
+    """
+    blocked, start = page.get_by_text("Standing, blocked"), page.get_by_role("button", name="Put at start")
     for _ in range(24):
         press()
         with contextlib.suppress(playwright.TimeoutError):
             shown.first.wait_for(timeout=5000)
             return
         let_go()
+        if blocked.is_visible() and start.is_visible():
+            start.click()
     raise AssertionError("the robot does not drive")
 
 
@@ -53,7 +59,7 @@ def hold_key(page, until: str = "Driving") -> None:
         page.locator(".lab-pad").focus()
         page.keyboard.down("ArrowUp")
 
-    drive_by(page.get_by_text(until, exact=True), press, lambda: page.keyboard.up("ArrowUp"))
+    drive_by(page, page.get_by_text(until, exact=True), press, lambda: page.keyboard.up("ArrowUp"))
 
 
 def drive_and_stop(page) -> None:
@@ -72,7 +78,7 @@ def hold(page, until: str | re.Pattern[str] = re.compile(r"^Driving$")) -> None:
         page.mouse.down()
         page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] * 0.15, steps=3)
 
-    drive_by(page.get_by_text(until), press, page.mouse.up)
+    drive_by(page, page.get_by_text(until), press, page.mouse.up)
 
 
 def test_it_drives_while_the_handle_is_held_and_stands_when_it_is_let_go(visit):

@@ -15,7 +15,15 @@ from realitygap._limits import MOST_CHUNK_BYTES, read_file
 from realitygap._parquet_size import check_size
 from realitygap._process import use_polars
 from realitygap.errors import RecordError, RecordVersionError
-from realitygap.records._columns import EXTRA_SCHEMA, FAR_PARENTS, SCHEMA, check_part, check_rows, schema_with
+from realitygap.records._columns import (
+    EXTRA_SCHEMA,
+    FAR_PARENTS,
+    SCHEMA,
+    check_part,
+    check_rows,
+    has_far_parents,
+    schema_with,
+)
 from realitygap.records._digest import RowsDigest, Stream, row_streams, rows_digest
 from realitygap.records._files import reading
 from realitygap.records._seal import BrokenSeal, check_seal, seal
@@ -145,9 +153,8 @@ def read_rows(path: Path, columns: Sequence[str] | None = None) -> tuple[Chunk, 
         also = [FAR_PARENTS] if "parents" in columns and FAR_PARENTS not in columns else []
         frame = _decode(chunk, sealed, [*columns, *also])
         with _checking(path):
-            check_part(
-                frame.select(name for name in frame.columns if name in (*SCHEMA, FAR_PARENTS)), chunk.first
-            )
+            known = {*SCHEMA, FAR_PARENTS} if has_far_parents(frame) else SCHEMA
+            check_part(frame.select(name for name in frame.columns if name in known), chunk.first)
         return chunk, frame.drop(also)
     return chunk, _read_checked(chunk, sealed)[0]
 

@@ -8,11 +8,13 @@ import numpy as np
 import polars as pl
 import pytest
 
+from realitygap.errors import StudyError
 from realitygap.evolution import MapElites
 from realitygap.platforms import trace_genome
 from realitygap.records import has_far_parents
 from realitygap.runs import (
     Condition,
+    Evolution,
     archive_progress,
     corrected_archive,
     elites_of,
@@ -20,7 +22,9 @@ from realitygap.runs import (
     retry_elites,
     run_replicates,
 )
+from realitygap.study._transfer.simulated import refuse_unevolved
 from realitygap.trials import NoiseKey
+from realitygap.world import paper_arena
 
 pytestmark = pytest.mark.slow
 
@@ -79,6 +83,7 @@ def test_a_run_is_that_of_ask_and_tell(variant: dict[str, Any]) -> None:
         bias=bias,
         key=condition.key,
     )
+    told._cells = archive.cells_in(condition.arena.arena(), condition.key)
     rows = run_replicates(condition, replicate, 1)
     for batch in range(condition.neat.generations):
         genomes, fitness, descriptors = told.ask(), [], []
@@ -134,6 +139,15 @@ def test_parents_are_elites_of_before_their_batch() -> None:
         assert parents <= known
 
 
+def test_centroids_of_shares_are_shares() -> None:
+    settings = condition_of(VARIANTS[2]).archive
+    centroids = settings.cells_in(paper_arena(), 3).centroids
+    assert centroids.shape == (50, 7)
+    np.testing.assert_allclose(centroids[:, 1:].sum(axis=1), 1.0)
+    assert centroids[:, 0].min() < 0.2
+    assert centroids[:, 0].max() > 0.8
+
+
 def test_rows_are_repeated_trial_by_trial() -> None:
     condition = condition_of(VARIANTS[1])
     rows = run_replicates(condition, 0, 1)
@@ -181,6 +195,14 @@ def test_other_selections_have_no_archive() -> None:
 def test_mistakes_are_refused(settings: dict[str, Any], says: str) -> None:
     with pytest.raises(ValueError, match=says):
         condition_of(settings)
+
+
+def test_there_is_no_population_to_ask() -> None:
+    condition = condition_of(VARIANTS[0])
+    with pytest.raises(ValueError, match="use MapElites"):
+        Evolution(condition, 0)
+    with pytest.raises(StudyError, match="expected evolution in simulation"):
+        refuse_unevolved(condition)
 
 
 def test_conditions_without_an_archive_keep_their_settings() -> None:

@@ -24,7 +24,16 @@ from ._interface import (
     paper_interface,
 )
 from ._json import interface_to_dict, to_text
-from ._map_elites import MOST_CELLS, MOST_CENTROIDS, Elite, MapElites, cells_of, cvt_centroids, place_in_cells
+from ._map_elites import (
+    MOST_CELLS,
+    MOST_CENTROIDS,
+    Elite,
+    MapElites,
+    cells_of,
+    cvt_centroids,
+    cvt_points,
+    place_in_cells,
+)
 from ._novelty import (
     NearestArchive,
     NoveltySettings,
@@ -64,6 +73,7 @@ __all__ = [
     "behavior_distance",
     "cells_of",
     "cvt_centroids",
+    "cvt_points",
     "decode_all",
     "distance_kind",
     "genome_from_record",

@@ -357,13 +357,19 @@ def _checked_ranges(ranges: Sequence[tuple[float, float]]) -> NDArray[np.float64
     return limits
 
 
-def cells_of(cells: int | Sequence[int], limits: NDArray[np.float64], key: int) -> Cells:
+def cells_of(
+    cells: int | Sequence[int],
+    limits: NDArray[np.float64],
+    key: int,
+    points: NDArray[np.float64] | None = None,
+) -> Cells:
     """Return cells as kernels read them.
 
     Args:
         cells: Cells along each descriptor of a grid, or the number of cells of a CVT.
         limits: (d, 2) lowest and highest value of each descriptor.
         key: Key of the centroids.
+        points: Points of the unit cube over which the centroids of a CVT are spread. Default: random ones.
 
     Raises:
         TypeError: A number is not a whole one.
@@ -373,7 +379,8 @@ def cells_of(cells: int | Sequence[int], limits: NDArray[np.float64], key: int) 
     d = len(limits)
     if not isinstance(cells, Sequence):
         n = whole_number("cells", cells, 1, MOST_CENTROIDS)
-        return Cells(low, high, np.ones(d, np.int64), cvt_centroids(n, d, key))
+        points = cvt_points(n, d, key) if points is None else points
+        return Cells(low, high, np.ones(d, np.int64), spread_centroids(n, points))
     size = tuple(whole_number(f"cells[{k}]", n, 1, MOST_CELLS) for k, n in enumerate(cells))
     if len(size) != d:
         raise ValueError(
@@ -402,7 +409,17 @@ def cvt_centroids(n: int, d: int, key: int = 0) -> NDArray[np.float64]:
         d: Number of dimensions.
         key: Seed of the points.
     """
-    points = np.random.Generator(np.random.Philox(key=key)).random((n * CVT_POINTS, d))
+    return spread_centroids(n, cvt_points(n, d, key))
+
+
+def cvt_points(n: int, d: int, key: int) -> NDArray[np.float64]:
+    """Return random points of the unit cube for n centroids, (n * `CVT_POINTS`, d)."""
+    return np.random.Generator(np.random.Philox(key=key)).random((n * CVT_POINTS, d))
+
+
+def spread_centroids(n: int, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return n centroids of points of the unit cube, (m, d), by Lloyd's algorithm, (n, d)."""
+    d = points.shape[1]
     centroids = points[:n].copy()
     unit = Cells(np.zeros(d), np.ones(d), np.ones(d, np.int64), centroids)
     for _ in range(CVT_ROUNDS):

@@ -57,7 +57,16 @@ class SelectionScores:
 
 
 def population_of(condition: Condition, replicate: int) -> Population:
-    """Return the population of one run of a condition."""
+    """Return the population of one run of a condition.
+
+    Raises:
+        ValueError: Selection is map-elites, which has no population.
+    """
+    if condition.selection == "map-elites":
+        raise ValueError(
+            f"Condition {condition.name!r} has selection 'map-elites', expected one with a population. For ask and "
+            "tell, use MapElites."
+        )
     bias = condition.has_bias_input
     n_inputs = len(condition.network_inputs) - bias
     return Population(n_inputs, N_OUTPUTS, condition.neat, replicate=replicate, bias=bias, key=condition.key)
@@ -74,6 +83,9 @@ class Evolution:
     The generation that `ask` returns is a function of the condition, the replicate, and the scores so far. It is the
     same as in the whole runs of `run_replicates`, with the same kernels and random numbers. The novelty archive is
     updated after the whole generation, in the order of individuals.
+
+    Raises:
+        ValueError: Selection is map-elites; see `realitygap.MapElites`.
     """
 
     def __init__(self, condition: Condition, replicate: int) -> None:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Annotated, Literal, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field, model_validator
 
-from realitygap.evolution import MOST_CELLS, MOST_CENTROIDS, cells_of
+from realitygap.evolution import MOST_CELLS, MOST_CENTROIDS, cells_of, cvt_points
 from realitygap.kernels.neat import block as block_kernels
 from realitygap.kernels.neat.block import RunRules, Runs
 from realitygap.kernels.neat.elites import Cells, Elites, make_elites
@@ -35,12 +35,14 @@ class Descriptor(NamedTuple):
         ranges: Returns lowest and highest value of each in an arena.
         of: Returns the numbers, (t, d), of t trials with a number of steps in an arena.
         needs_trace: True if it needs every step.
+        is_shares: True if its numbers add up to 1.
     """
 
     names: tuple[str, ...]
     ranges: Callable[[Arena], tuple[tuple[float, float], ...]]
     of: Callable[[Tried, Arena, int], Floats]
     needs_trace: bool = False
+    is_shares: bool = False
 
 
 def _ended(tried: Tried, arena: Arena, n_steps: int) -> Floats:
@@ -92,6 +94,7 @@ DESCRIPTORS: dict[DescriptorName, Descriptor] = {
         tuple(f"region_{column}_{row}" for row in range(REGIONS[1]) for column in range(REGIONS[0])),
         _unit(math.prod(REGIONS)),
         _region_shares,
+        is_shares=True,
     ),
 }
 
@@ -172,8 +175,18 @@ class ArchiveSettings(Settings):
 
     def cells_in(self, arena: Arena, key: int) -> Cells:
         """Return the cells in an arena as kernels read them; the centroids of a CVT depend on a key."""
-        cells: int | Sequence[int] = self.cells if self.kind == "grid" else self.cells[0]
-        return cells_of(cells, np.array(self.ranges(arena), np.float64), key)
+        limits = np.array(self.ranges(arena), np.float64)
+        if self.kind == "grid":
+            return cells_of(self.cells, limits, key)
+        points, first = cvt_points(self.n_cells, len(limits), key), 0
+        for descriptor in (DESCRIPTORS[each] for each in self.descriptor):
+            last = first + len(descriptor.names)
+            if descriptor.is_shares:
+                # gaps between sorted numbers are even over all shares (Devroye 1986, V.2)
+                cuts = np.sort(points[:, first : last - 1], axis=1)
+                points[:, first:last] = np.diff(cuts, axis=1, prepend=0.0, append=1.0)
+            first = last
+        return cells_of(self.n_cells, limits, key, points)
 
 
 class Archives:

@@ -39,9 +39,9 @@ def refuse_unevolved(condition: Condition) -> None:
     """Refuse conditions that are not evolved in simulation.
 
     Raises:
-        StudyError: A robot drives its trials, or nothing is selected.
+        StudyError: A robot drives its trials, nothing is selected, or selection is of an archive.
     """
-    if condition.is_physical or condition.selection == "random":
+    if condition.is_physical or condition.selection in ("random", "map-elites"):
         raise StudyError(
             f"Condition {condition.name!r} has platform {condition.platform!r} and selection {condition.selection!r}, "
             "expected evolution in simulation: platform 'sim' or 'jyro', selection 'coverage', 'fitness' or 'novelty'."

@@ -1,0 +1,172 @@
+"""MAP-Elites with noisy trials, and its speed beside pyribs that drives our simulator, as JSON.
+
+`python benchmarks/map_elites.py noise --out docs/data` compares 1, 2, 4, and 8 trials of each network at equal trials:
+20,480 a run, 10 runs, batches of 256, on `sim` in the paper's arena, for each of three spaces of descriptors. What
+counts is the corrected archive: each elite is tried 64 times again, and the means make a new archive. The default
+number of trials is that with the largest mean fitness per cell of corrected archives in most of the three spaces. The
+plan and the rule were set before the first run.
+
+`python benchmarks/map_elites.py speed --out docs/data` measures evaluations a second with one thread: `selection =
+"map-elites"`, and a loop of pyribs (GridArchive, GaussianEmitter) that tries networks of fixed structure by
+`try_genomes`. Both have batches of 256, one trial of a network, and the descriptor `region_share` with 3 cells along
+each share. The two are measured in turn, five times each; medians count.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import statistics
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from realitygap.evolution import genome_from_record
+from realitygap.platforms import SimPlatform, try_genomes
+from realitygap.runs import Condition, corrected_archive, elites_of, retry_elites, run_replicates
+from realitygap.stats import mean_interval
+from realitygap.trials import NoiseKey
+
+TRIALS, BATCH, RUNS = 20_480, 256, 10
+REPEATS = (1, 2, 4, 8)
+SPACES: dict[str, dict[str, Any]] = {
+    "motion": {"descriptor": ["mean_turn", "mean_move", "stall_share"], "cells": [20, 10, 5]},
+    "end": {"descriptor": ["end"], "cells": [28, 16]},
+    "regions": {"kind": "cvt", "descriptor": ["region_share"], "cells": [500]},
+}
+SEED = 4127
+TIMES, SPEED_BATCHES = 5, 100
+
+
+def noise() -> dict[str, Any]:
+    """Return the corrected archives of each space and number of trials."""
+    rows = []
+    for space, archive in SPACES.items():
+        for repeats in REPEATS:
+            condition = Condition(
+                name=f"{space}-{repeats}",
+                platform="sim",
+                selection="map-elites",
+                seed=SEED,
+                neat={"population": BATCH, "generations": TRIALS // (BATCH * repeats)},
+                archive={**archive, "repeats": repeats},
+            )
+            elites = elites_of(condition, run_replicates(condition, 0, RUNS))
+            again = retry_elites(condition, elites)
+            corrected = corrected_archive(again)
+            n_cells, runs = condition.archive.n_cells, range(RUNS)
+            scores = [corrected.filter(replicate=run)["again_fitness"].sum() / n_cells for run in runs]
+            best = [again.filter(replicate=run)["again_fitness"].max() for run in runs]
+            interval = mean_interval(np.array(scores))
+            rows.append(
+                {
+                    "space": space,
+                    "repeats": repeats,
+                    "as_found": float(elites["fitness"].sum()) / n_cells / RUNS,
+                    "corrected": statistics.mean(scores),
+                    "corrected_interval": [interval.low, interval.high],
+                    "filled": elites.height / n_cells / RUNS,
+                    "filled_corrected": corrected.height / n_cells / RUNS,
+                    "stay": float((again["cell"] == again["again_cell"]).to_numpy().mean()),
+                    "best": statistics.mean(best),
+                }
+            )
+            print(json.dumps(rows[-1]), flush=True)
+    best_of = {
+        space: max((row for row in rows if row["space"] == space), key=lambda row: row["corrected"])[
+            "repeats"
+        ]
+        for space in SPACES
+    }
+    winners = list(best_of.values())
+    chosen = next((each for each in REPEATS if winners.count(each) >= 2), 1)
+    return {"trials": TRIALS, "batch": BATCH, "runs": RUNS, "rows": rows, "best": best_of, "default": chosen}
+
+
+def ours() -> float:
+    """Return evaluations a second of runs with selection map-elites."""
+    condition = speed_condition()
+    began = time.perf_counter()
+    run_replicates(condition, 0, 1)
+    return BATCH * SPEED_BATCHES / (time.perf_counter() - began)
+
+
+def speed_condition() -> Condition:
+    """Return the condition of the comparison of speed."""
+    return Condition(
+        name="speed",
+        platform="sim",
+        selection="map-elites",
+        seed=SEED,
+        neat={"population": BATCH, "generations": SPEED_BATCHES},
+        archive={"descriptor": ["region_share"], "cells": [3] * 6},
+    )
+
+
+def pyribs() -> float:
+    """Return evaluations a second of pyribs with networks of fixed structure in our simulator."""
+    from ribs.archives import GridArchive
+    from ribs.emitters import GaussianEmitter
+    from ribs.schedulers import Scheduler
+
+    condition = speed_condition()
+    arena, n_inputs = condition.arena.arena(), len(condition.network_inputs)
+    genes = {
+        "hidden": [],
+        "biases": [],
+        "innovation": list(range(2 * n_inputs)),
+        "source": list(range(n_inputs)) * 2,
+        "target": [n_inputs] * n_inputs + [n_inputs + 1] * n_inputs,
+        "enabled": [True] * (2 * n_inputs),
+    }
+    archive = GridArchive(solution_dim=2 * n_inputs, dims=[3] * 6, ranges=[(0.0, 1.0)] * 6, seed=SEED)
+    emitter = GaussianEmitter(archive, sigma=1.0, x0=np.zeros(2 * n_inputs), batch_size=BATCH, seed=SEED)
+    scheduler = Scheduler(archive, [emitter])
+    platform, describe = SimPlatform(), condition.archive.describe
+    began = time.perf_counter()
+    for batch in range(SPEED_BATCHES):
+        genomes = [
+            genome_from_record({**genes, "weight": weights.tolist()}, condition.neat_rules)
+            for weights in scheduler.ask()
+        ]
+        key = NoiseKey(condition.key, 0, batch)
+        tried = try_genomes(
+            platform, arena, genomes, noise=0.0, noise_key=key, inputs=condition.network_inputs
+        )
+        scheduler.tell(tried.coverage_line, describe(TriedCells(tried), arena, platform.steps))
+    return BATCH * SPEED_BATCHES / (time.perf_counter() - began)
+
+
+class TriedCells:
+    """What `ArchiveSettings.describe` reads of trials by cells."""
+
+    def __init__(self, batch: Any) -> None:
+        self.batch = batch
+
+
+def speed() -> dict[str, Any]:
+    """Return the medians of both, measured in turn, and their ratio."""
+    ours(), pyribs()  # compile
+    pairs = [(ours(), pyribs()) for _ in range(TIMES)]
+    mine, others = (statistics.median(each) for each in zip(*pairs, strict=True))
+    return {"ours": mine, "pyribs": others, "ratio": mine / others, "times": TIMES}
+
+
+def main() -> None:
+    """Measure, and write what was measured."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("what", choices=("noise", "speed"))
+    parser.add_argument("--out", type=Path, required=True, help="folder of the file")
+    arguments = parser.parse_args()
+    found = noise() if arguments.what == "noise" else speed()
+    path = arguments.out / f"map-elites-{arguments.what}.json"
+    path.write_text(json.dumps(found, indent=1) + "\n", "utf-8")
+    print(f"Written: {path}")
+
+
+if __name__ == "__main__":
+    main()

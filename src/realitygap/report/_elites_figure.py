@@ -77,9 +77,9 @@ def draw_elites(
         f"cells with {true_score:.3f} are left (corrected)"
     )
     caption = (
-        f"Archive of {run.name}, run {run.replicate}: {summary}. Darker cells have fitter elites, and white ones are "
-        f"empty. {_hidden(run.condition)}{run.label}, n = 1 run. Below: mean fitness per cell (an empty one counts 0) "
-        f"as found, by trials; line: mean of {counted(n_runs, 'run')}, area: the range."
+        f"Archive of {run.name}, run {run.replicate}: {summary}. Stronger colors mark fitter elites, and cells without "
+        f"color are empty. {_hidden(run.condition)}{run.label}, n = 1 run. Below: mean fitness per cell (an empty one "
+        f"counts 0) as found, by trials; line: mean of {counted(n_runs, 'run')}, area: the range."
     )
     alt = f"Archive of run {run.replicate} of {run.name}. {summary}."
     maps = [_map(run.condition, elites["cell"], elites["fitness"])]

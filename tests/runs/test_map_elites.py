@@ -21,6 +21,7 @@ from realitygap.runs import (
     replay,
     retry_elites,
     run_replicates,
+    to_ribs,
 )
 from realitygap.study._transfer.simulated import refuse_unevolved
 from realitygap.trials import NoiseKey
@@ -170,6 +171,24 @@ def test_fresh_trials_correct_an_archive() -> None:
     assert retry_elites(condition, elites.tail(3), trials=16).height == 3
     with pytest.raises(ValueError, match="trials is 0"):
         retry_elites(condition, elites, trials=0)
+
+
+@pytest.mark.parametrize("variant", VARIANTS, ids=str)
+def test_archives_of_pyribs_have_the_same_elites_in_the_same_cells(variant: dict[str, Any]) -> None:
+    pytest.importorskip("ribs.archives", reason="needs ribs: uv sync --extra qd")
+    condition = condition_of(variant)
+    elites = elites_of(condition, run_replicates(condition, 0, 1))
+    for frame, cell, fitness in (
+        (elites, "cell", "fitness"),
+        (corrected_archive(retry_elites(condition, elites, 3)), "again_cell", "again_fitness"),
+    ):
+        theirs = to_ribs(condition, frame).data(return_type="pandas").sort_values("index")
+        assert theirs["index"].tolist() == frame.sort(cell)[cell].to_list()
+        assert theirs["objective"].tolist() == frame.sort(cell)[fitness].to_list()
+    assert theirs["solution"].iloc[0].network().activate([0.0] * len(condition.network_inputs)).shape == (2,)
+    two = elites.vstack(elites.with_columns(replicate=pl.lit(1, pl.UInt32)))
+    with pytest.raises(ValueError, match="rows of 2 runs"):
+        to_ribs(condition, two)
 
 
 def test_other_selections_have_no_archive() -> None:

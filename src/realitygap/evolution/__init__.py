@@ -33,6 +33,7 @@ from ._map_elites import (
     cvt_centroids,
     cvt_points,
     place_in_cells,
+    ribs_archive,
 )
 from ._novelty import (
     NearestArchive,
@@ -88,6 +89,7 @@ __all__ = [
     "paper_interface",
     "place_in_cells",
     "random_key",
+    "ribs_archive",
     "sorted_cells_distance",
     "to_c",
     "to_networkx",

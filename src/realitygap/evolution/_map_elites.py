@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from realitygap.errors import RecordError, check_told_once, finite_numbers, whole_number
+from realitygap.errors import RecordError, check_told_once, finite_numbers, from_extra, whole_number
 from realitygap.kernels.neat import elites as kernels
 from realitygap.kernels.neat.elites import Cells, Elites, make_elites
 from realitygap.kernels.neat.genome import Genomes, first_genomes, make_genomes
@@ -261,6 +261,20 @@ class MapElites:
         """
         return float(np.nansum(self.fitness - offset))
 
+    def to_ribs(self) -> Any:
+        """Return the elites as an archive of pyribs, for its figures and emitters; see `ribs_archive`.
+
+        Raises:
+            MissingExtraError: pyribs is not installed.
+        """
+        elites = self.elites()
+        return ribs_archive(
+            self._cells,
+            [elite.genome for elite in elites],
+            np.array([elite.fitness for elite in elites]),
+            np.array([elite.descriptor for elite in elites]).reshape(len(elites), -1),
+        )
+
     def save(self, path: str | Path) -> None:
         """Write a checkpoint. An existing file is replaced once the new one is complete.
 
@@ -396,6 +410,40 @@ def place_in_cells(descriptors: NDArray[np.float64], cells: Cells) -> NDArray[np
     found = np.empty(len(descriptors), np.int64)
     kernels.cells_of(descriptors, cells, found)
     return found
+
+
+def ribs_archive(
+    cells: Cells, genomes: Sequence[Genome], fitness: NDArray[np.float64], descriptors: NDArray[np.float64]
+) -> Any:
+    """Return an archive of pyribs whose solutions are genomes: its `GridArchive` or `CVTArchive`.
+
+    Measures of a grid are the descriptors, and those of a CVT are the descriptors as parts of their ranges, because
+    pyribs takes distances in the units of the measures.
+
+    Args:
+        cells: Cells of the archive.
+        genomes: n elites.
+        fitness: (n,) their fitness.
+        descriptors: (n, d) their descriptors.
+
+    Raises:
+        MissingExtraError: pyribs is not installed.
+    """
+    archives = from_extra("ribs.archives", "qd")
+    d = len(cells.low)
+    settings: dict[str, Any] = {"solution_dim": (), "solution_dtype": object}
+    if len(cells.centroids):
+        archive = archives.CVTArchive(centroids=cells.centroids, ranges=[(0.0, 1.0)] * d, **settings)
+        measures = np.clip((descriptors - cells.low) / (cells.high - cells.low), 0.0, 1.0)
+    else:
+        ranges = list(zip(cells.low, cells.high, strict=True))
+        archive = archives.GridArchive(dims=cells.size.tolist(), ranges=ranges, epsilon=0.0, **settings)
+        measures = descriptors
+    if len(genomes):
+        solutions = np.empty(len(genomes), object)
+        solutions[:] = genomes
+        archive.add(solutions, fitness, measures)
+    return archive
 
 
 def cvt_centroids(n: int, d: int, key: int = 0) -> NDArray[np.float64]:

@@ -1,6 +1,6 @@
 """One evolution from one seed, and many of them in parallel."""
 
-from ._archive import RETRIES, archive_progress, corrected_archive, elites_of, retry_elites
+from ._archive import RETRIES, archive_progress, corrected_archive, elites_of, retry_elites, to_ribs
 from ._condition import NAME_PATTERN, Condition
 from ._evolution import Evolution, named, population_of
 from ._map_elites import ArchiveSettings
@@ -33,5 +33,6 @@ __all__ = [
     "run_replicates",
     "run_rows",
     "run_task",
+    "to_ribs",
     "trace_row",
 ]

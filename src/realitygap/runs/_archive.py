@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
-from realitygap.evolution import decode_all, place_in_cells
+from realitygap.evolution import decode_all, place_in_cells, ribs_archive
 from realitygap.kernels.math.philox import MAX_REPEATS
 from realitygap.platforms import open_trials, scores_of, traced_at_once
 from realitygap.trials import NoiseKey, counters_of
@@ -154,6 +156,28 @@ def _tried_again(condition: Condition, elites: pl.DataFrame, n_trials: int) -> t
         descriptors[part] = condition.archive.describe(tried, trials.arena, trials.n_steps)
     return fitness.reshape(-1, n_trials).mean(axis=1), descriptors.reshape(len(genomes), n_trials, -1).mean(
         axis=1
+    )
+
+
+def to_ribs(condition: Condition, elites: pl.DataFrame) -> Any:
+    """Return the elites of a run as an archive of pyribs, for its figures and emitters; see `ribs_archive`.
+
+    Args:
+        condition: Condition with selection map-elites.
+        elites: Rows of one run of `elites_of`, or of `corrected_archive`, whose fresh trials then count.
+
+    Raises:
+        MissingExtraError: pyribs is not installed.
+        ValueError: There are rows of several runs.
+    """
+    if elites["replicate"].n_unique() > 1:
+        raise ValueError(f"There are rows of {elites['replicate'].n_unique()} runs, expected those of one.")
+    again = "again_" if "again_fitness" in elites.columns else ""
+    return ribs_archive(
+        condition.archive.cells_in(condition.placed_arena, condition.key),
+        [genome_of(condition, row) for row in elites.iter_rows(named=True)],
+        elites[f"{again}fitness"].to_numpy(),
+        elites[f"{again}descriptor"].explode().to_numpy().reshape(elites.height, -1),
     )
 
 

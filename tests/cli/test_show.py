@@ -144,7 +144,7 @@ def test_mistakes_in_python_are_told_too(results, tmp_path):
         (["lineage", "DIR", "--replicate", "99", "-o", "a.svg"], "its runs are 0 to 2"),
         (["species", "DIR", "--generation", "1", "-o", "a.svg"], "over all generations"),
         (["network", "-o", "a.svg"], "No results folder"),
-        (["netwrk", "DIR", "-o", "a.svg"], "species, lineage, divergence, movie, arena or robot first"),
+        (["netwrk", "DIR", "-o", "a.svg"], "lineage, archive, divergence, movie, arena or robot first"),
         (["movie", "-o", "a.gif"], "No results folder. Name one: realitygap show movie results/paper"),
         (["movie", "DIR", "-o", "a.png"], "expected .gif or .mp4"),
         (["movie", "DIR", "--each", "run", "-o", "a.gif"], "Unknown each 'run'"),

@@ -696,3 +696,15 @@ def test_fitted_numbers_of_a_page_may_differ_by_two_percent(now, is_near):
 )
 def test_fitted_numbers_of_a_page_may_differ_by_a_tenth_of_their_interval(now, is_near):
     assert make_outputs.are_near("delay -0.0042 s -0.0212 to 0.0126", now) == is_near
+
+
+def test_the_table_of_repeats_follows_from_its_data():
+    found = json.loads((DOCS / "data" / "map-elites-noise.json").read_text("utf-8"))
+    page = (DOCS / "how-to" / "map-elites.md").read_text("utf-8")
+    for row in found["rows"]:
+        low, high = row["corrected_interval"]
+        line = f"| {row['space']} | {row['repeats']} | {row['as_found']:.3f} "
+        line += f"| {row['corrected']:.3f} [{low:.3f}, {high:.3f}] "
+        assert f"{line}| {row['stay']:.0%} | {row['best']:.3f} |" in page
+    assert len(found["rows"]) == 12
+    assert found["default"] == ArchiveSettings().repeats

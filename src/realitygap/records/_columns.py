@@ -169,7 +169,7 @@ def list_column(values: npt.NDArray[Any], lengths: npt.NDArray[np.integer[Any]])
         raise ValueError(f"lengths run from {lengths.min()} to {lengths.max()}, expected 0 to {k}.")
     if n == 0 or k == 0:
         empty = pl.Series(values=values.reshape(-1)[:0]).dtype
-        return pl.Series(values=[[]] * n, dtype=pl.List(empty))
+        return pl.Series(values=[[]], dtype=pl.List(empty)).new_from_index(0, n)
     padded = pl.DataFrame({"values": np.ascontiguousarray(values), "lengths": lengths.astype(np.uint32)})
     return padded.select(pl.col("values").arr.to_list().list.head(pl.col("lengths"))).to_series()
 

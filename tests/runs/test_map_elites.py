@@ -123,6 +123,8 @@ def test_rows_do_not_depend_on_the_block(monkeypatch: pytest.MonkeyPatch) -> Non
     whole = run_replicates(condition, 0, 9)
     monkeypatch.setattr("realitygap.runs._staged.MOST_ELITES", 2 * condition.archive.n_cells)
     assert run_replicates(condition, 0, 9).equals(whole)
+    monkeypatch.setattr("realitygap.runs._staged.BLOCK_TRIALS", 8)
+    assert run_replicates(condition, 0, 9).equals(whole)
     alone = run_replicates(condition, 7, 1)
     assert alone.equals(whole.filter(whole["replicate"] == 7))
 

@@ -78,9 +78,11 @@ def run_staged(
         TaskError: A function of the user's own failed.
     """
     total = rows.fitness.shape[0]
-    together = min(runs_together(rules.population * condition.repeats), total)
+    together = runs_together(rules.population)
     if condition.selection == "map-elites":
-        together = min(together, max(1, MOST_ELITES // condition.archive.n_cells))
+        in_trials = -(-BLOCK_TRIALS // (rules.population * condition.repeats))
+        together = max(1, min(in_trials, MOST_ELITES // condition.archive.n_cells))
+    together = min(together, total)
     staged = _Staged(condition, rules, together, room, hidden_room)
     for first_run in range(0, total, staged.together):
         n_runs = min(staged.together, total - first_run)

@@ -211,9 +211,8 @@ class EvenReadings(MixtureReadings):
     def _shown(self, places: Places, values: Array) -> tuple[Array, Array]:
         """As `Readings`, with finer bins: the noise of a distance is less than a bin of the check."""
         edges = np.linspace(0.0, 1.0, SHOWN_BINS + 1)[1:-1]
-        return np.concatenate([[0.0], (edges[1:] + edges[:-1]) / 2, [1.0]]), self._chances(
-            places, values, edges
-        )
+        bins = np.concatenate([[0.0], (edges[1:] + edges[:-1]) / 2, [1.0]])
+        return bins, self._chances(places, values, edges)
 
     def _chances(self, places: Places, values: Array, edges: Array) -> Array:
         """Return the probability of each bin between edges at each of the places, (m, q, b)."""

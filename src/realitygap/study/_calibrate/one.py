@@ -90,9 +90,8 @@ def calibrate(
             f"--budget is {budget}, but choosing the last trials needs at least {LEAST_TO_CHOOSE}, because the "
             "choice depends on the first ones. Give more, or leave out --choose."
         )
-    plans = (
-        [] if choose else _plans(KINDS[kind], target, robot, budget, seed)
-    )  # refuses before a file is made
+    # before a file is made, because it may refuse
+    plans = [] if choose else _plans(KINDS[kind], target, robot, budget, seed)
     file = None if trials_file is None else open_trials(trials_file, target, observe, robot=str(robot))
     with KeptTarget(target, file, operator=operator) as kept:
         if file is not None and hold is not None:

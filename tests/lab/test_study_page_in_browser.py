@@ -220,6 +220,23 @@ def test_mistakes_in_the_form_are_shown_at_their_fields(lab, visit):
     assert list(lab.root.iterdir()) == []
 
 
+def test_mistakes_do_not_take_the_focus_from_a_visitor_who_types(lab, visit):
+    page = visit("new")
+    name = page.get_by_label("Name", exact=True).first
+    name.fill("ui test!")
+    name.blur()
+    runs = page.get_by_label("Runs per condition")
+    runs.evaluate("""it => {
+        window.moves = [];
+        addEventListener("focusin", ({target}) => moves.push(target));
+        [...document.querySelectorAll("button")].find((each) => each.textContent.includes("Start study")).click();
+        it.focus();
+    }""")
+    page.get_by_role("alert").filter(has_text="You entered 'ui test!'.").wait_for()
+    page.evaluate("new Promise((done) => setTimeout(done, 60))")  # longer than the page waits
+    assert runs.evaluate("it => document.activeElement === it && moves.every((each) => each === it)")
+
+
 def test_texts_that_are_no_values_stay_in_their_fields(lab, visit):
     page = visit("new")
     runs = page.get_by_label("Runs per condition")

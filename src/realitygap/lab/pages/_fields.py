@@ -332,7 +332,7 @@ class Form:
                     link = ui.link(f"{named.label}: {text}", f"#{target}")
                     link.on("click", js_handler=f"(e) => {{ e.preventDefault(); {_focus(target)} }}")
         first = next((_control(self._fields[key].input) for key in problems if key in self._fields), "")
-        ui.run_javascript(f"setTimeout(() => {{ {_focus(first, self._summary.html_id)} }}, 50)")
+        _focus_later(first, self._summary.html_id)
 
     def refuse(self, error: FormError) -> bool:
         """Show mistakes at fields of a form without a summary, and move the focus there; False if it lacks a field."""
@@ -342,7 +342,7 @@ class Form:
             field = self._fields[key]
             self._refused[key] = (field.input.value, text)
             self._mark(field, text)
-            ui.run_javascript(f"setTimeout(() => {{ {_focus(_control(field.input))} }}, 50)")
+            _focus_later(_control(field.input))
         return True
 
     def _refused_again(self, key: str) -> str:
@@ -408,6 +408,11 @@ def _with_default(field: OrderField, choices: Choices | None) -> Choices | None:
 def _control(element: ui.element) -> str:
     """The id of the control that takes the focus."""
     return f"f{element.id}"
+
+
+def _focus_later(target: str, otherwise: str = "") -> None:
+    """Move the focus when the page is drawn, unless the visitor types in another field by then."""
+    ui.run_javascript(f"setTimeout(() => {{ if (!isTypingOn()) {{ {_focus(target, otherwise)} }} }}, 50)")
 
 
 def _focus(target: str, otherwise: str = "") -> str:

@@ -75,6 +75,13 @@
   }
   window.whenReleased = (act) => (isHeld ? addEventListener("lab-released", act, { once: true }) : act());
 
+  // Mistakes take the focus to their field, but not from a visitor who types in another field by now.
+  let asked = null;
+  const isField = (it) => it.matches("input, textarea");
+  addEventListener("click", ({ target }) => { if (!isField(target)) asked = target; }, true);
+  addEventListener("keydown", ({ key, target }) => { if (key === "Enter") asked = target; }, true);
+  window.isTypingOn = () => isField(document.activeElement) && document.activeElement !== asked;
+
   // A number and its unit stay on one line. Text that is copied, such as that of a file, keeps its spaces.
   const UNIT = /(\d) (?=(?:%|m?s|min|h|[cmk]?m|in|m?V|Hz|°|[kM]B|px)(?![\p{L}\p{N}_]))/gu;
   const join = (node) => {

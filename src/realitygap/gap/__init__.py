@@ -8,6 +8,7 @@ from ._card import gap_card, pairs_picture
 from ._change import GapChange, measure_change
 from ._level import difference_ends, rms_interval, square_differences
 from ._measure import measure_gap
+from ._prior_process import Predicted, PriorProcess
 from ._ranks import (
     Ties,
     WorstPair,
@@ -56,6 +57,9 @@ __all__ = [  # noqa: RUF022 - grouped by subject
     "coverage_maps",
     "ReplayError",
     "replay_error",
+    # prediction from a simulation, trial by trial
+    "PriorProcess",
+    "Predicted",
     # what notebooks show
     "gap_card",
     "pairs_picture",

@@ -12,7 +12,7 @@ import numpy as np
 
 from realitygap.errors import did_you_mean, whole_number
 
-from ._model import FAMILY, TwinModel, numbers_for
+from ._model import FAMILY, TwinIr, TwinModel, numbers_for
 
 Value = bool | int | float | str
 
@@ -30,7 +30,7 @@ class Family(NamedTuple):
     Attributes:
         meaning: Defect of the family.
         numbers: Numbers that are drawn or set in addition to those of every twin, by dotted name.
-        oddities: Groups of numbers of an alien, from which `n_oddities` are taken.
+        oddities: Groups of numbers by what they do, from which `n_oddities` are taken.
         n_oddities: Number of groups.
     """
 
@@ -165,6 +165,37 @@ FAMILIES: dict[str, Family] = {
             "walls.friction": Range(0.3, 0.6),
         },
     ),
+    "weak-wheel": Family(
+        "one wheel that turns at a part of its speed",
+        {},
+        {f"weak {side} wheel": {f"motors.gain_{side}": Range(0.3, 0.7)} for side in ("left", "right")},
+        1,
+    ),
+    "dead-wheel": Family(
+        "one wheel that does not turn",
+        {},
+        {f"dead {side} wheel": {f"motors.gain_{side}": 0.0} for side in ("left", "right")},
+        1,
+    ),
+    "blind-sensor": Family(
+        "one infrared sensor that sees nothing",
+        {},
+        {f"blind sensor {k}": {f"ir.mount.{k}.gain": 0.0} for k in range(3)},
+        1,
+    ),
+    "payload": Family(
+        "a heavy load over the wheels, which slows the motors",
+        {
+            "body.mass": Range(1.3, 1.8),
+            "body.center": Range(0.002, 0.008),
+            "motors.speed": Range(0.09, 0.13),
+            "motors.lag": Range(0.1, 0.2),
+        },
+    ),
+    "stuck-caster": Family(
+        "a third support that no longer turns, and drags",
+        {"wheels.caster_friction": Range(0.3, 0.8)},
+    ),
     "same": Family("`sim` itself behind the same wall: no gap at all", {"engine": "sim"}),
     "alien": Family("two things that no numbers of `sim` can express", {}, _ODDITIES, 2),
 }
@@ -248,11 +279,19 @@ def _drawn(how: Range | Value, random: np.random.Generator) -> Value:
     return float(f"{random.uniform(how.low, how.high):.5g}")
 
 
+def _first_of(key: str) -> list[Any]:
+    """Return the entries of a list before any is drawn."""
+    return [mount.model_dump() for mount in TwinIr().mount] if key == "mount" else [0.0, 0.0]
+
+
 def _put(values: dict[str, Any], path: list[str], value: Value) -> None:
     """Put a value at its dotted name, making tables, and lists for numbered entries."""
+    place: Any = values
     for key, following in itertools.pairwise(path):
-        values = values.setdefault(key, [0.0, 0.0] if following.isdigit() else {})
-    if isinstance(values, list):
-        values[int(path[-1])] = value
-    else:
-        values[path[-1]] = value
+        if isinstance(place, list):
+            place = place[int(key)]
+        elif following.isdigit():
+            place = place.setdefault(key, _first_of(key))
+        else:
+            place = place.setdefault(key, {})
+    place[int(path[-1]) if isinstance(place, list) else path[-1]] = value

@@ -9,6 +9,8 @@ import pytest
 
 from realitygap.report import NARROW, draw_elites, save_view, write_report
 from realitygap.report._elites_figure import _map
+from realitygap.report._replay import content
+from realitygap.report._tally import read_tally
 from realitygap.runs import corrected_archive, elites_of, retry_elites
 from realitygap.study import parse_study, run_study
 
@@ -67,6 +69,31 @@ def test_it_shows_the_archive_as_found_and_corrected(maps, name):
         assert "differ only in mean_move" in drawn.caption
     else:
         assert np.isfinite(shown).sum() == elites.height
+
+
+@pytest.mark.parametrize("name", ["flat", "deep", "spread"])
+def test_a_click_on_a_cell_leads_to_its_elite(maps, name):
+    condition = next(each for each in parse_study(STUDY, "maps.toml").conditions if each.name == name)
+    tally = read_tally(maps)
+    played = content(tally, "flat").trials[name]
+    elites = elites_of(condition, maps.read(name, [tally.typical_replicate(name)]))
+    assert played == set(elites.select("generation", "individual").iter_rows())
+    drawn = draw_elites(maps, name, played=played)
+    fitness = {
+        f"{row[0]}/{row[1]}": row[2]
+        for row in elites.select("generation", "individual", "fitness").iter_rows()
+    }
+    found = [series for panel in drawn.marks if panel.axes.startswith("found") for series in panel.series]
+    shown = _map(condition, elites["cell"], elites["fitness"])
+    assert sum(len(each.points) for each in found) == np.isfinite(shown).sum()
+    for series in found:
+        assert series.n_linked == len(series.labels)
+        assert series.link.startswith(f"#replay={name}/")
+        for label, (x, y) in zip(series.labels, series.points, strict=True):
+            assert f"{fitness[label]:.3f}" == series.name
+            assert fitness[label] in shown[:, int(y), int(x)]
+    without = draw_elites(maps, name, played=list(played)[:1]).marks
+    assert sum(each.n_linked for panel in without for each in panel.series) <= 2
 
 
 def test_a_view_and_the_report_show_it(maps, tmp_path):

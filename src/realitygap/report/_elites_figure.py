@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import TYPE_CHECKING
+from urllib.parse import quote
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +17,7 @@ from realitygap.report._chosen_run import ChosenRun, choose_run
 from realitygap.report._tally import Results, Tally, read_tally
 from realitygap.report.charts.house import Drawing, draw_wide, shorten
 from realitygap.report.charts.lines import area_key, draw_band, draw_line, head, pen_style
+from realitygap.report.charts.marks import MOST_MARKS, Panel, Series
 from realitygap.report.charts.sheet import IS_WIDE, Sheet
 from realitygap.runs import (
     RETRIES,
@@ -44,7 +46,12 @@ _COLUMNS = ("condition", "replicate", "generation", "individual", "fitness", "de
 
 
 def draw_elites(
-    folder: Results, condition: str | None = None, replicate: int | None = None, *, name: str = "elites"
+    folder: Results,
+    condition: str | None = None,
+    replicate: int | None = None,
+    *,
+    name: str = "elites",
+    played: Collection[tuple[int, int]] = (),
 ) -> Drawing:
     """Draw the archive of a run with MAP-Elites, as found and corrected, and its growth in all runs.
 
@@ -53,6 +60,7 @@ def draw_elites(
         condition: Condition. Default: the first with selection map-elites.
         replicate: Run. Default: the typical one, as in `draw_paths`.
         name: First part of the ids in the drawing.
+        played: Generation and individual of the trials that the page can play: a click on a cell plays its elite.
 
     Raises:
         RecordError: there is no such folder, a file in it is damaged, or it holds no trials yet.
@@ -84,6 +92,10 @@ def draw_elites(
     alt = f"Archive of run {run.replicate} of {run.name}. {summary}."
     maps = [_map(run.condition, elites["cell"], elites["fitness"])]
     maps.append(_map(run.condition, corrected["again_cell"], corrected["again_fitness"]))
+    marks = (
+        *_panels("found", run, elites, ("cell", "fitness"), played),
+        *_panels("corrected", run, corrected, ("again_cell", "again_fitness"), played),
+    )
     most = max(float(np.nanmax(each, initial=0.0)) for each in maps) or 1.0
 
     def draw(width: float) -> Sheet:
@@ -99,6 +111,7 @@ def draw_elites(
         for what, slices in zip(("found", "corrected"), maps, strict=True):
             for k, shares in enumerate(slices):
                 axes = sheet.panels[f"{what} {k}"]
+                axes.set_gid(f"{what}-{k}")
                 _draw_map(axes, run.condition, shares / most, is_first=k == 0 or not wide)
                 head(
                     axes,
@@ -114,7 +127,7 @@ def draw_elites(
         sheet.key(keys)
         return sheet
 
-    return draw_wide(draw, name, caption, alt)
+    return draw_wide(draw, name, caption, alt, marks=marks)
 
 
 def _chosen(tally: Tally, condition: str | None) -> str:
@@ -152,17 +165,51 @@ def _map(condition: Condition, cells: pl.Series, fitness: pl.Series) -> Floats:
     Cells that differ in other descriptors only share a place; the fittest is shown. Those of a CVT are in the order of
     their numbers.
     """
-    slices, up, across = _shape(condition)
-    shown = np.full((slices, up, across), np.nan)
-    numbers, values = cells.to_numpy().astype(np.int64), fitness.to_numpy()
-    if condition.archive.kind == "cvt":
-        places: tuple[npt.NDArray[np.int64], ...] = (np.zeros_like(numbers), *np.divmod(numbers, across))
-    else:
-        x, *others = np.unravel_index(numbers, condition.archive.cells)
-        y, z, *_ = (*others, np.zeros_like(numbers), np.zeros_like(numbers))
-        places = (z if slices > 1 else np.zeros_like(numbers), y, x)
-    np.fmax.at(shown, places, values)
+    shown = np.full(_shape(condition), np.nan)
+    np.fmax.at(shown, _places(condition, cells), fitness.to_numpy())
     return shown
+
+
+def _places(condition: Condition, cells: pl.Series) -> tuple[npt.NDArray[np.int64], ...]:
+    """Return the map, the row, and the column of each cell."""
+    slices, _, across = _shape(condition)
+    numbers = cells.to_numpy().astype(np.int64)
+    if condition.archive.kind == "cvt":
+        return (np.zeros_like(numbers), *np.divmod(numbers, across))
+    x, *others = np.unravel_index(numbers, condition.archive.cells)
+    y, z, *_ = (*others, np.zeros_like(numbers), np.zeros_like(numbers))
+    return z if slices > 1 else np.zeros_like(numbers), y, x
+
+
+def _panels(
+    what: str,
+    run: ChosenRun,
+    elites: pl.DataFrame,
+    columns: tuple[str, str],
+    played: Collection[tuple[int, int]],
+) -> list[Panel]:
+    """Return the marks of the elites that maps show: the fittest of each place."""
+    cell, fitness = columns
+    slices, rows, columns_of = _places(run.condition, elites[cell])
+    placed = elites.select("generation", "individual", value=pl.col(fitness)).with_columns(
+        slice=slices, row=rows, column=columns_of
+    )
+    best = placed.sort("value", descending=True, maintain_order=True)
+    best = best.unique(["slice", "row", "column"], keep="first", maintain_order=True).head(MOST_MARKS // 2)
+    link = f"#replay={quote(run.name, safe='')}/{run.replicate}/"
+    panels = []
+    for k in range(_shape(run.condition)[0]):
+        series = []
+        for (value,), group in best.filter(slice=k).group_by("value", maintain_order=True):
+            trials = list(group.select("generation", "individual").iter_rows())
+            order = sorted(range(len(trials)), key=[each not in played for each in trials].__getitem__)
+            points = group.select("column", "row").to_numpy()[order] + 0.5
+            labels = tuple("/".join(map(str, trials[i])) for i in order)
+            n_played = sum(each in played for each in trials)
+            text = "Fitness {name}, generation and individual {label}"
+            series.append(Series(text, points, f"{value:.3f}", labels, link if n_played else "", n_played))
+        panels.append(Panel(f"{what}-{k}", tuple(series), (1, 1)))
+    return panels
 
 
 def _hidden(condition: Condition) -> str:

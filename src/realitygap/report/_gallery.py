@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any
 
 from realitygap._version import __version__
@@ -19,19 +19,20 @@ from realitygap.report._tally import Tally
 from realitygap.report.charts.house import Drawing
 
 
-def content(tally: Tally) -> dict[str, Any]:
+def content(tally: Tally, played: Mapping[str, Collection[tuple[int, int]]]) -> dict[str, Any]:
     """Return the figures of the page, or the reason why one is missing.
 
     Args:
         tally: Tally of the study.
+        played: Trials that the page can play, by condition, as `draw_elites` takes them.
     """
 
     def draw(
-        what: str, condition: str, figure: Callable[..., Drawing], counterpart: str = ""
+        what: str, condition: str, figure: Callable[..., Drawing], counterpart: str = "", **more: Any
     ) -> FigureOnPage | str:
         anchor = f"figure-{what}"
         try:
-            return FigureOnPage(anchor, figure(tally, condition, name=anchor), counterpart)
+            return FigureOnPage(anchor, figure(tally, condition, name=anchor, **more), counterpart)
         except RecordVersionError:
             return (
                 f"A figure of condition {condition} is missing: this realitygap ({__version__}) cannot read its "
@@ -54,7 +55,7 @@ def content(tally: Tally) -> dict[str, Any]:
         if (driven := [each["name"] for each in tally.selecting_by(search) if each["name"] in tally.driven])
     ] or [draw("individuals-coverage", _first(tally), draw_individuals, "Figure 5")]
     found["elites"] = [
-        draw(f"elites-{k}", each["name"], draw_elites)
+        draw(f"elites-{k}", each["name"], draw_elites, played=played.get(each["name"], ()))
         for k, each in enumerate(tally.selecting_by("map-elites"))
     ]
     species = count_species(tally)

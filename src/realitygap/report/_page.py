@@ -293,7 +293,7 @@ def _words_and_figures(tally: Tally) -> dict[str, Any]:
         "task_scores": _scores_table(tasks),
         "scores": _score_figures(tally),
         "choices": _choices_figure(tally),
-        "gallery": _gallery.content(tally),
+        "gallery": _gallery.content(tally, replay.trials),
         "replay": replay,
         "command": _command(tally),
         "has_novelty": any(selection_of(each) == "novelty" for each in tally.conditions),

@@ -25,7 +25,7 @@ from realitygap.report._placed import as_json, hash_of
 from realitygap.report._tally import DescribedCondition, Tally, label_of, score_text, task_of
 from realitygap.report._template import template_text
 from realitygap.report.charts.arena import arena_extent
-from realitygap.runs import Condition, replay
+from realitygap.runs import Condition, elites_of, replay
 from realitygap.trials import Trajectory
 
 UNITS = {"length": 1e-3, "angle": 5e-3, "output": 5e-3}
@@ -102,6 +102,15 @@ class ReplayOnPage:
     def embedded(self) -> list[_Run]:
         """The runs with trials that can be played."""
         return [run for run in self.runs if run.data is not None]
+
+    @property
+    def trials(self) -> dict[str, frozenset[tuple[int, int]]]:
+        """Generation and individual of the trials of the typical run that can be played, by condition."""
+        return {
+            run.name: frozenset((generation, individual) for generation, individual, *_ in run.data["trials"])
+            for run in self.runs
+            if run.data is not None
+        }
 
     @property
     def replayed(self) -> dict[str, tuple[int, ...]]:
@@ -211,7 +220,9 @@ def _pack_run(tally: Tally, described: DescribedCondition, room: int, packed: by
             note = "its trials were driven by a robot, and cannot be computed again to be played."
             return _Run(name, replicate, None, 0, rows.height, note)
         n_fitting = room // (condition.on.steps + 1) // condition.arena.robots
-        chosen = _choose(rows, n_fitting, tally.score_column(name))
+        column = tally.score_column(name)
+        is_archive = condition.selection == "map-elites"
+        chosen = _elites(condition, rows, n_fitting) if is_archive else _choose(rows, n_fitting, column)
         trials = [_pack_row(condition, row, packed) for row in chosen.iter_rows(named=True)]
         bests = _bests(tally, name, replicate, n_fitting - len(trials))
         others = [
@@ -227,10 +238,8 @@ def _pack_run(tally: Tally, described: DescribedCondition, room: int, packed: by
         return _Run(name, replicate, None, 0, rows.height, note)
     note = ""
     if len(trials) < rows.height:
-        note = (
-            f"{len(trials):,} of {rows.height:,} trials, the best ones of each generation; "
-            "more would make the page too large."
-        )
+        which = "elites of its archive" if is_archive else "the best ones of each generation"
+        note = f"{len(trials):,} of {rows.height:,} trials, {which}; more would make the page too large."
     data = _set_up(condition) | {
         "name": name,
         "run": replicate,
@@ -253,6 +262,12 @@ def _bests(tally: Tally, name: str, typical: int, most: int) -> pl.DataFrame:
     rows = tally.folder.read(name, runs)
     best = rows.filter(column == column.max().over("replicate"))
     return best.unique("replicate", keep="first", maintain_order=True)
+
+
+def _elites(condition: Condition, rows: pl.DataFrame, most: int) -> pl.DataFrame:
+    """Return the elites of a run, the fittest of them if there are more than fit."""
+    best = elites_of(condition, rows).sort("fitness", descending=True, maintain_order=True).head(most)
+    return best.sort("generation", "individual")
 
 
 def _choose(rows: pl.DataFrame, most: int, column: str) -> pl.DataFrame:

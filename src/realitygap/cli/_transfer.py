@@ -93,10 +93,11 @@ def _print(result: TransferResult) -> None:
         f"{result.replicates} replicate{'s' if result.replicates > 1 else ''}, {result.fresh_trials} fresh trials "
         f"each, {result.score}"
     )
-    echo(f"{'strategy':16}{'budget':>7}{'on the target':>24}{'regret':>24}{'in simulation':>15}")
+    wide = max(16, *(len(row.strategy) for row in result.strategies))
+    echo(f"{'strategy':{wide}}{'budget':>7}{'on the target':>24}{'regret':>24}{'in simulation':>15}")
     for row in result.strategies:
         quality, regret = map(with_interval, (row.quality, row.regret))
-        echo(f"{row.strategy:16}{row.budget:>7}{quality:>24}{regret:>24}{number(row.simulated):>15}")
+        echo(f"{row.strategy:{wide}}{row.budget:>7}{quality:>24}{regret:>24}{number(row.simulated):>15}")
     echo(f"Regret is to {result.best_in_words}.")
     if result.replicates == 1:
         echo("Intervals are over the fresh trials of one champion. To compare strategies, add --replicates.")

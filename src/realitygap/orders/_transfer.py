@@ -148,6 +148,12 @@ class TransferOrder(Order):
     held-out trials best, or the robot file's numbers if they did. Strategy transferability is that of Koos, Mouret &
     Doncieux (2013). Strategy direct evolves on the target.
 
+    Strategy trial-and-error evolves a repertoire of different controllers by MAP-Elites, and tries what a prediction
+    expects most of, trial by trial (Cully and others 2015). Strategy trial-and-error-recalibrated tries the repertoire
+    in the fitted simulator first. The repertoire of trial-and-error-posterior is from the fitted simulator, and that of
+    trial-and-error-damage from robots with suspected damages. Strategy trial-and-error-combined has both. See
+    --stop-at.
+
     Example: realitygap transfer sim-paper --to twin:worn-1.toml --budget 20
 
     Example: realitygap transfer light --to sim:khepera --budget 10 --strategy select
@@ -169,7 +175,8 @@ class TransferOrder(Order):
     strategy: tuple[str, ...] = option(
         (),
         help="plain, select, halving, noise, randomized, calibrated, posterior, recommended, transferability, "
-        "direct or all. Repeatable.",
+        "trial-and-error, trial-and-error-recalibrated, trial-and-error-posterior, trial-and-error-damage, "
+        "trial-and-error-combined, direct or all. Repeatable.",
         default_is="all",
     )
     condition: str | None = option(
@@ -198,6 +205,13 @@ class TransferOrder(Order):
     )
     runs: int = option(100, help="Evolutions in simulation per replicate.", at_least=1)
     repeats: int = option(8, help="Trials per individual in simulation.", at_least=1)
+    stop_at: Annotated[float, Field(gt=0, le=1)] | None = option(
+        None,
+        help="Strategies trial-and-error end when their best trial has this share of the highest predicted score, 0 to "
+        "1.",
+        default_is="use the whole budget",
+        metavar="SHARE",
+    )
     seed: Seed = seed_option()
     out: Path | None = folder_option("results/transfer")
     lock: Lock = False

@@ -109,26 +109,31 @@ def retry_elites(condition: Condition, elites: pl.DataFrame, trials: int = RETRI
         trials: Number of trials of each, 1 to 4096.
 
     Returns:
-        The rows, with `again_fitness`, `again_descriptor`, and `again_cell`.
+        The rows, with `again_fitness`, `again_deviation`, the standard deviation of fitness between trials,
+        `again_descriptor`, and `again_cell`.
 
     Raises:
         ValueError: Another number of trials.
     """
     if not 1 <= trials <= MAX_REPEATS:
         raise ValueError(f"trials is {trials}, expected 1 to {MAX_REPEATS}.")
-    fitness, descriptors = np.empty(elites.height), np.empty((elites.height, len(condition.descriptor_names)))
-    first = 0
-    for part in elites.partition_by("replicate", maintain_order=True):
-        last = first + part.height
-        fitness[first:last], descriptors[first:last] = _tried_again(condition, part, trials)
-        first = last
+    parts = elites.partition_by("replicate", maintain_order=True)
+    tried = [_tried_again(condition, part, trials) for part in parts]
+    fitness = np.concatenate([np.empty((0, trials)), *(each[0] for each in tried)])
+    descriptors = np.concatenate(
+        [np.empty((0, len(condition.descriptor_names))), *(each[1] for each in tried)]
+    )
     again = pl.Series("again_descriptor", descriptors).arr.to_list()
-    placed = elites.with_columns(pl.Series("again_fitness", fitness), again)
+    placed = elites.with_columns(
+        pl.Series("again_fitness", fitness.mean(axis=1)),
+        pl.Series("again_deviation", fitness.std(axis=1)),
+        again,
+    )
     return placed.with_columns(again_cell=_cells(condition, again))
 
 
 def _tried_again(condition: Condition, elites: pl.DataFrame, n_trials: int) -> tuple[Floats, Floats]:
-    """Return mean fitness (n,) and descriptors (n, d) of the elites of one run."""
+    """Return fitness (n, t) in each trial, and mean descriptors (n, d), of the elites of one run."""
     genomes = [genome_of(condition, row) for row in elites.iter_rows(named=True)]
     trials = open_trials(
         condition.on,
@@ -154,9 +159,8 @@ def _tried_again(condition: Condition, elites: pl.DataFrame, n_trials: int) -> t
         tried = trials.carry_out(networks, who.astype(np.int32), condition.key, words, trace=needs_trace)
         fitness[part] = scores_of(task, trials, tried, names)
         descriptors[part] = condition.archive.describe(tried, trials.arena, trials.n_steps)
-    return fitness.reshape(-1, n_trials).mean(axis=1), descriptors.reshape(len(genomes), n_trials, -1).mean(
-        axis=1
-    )
+    means = descriptors.reshape(len(genomes), n_trials, -1).mean(axis=1)
+    return fitness.reshape(-1, n_trials), means
 
 
 def to_ribs(condition: Condition, elites: pl.DataFrame) -> Any:

@@ -16,6 +16,7 @@ from realitygap.world import Calibration, RobotModel
 
 from .._kept_target import KeptTarget
 from .._targets import open_trials
+from .repertoire import Repertoire, evolve_repertoire, joined, repertoire_condition, tried_under
 from .simulated import Champion, evolve_champions
 
 
@@ -30,6 +31,7 @@ class Simulation:
     def __init__(self, runs: int, repeats: int) -> None:
         self.runs, self.repeats = runs, repeats
         self._known: dict[tuple[str, int, int], list[Champion]] = {}
+        self._repertoires: dict[tuple[str, int], Repertoire] = {}
 
     def champions(
         self,
@@ -41,16 +43,34 @@ class Simulation:
         """Return the champions of a replicate's runs under a condition, the best in simulation first.
 
         Args:
-            condition: Condition for `evolve_champions`.
+            condition: Condition for `evolve_champions`; with selection map-elites, elites are the champions.
             replicate: Replicate of the transfer.
             runs: Number of runs of the replicate. Default: all.
         """
+        if condition.selection == "map-elites":
+            return list(self.repertoire(condition, replicate).champions)
         n = self.runs if runs is None else runs
         key = (condition.hash(), replicate, n)
         if key not in self._known:
             first = replicate * self.runs
             self._known[key] = evolve_champions(condition, range(first, first + n), repeats=self.repeats)
         return self._known[key]
+
+    def repertoire(self, condition: Condition, replicate: int, parts: int = 1) -> Repertoire:
+        """Return the repertoire of a replicate under a condition, from as many trials as all of its runs.
+
+        Args:
+            condition: Condition for `repertoire_condition`.
+            replicate: Replicate of the transfer.
+            parts: Number of repertoires that share the trials.
+        """
+        neat = condition.neat
+        n_trials = self.runs * neat.population * neat.generations * self.repeats
+        evolving = repertoire_condition(condition, n_trials, parts)
+        key = (evolving.hash(), replicate)
+        if key not in self._repertoires:
+            self._repertoires[key] = evolve_repertoire(evolving, replicate)
+        return self._repertoires[key]
 
 
 class Calibrates(Protocol):
@@ -74,6 +94,7 @@ class Attempt:
         observe: Observation level of trials on the target.
         budget: Trials on the target.
         replicate: Replicate of the transfer, from 0 on.
+        stop_at: Share of the highest predicted score at which trial and error ends; None to use the whole budget.
         simulation: Simulation that evolves.
         calibration: Makes or reads a calibration.
     """
@@ -83,6 +104,7 @@ class Attempt:
     observe: Observe
     budget: int
     replicate: int
+    stop_at: float | None
     simulation: Simulation
     calibration: Calibrates
 
@@ -94,6 +116,12 @@ class Attempt:
     def champions(self, condition: Condition | None = None) -> list[Champion]:
         """Return champions evolved under a condition, the attempt's own by default; the best in simulation first."""
         return self.simulation.champions(condition or self.condition, self.replicate)
+
+    def repertoire(self, *conditions: Condition) -> Repertoire:
+        """Return a repertoire evolved under a condition, the attempt's own by default, or under each of several."""
+        evolving = conditions or (self.condition,)
+        each = [self.simulation.repertoire(one, self.replicate, len(evolving)) for one in evolving]
+        return each[0] if len(each) == 1 else tried_under(joined(each), evolving, self.replicate)
 
     def try_on_target(self, genomes: Sequence[Genome]) -> tuple[list[float], list[tuple[int, ...]]]:
         """Try genomes on the target, once each; the score of each, and the cells that it visited, if they are known."""

@@ -35,20 +35,21 @@ _RECOMMENDED = {FITTED: "calibrated", POSTERIOR: "posterior", NOMINAL: "nominal"
 
 def calibrated(attempt: Attempt) -> Champion:
     """Evolve in the simulator with the fitted numbers, and choose by the trials that are left, as `select` does."""
-    return best_on_target(attempt, attempt.champions(_fitted(attempt, "calibrated")))
+    return best_on_target(attempt, attempt.champions(fitted(attempt, "calibrated")))
 
 
 def posterior(attempt: Attempt) -> Champion:
     """Evolve with a robot of the posterior for each trial, and choose by the trials that are left, as `select` does."""
-    return best_on_target(attempt, attempt.champions(_fitted(attempt, "posterior")))
+    return best_on_target(attempt, attempt.champions(fitted(attempt, "posterior")))
 
 
 def recommended(attempt: Attempt) -> Champion:
     """Evolve with the numbers that the calibration recommends, and choose by the trials that are left."""
-    return best_on_target(attempt, attempt.champions(_fitted(attempt, "recommended")))
+    return best_on_target(attempt, attempt.champions(fitted(attempt, "recommended")))
 
 
-def _fitted(attempt: Attempt, numbers: Numbers) -> Condition:
+def fitted(attempt: Attempt, numbers: Numbers) -> Condition:
+    """Return the condition on the simulator that was calibrated to the target, on the budget."""
     needs_sim(attempt.condition, numbers)
     calibration, base = attempt.calibration(attempt.condition, attempt.left)
     attempt.target.spent += calibration.trials

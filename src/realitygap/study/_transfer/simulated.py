@@ -39,12 +39,12 @@ def refuse_unevolved(condition: Condition) -> None:
     """Refuse conditions that are not evolved in simulation.
 
     Raises:
-        StudyError: A robot drives its trials, nothing is selected, or selection is of an archive.
+        StudyError: A robot drives its trials, or nothing is selected.
     """
-    if condition.is_physical or condition.selection in ("random", "map-elites"):
+    if condition.is_physical or condition.selection == "random":
         raise StudyError(
             f"Condition {condition.name!r} has platform {condition.platform!r} and selection {condition.selection!r}, "
-            "expected evolution in simulation: platform 'sim' or 'jyro', selection 'coverage', 'fitness' or 'novelty'."
+            "expected evolution in simulation: platform 'sim' or 'jyro', and another selection than 'random'."
         )
 
 
@@ -60,9 +60,14 @@ def evolve_champions(condition: Condition, runs: range, *, repeats: int) -> list
         repeats: Trials of each individual, every one on noise of its own.
 
     Raises:
-        StudyError: A condition as `refuse_unevolved` says.
+        StudyError: A condition as `refuse_unevolved` says, or one whose selection is of an archive.
     """
     refuse_unevolved(condition)
+    if condition.selection == "map-elites":
+        raise StudyError(
+            f"Condition {condition.name!r} has selection 'map-elites', which has elites in place of champions. "
+            "Choose a condition with another selection."
+        )
     populations = [population_of(condition, run) for run in runs]
     archives = [_archive(condition) for _ in runs]
     best: list[tuple[float, Genome] | None] = [None] * len(runs)

@@ -41,6 +41,13 @@ from .noise import needs_sim, noise, randomized
 from .result import Transferred, TransferResult, summarize_transfer
 from .simulated import Champion, refuse_unevolved
 from .transferability import transferability
+from .trial_and_error import (
+    trial_and_error,
+    trial_and_error_combined,
+    trial_and_error_damage,
+    trial_and_error_posterior,
+    trial_and_error_recalibrated,
+)
 from .uncalibrated import direct, halving, plain, select
 
 STRATEGIES: Mapping[str, Callable[[Attempt], Champion]] = {
@@ -53,15 +60,30 @@ STRATEGIES: Mapping[str, Callable[[Attempt], Champion]] = {
     "posterior": posterior,
     "recommended": recommended,
     "transferability": transferability,
+    "trial-and-error": trial_and_error,
+    "trial-and-error-recalibrated": trial_and_error_recalibrated,
+    "trial-and-error-posterior": trial_and_error_posterior,
+    "trial-and-error-damage": trial_and_error_damage,
+    "trial-and-error-combined": trial_and_error_combined,
     "direct": direct,
 }
 """Strategies by name; the docstring of each function describes its strategy."""
 
-CALIBRATE = ("calibrated", "posterior", "recommended")
+CALIBRATE = (
+    "calibrated",
+    "posterior",
+    "recommended",
+    "trial-and-error-recalibrated",
+    "trial-and-error-posterior",
+    "trial-and-error-combined",
+)
 """Strategies that share calibrations."""
 
-NEED_SIM = ("randomized", *CALIBRATE)
+NEED_SIM = ("randomized", "trial-and-error-damage", *CALIBRATE)
 """Strategies that change numbers of the simulated robot."""
+
+BREED = ("noise", "transferability", "direct")
+"""Strategies that evolve in a way of their own, which is none of an archive."""
 
 WITHOUT_TRIALS = ("plain",)
 """Strategies that spend nothing: carried out once for all budgets."""
@@ -116,6 +138,7 @@ class TransferPlan:
             "calibration": "" if order.calibration is None else str(order.calibration),
             "fit": self.fit,
             "seed": order.seed,
+            "stop_at": order.stop_at,
         }
 
 
@@ -291,6 +314,12 @@ class _Work:
             interface = ControllerInterface(self.condition.network_inputs, self.condition.output_names)
             interface.check(self.target.inputs, f"Condition {self.condition.name!r}", self.target.name)
         for strategy in strategies:
+            if strategy in BREED and self.condition.selection == "map-elites":
+                others = ", ".join(name for name in STRATEGIES if name not in BREED)
+                raise StudyError(
+                    f"Strategy {strategy!r} has a selection of its own, and condition {self.condition.name!r} has "
+                    f"selection 'map-elites'. Choose other strategies ({others}), or another condition."
+                )
             if strategy in NEED_SIM:
                 needs_sim(self.condition, strategy)
             if strategy in CALIBRATE:
@@ -312,6 +341,7 @@ class _Work:
                 observe=observe,
                 budget=budget,
                 replicate=replicate,
+                stop_at=self.plan.order.stop_at,
                 simulation=self.simulation,
                 calibration=self._calibration(replicate),
             )

@@ -1,0 +1,155 @@
+"""Strategies that find out by trial and error what of a repertoire works on the target."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from realitygap.gap import PriorProcess
+from realitygap.runs import Condition
+
+from .attempt import Attempt
+from .calibrated import fitted
+from .noise import changed_condition, needs_sim
+from .repertoire import Repertoire, tried_under
+from .simulated import Champion
+from .transferability import distances
+
+SPREAD, OFFSET = 0.1, 0.1
+"""Standard deviations of the difference to the simulation, as shares of the range of scores: from one behavior to
+another, and of all together."""
+
+KAPPA = 1.0
+"""Weight of the standard deviation in the choice of the next trial. With 0.05, as in the source, the search tries the
+same elite again and again."""
+
+LEAST_VARIANCE = 0.001
+"""Least variance of a trial on that scale (Cully and others 2015)."""
+
+DEAD = 0.01
+"""Share of the number of a part that does next to nothing; 0 is refused."""
+UNLIKELY = 0.1
+"""Generalized Jaccard distance between visited cells that makes a damage less likely by the factor e."""
+
+WEAK = (DEAD, 0.3, 0.6)
+"""Shares of the gain of one wheel under suspected damages."""
+LOADED = (0.5, 0.75)
+"""Shares of the gains of both wheels."""
+PULLS = (-1.0, 1.0)
+"""Drift to a side [rad/m]."""
+SENSOR = re.compile(r"range\.\d+\.amplitude")
+"""The number of a range sensor that is small if it is blind."""
+
+
+def trial_and_error(attempt: Attempt) -> Champion:
+    """Try what a Gaussian process over the descriptors expects most of, one trial after the other.
+
+    A repertoire evolves by MAP-Elites, with as many trials in simulation as the runs of the other strategies. Its mean
+    scores in fresh trials are the prior mean. The elite with the highest upper confidence bound is tried next. In the
+    end the elite of the highest expected score is chosen.
+
+    Source: Cully, Clune, Tarapore & Mouret (2015), Nature 521. Differs: the archive is corrected by fresh trials, the
+    variance of a trial is that of the elite in simulation, a difference that all elites share has a term of its own,
+    the spread is smaller and the weight of the deviation greater, the choice at the end is by expected score, and all
+    of the budget is used.
+    """
+    return search(attempt, attempt.repertoire())
+
+
+def trial_and_error_recalibrated(attempt: Attempt) -> Champion:
+    """As `trial_and_error`, with the scores of the repertoire in the calibrated simulator, averaged over the posterior.
+
+    Half of the budget calibrates. Nothing evolves after it.
+    """
+    posterior = fitted(attempt, "posterior")
+    return search(attempt, tried_under(attempt.repertoire(), [posterior], attempt.replicate))
+
+
+def trial_and_error_posterior(attempt: Attempt) -> Champion:
+    """As `trial_and_error`, with a repertoire from the calibrated simulator, whose trials draw robots of the posterior.
+
+    The scores are averages over the draws. Half of the budget calibrates.
+    """
+    return search(attempt, attempt.repertoire(fitted(attempt, "posterior")))
+
+
+def trial_and_error_damage(attempt: Attempt) -> Champion:
+    """As `trial_and_error`, with a repertoire for the intact robot and for each suspected damage.
+
+    The repertoires share the trials in simulation. Their best elites are tried under each damage. The trials on the
+    target weigh the damages, by the likelihood of the score and by the distance of the visited cells to those in
+    simulation.
+    """
+    return search(attempt, attempt.repertoire(*damaged_conditions(attempt.condition)))
+
+
+def trial_and_error_combined(attempt: Attempt) -> Champion:
+    """As `trial_and_error_damage`, with one more repertoire from the calibrated simulator.
+
+    Half of the budget calibrates.
+    """
+    posterior = fitted(attempt, "posterior")
+    return search(attempt, attempt.repertoire(posterior, *damaged_conditions(attempt.condition)))
+
+
+def damaged_conditions(condition: Condition) -> list[Condition]:
+    """Return the condition with the intact robot, and with each suspected damage of it.
+
+    Raises:
+        StudyError: It is not on platform `sim`, which alone has numbers to change.
+    """
+    sim = needs_sim(condition, "trial-and-error-damage")
+    return [
+        changed_condition(condition, name, set={**sim.set, **numbers}) if numbers else condition
+        for name, numbers in suspected_damages(sim.model.centers()).items()
+    ]
+
+
+def suspected_damages(numbers: Mapping[str, float]) -> dict[str, dict[str, float]]:
+    """Return the numbers of a robot that each suspected damage changes, from its numbers when it is intact.
+
+    A wheel is weak or dead, both are weak, such as under a load, a sensor is blind, or the robot pulls to a side.
+    """
+    left, right = (f"drive.gain_{side}" for side in ("left", "right"))
+    damages: dict[str, dict[str, float]] = {"intact": {}}
+    for share in WEAK:
+        damages |= {f"{wheel}-x-{share:g}": {wheel: share * numbers[wheel]} for wheel in (left, right)}
+    for share in LOADED:
+        damages[f"drive.gains-x-{share:g}"] = {wheel: share * numbers[wheel] for wheel in (left, right)}
+    damages |= {f"drive.drift_per_m-{drift:g}": {"drive.drift_per_m": drift} for drift in PULLS}
+    blind = (name for name in numbers if SENSOR.fullmatch(name))
+    return damages | {f"{name}-x-{DEAD:g}": {name: DEAD * numbers[name]} for name in blind}
+
+
+def search(attempt: Attempt, repertoire: Repertoire) -> Champion:
+    """Spend the rest of the budget on elites of a repertoire, and return the one of the highest expected score.
+
+    Its score in simulation is the mean over the simulations, as the trials weigh them.
+    """
+    simulated = repertoire.simulated
+    low, high = attempt.condition.task_of_trials.score_range
+    if not np.isfinite(high - low):  # a score without range has that of the elites
+        low, high = float(simulated.min()), float(simulated.max())
+    scale = high - low or 1.0
+    process = PriorProcess(
+        repertoire.descriptors,
+        (simulated - low) / scale,
+        spread=SPREAD,
+        offset=OFFSET,
+        noise=np.maximum(repertoire.variances / scale**2, LEAST_VARIANCE),
+    )
+    while attempt.left and (attempt.stop_at is None or not process.is_enough(attempt.stop_at)):
+        k = process.choose(KAPPA)
+        (score,), (cells,) = attempt.try_on_target([repertoire.champions[k].genome])
+        process.tell(k, (score - low) / scale)
+        if cells and len(repertoire.visits) > 1:
+            visits = repertoire.visits[:, k]
+            on_target = np.zeros((1, visits.shape[1]))
+            on_target[0, list(cells)] = 1.0
+            process.weigh(-distances(visits, on_target)[:, 0] / UNLIKELY)
+    best = int(process.predict().mean.argmax())
+    expected = float(process.weights @ simulated[:, best])
+    return replace(repertoire.champions[best], simulated=expected)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,22 +19,33 @@ from .repertoire import Repertoire, tried_under
 from .simulated import Champion
 from .transferability import distances
 
-SPREAD, OFFSET = 0.1, 0.1
-"""Standard deviations of the difference to the simulation, as shares of the range of scores: from one behavior to
-another, and of all together."""
 
-KAPPA = 1.0
-"""Weight of the standard deviation in the choice of the next trial. With 0.05, as in the source, the search tries the
-same elite again and again."""
+class SearchRules(NamedTuple):
+    """The numbers of a search, for scores from 0 to 1.
 
-LEAST_VARIANCE = 0.001
-"""Least variance of a trial on that scale (Cully and others 2015)."""
+    They are among those that did best on damaged robots on `sim`: `python benchmarks/recovery.py parameters`.
+
+    Attributes:
+        spread: Standard deviation of the difference to the simulation from one behavior to another.
+        offset: Standard deviation of a difference that all behaviors share.
+        kappa: Weight of the standard deviation in the choice of the next trial. With 0.05, as in the source, the search
+            tries the same elite again and again.
+        unlikely: Generalized Jaccard distance between visited cells that makes a damage less likely by the factor e;
+            infinite to compare scores alone.
+        least_variance: Least variance of a trial (Cully and others 2015).
+    """
+
+    spread: float = 0.1
+    offset: float = 0.1
+    kappa: float = 1.0
+    unlikely: float = 0.1
+    least_variance: float = 0.001
+
+
+RULES = SearchRules()
 
 DEAD = 0.01
 """Share of the number of a part that does next to nothing; 0 is refused."""
-UNLIKELY = 0.1
-"""Generalized Jaccard distance between visited cells that makes a damage less likely by the factor e."""
-
 WEAK = (DEAD, 0.3, 0.6)
 """Shares of the gain of one wheel under suspected damages."""
 LOADED = (0.5, 0.75)
@@ -124,7 +136,7 @@ def suspected_damages(numbers: Mapping[str, float]) -> dict[str, dict[str, float
     return damages | {f"{name}-x-{DEAD:g}": {name: DEAD * numbers[name]} for name in blind}
 
 
-def search(attempt: Attempt, repertoire: Repertoire) -> Champion:
+def search(attempt: Attempt, repertoire: Repertoire, rules: SearchRules = RULES) -> Champion:
     """Spend the rest of the budget on elites of a repertoire, and return the one of the highest expected score.
 
     Its score in simulation is the mean over the simulations, as the trials weigh them.
@@ -137,19 +149,19 @@ def search(attempt: Attempt, repertoire: Repertoire) -> Champion:
     process = PriorProcess(
         repertoire.descriptors,
         (simulated - low) / scale,
-        spread=SPREAD,
-        offset=OFFSET,
-        noise=np.maximum(repertoire.variances / scale**2, LEAST_VARIANCE),
+        spread=rules.spread,
+        offset=rules.offset,
+        noise=np.maximum(repertoire.variances / scale**2, rules.least_variance),
     )
     while attempt.left and (attempt.stop_at is None or not process.is_enough(attempt.stop_at)):
-        k = process.choose(KAPPA)
+        k = process.choose(rules.kappa)
         (score,), (cells,) = attempt.try_on_target([repertoire.champions[k].genome])
         process.tell(k, (score - low) / scale)
         if cells and len(repertoire.visits) > 1:
             visits = repertoire.visits[:, k]
             on_target = np.zeros((1, visits.shape[1]))
             on_target[0, list(cells)] = 1.0
-            process.weigh(-distances(visits, on_target)[:, 0] / UNLIKELY)
+            process.weigh(-distances(visits, on_target)[:, 0] / rules.unlikely)
     best = int(process.predict().mean.argmax())
     expected = float(process.weights @ simulated[:, best])
     return replace(repertoire.champions[best], simulated=expected)

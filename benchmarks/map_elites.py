@@ -19,6 +19,7 @@ import json
 import statistics
 import time
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -125,6 +126,7 @@ def pyribs() -> float:
     emitter = GaussianEmitter(archive, sigma=1.0, x0=np.zeros(2 * n_inputs), batch_size=BATCH, seed=SEED)
     scheduler = Scheduler(archive, [emitter])
     platform, describe = SimPlatform(), condition.archive.describe
+    trials = SimpleNamespace(arena=arena, n_steps=platform.steps)
     began = time.perf_counter()
     for batch in range(SPEED_BATCHES):
         genomes = [
@@ -135,15 +137,8 @@ def pyribs() -> float:
         tried = try_genomes(
             platform, arena, genomes, noise=0.0, noise_key=key, inputs=condition.network_inputs
         )
-        scheduler.tell(tried.coverage_line, describe(TriedCells(tried), arena, platform.steps))
+        scheduler.tell(tried.coverage_line, describe(SimpleNamespace(batch=tried), trials))
     return BATCH * SPEED_BATCHES / (time.perf_counter() - began)
-
-
-class TriedCells:
-    """What `ArchiveSettings.describe` reads of trials by cells."""
-
-    def __init__(self, batch: Any) -> None:
-        self.batch = batch
 
 
 def speed() -> dict[str, Any]:

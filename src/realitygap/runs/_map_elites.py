@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Annotated, Literal, NamedTuple, Self
+from typing import Annotated, Any, Literal, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,7 @@ from realitygap.kernels.neat.block import RunRules, Runs
 from realitygap.kernels.neat.elites import Cells, Elites, make_elites
 from realitygap.kernels.neat.genome import Genomes, NeatRules
 from realitygap.settings import Settings, as_tuple
-from realitygap.trials import Tried
+from realitygap.trials import PlatformTrials, Tried
 from realitygap.world import Arena
 
 Floats = NDArray[np.float64]
@@ -24,7 +24,12 @@ Floats = NDArray[np.float64]
 REGIONS = (3, 2)
 """Columns and rows of regions of an arena whose shares of the visited cells are descriptors."""
 
-DescriptorName = Literal["mean_turn", "mean_move", "stall_share", "end", "region_share"]
+STAGES = 3
+"""Places along a path: the last is its end."""
+
+DescriptorName = Literal[
+    "mean_turn", "turn_spread", "mean_move", "stall_share", "wall_share", "end", "path", "region_share"
+]
 
 
 class Descriptor(NamedTuple):
@@ -33,29 +38,35 @@ class Descriptor(NamedTuple):
     Attributes:
         names: Names of its numbers.
         ranges: Returns lowest and highest value of each in an arena.
-        of: Returns the numbers, (t, d), of t trials with a number of steps in an arena.
+        of: Returns the numbers, (t, d), of t trials that were tried by some trials.
         needs_trace: True if it needs every step.
         is_shares: True if its numbers add up to 1.
     """
 
     names: tuple[str, ...]
     ranges: Callable[[Arena], tuple[tuple[float, float], ...]]
-    of: Callable[[Tried, Arena, int], Floats]
+    of: Callable[[Tried, PlatformTrials], Floats]
     needs_trace: bool = False
     is_shares: bool = False
 
 
-def _ended(tried: Tried, arena: Arena, n_steps: int) -> Floats:
-    return np.add(tried.ended, [arena.start.x, arena.start.y])
+def _ended(tried: Tried, trials: PlatformTrials) -> Floats:
+    return np.add(tried.ended, trials.arena.start[:2])
+
+
+def _path(tried: Tried, trials: PlatformTrials) -> Floats:
+    steps = [stage * trials.n_steps // STAGES for stage in range(1, STAGES + 1)]
+    places = np.moveaxis(tried.trace.poses[steps, :2].astype(np.float64), 2, 0) + trials.arena.start[:2]
+    return np.reshape(places, (len(places), -1))
 
 
 def _limits(arena: Arena) -> tuple[tuple[float, float], ...]:
     return (arena.grid.x, arena.grid.right_end), (arena.grid.y, arena.grid.upper_end)
 
 
-def _region_shares(tried: Tried, arena: Arena, n_steps: int) -> Floats:
+def _region_shares(tried: Tried, trials: PlatformTrials) -> Floats:
     """Shares of the visited cells, whose sum is 1: their number itself would be coverage."""
-    grid, (across, up) = arena.grid, REGIONS
+    grid, (across, up) = trials.arena.grid, REGIONS
     row, column = np.divmod(np.arange(grid.n_cells), grid.columns)
     region = (column * across // grid.columns) + across * (row * up // grid.rows)
     cells, n = tried.batch.cells, tried.batch.n_line
@@ -65,20 +76,29 @@ def _region_shares(tried: Tried, arena: Arena, n_steps: int) -> Floats:
     return counts / np.maximum(n, 1)[:, None]
 
 
-def _stall_shares(tried: Tried, arena: Arena, n_steps: int) -> Floats:
-    return np.divide(tried.batch.n_stalls, n_steps)[:, None]
+def _stall_shares(tried: Tried, trials: PlatformTrials) -> Floats:
+    return np.divide(tried.batch.n_stalls, trials.n_steps)[:, None]
 
 
-def _mean_over_steps(values: NDArray[np.floating]) -> Floats:
+def _wall_shares(tried: Tried, trials: PlatformTrials) -> Floats:
+    nearest = tried.distances[1:].min(axis=1, initial=np.inf) * trials.distance_unit
+    return _mean_over_steps(nearest < trials.arena.grid.cell)
+
+
+def _mean_over_steps(values: NDArray[Any]) -> Floats:
     return np.asarray(values.mean(axis=0, dtype=np.float64)[:, None], np.float64)
 
 
-def _mean_move(tried: Tried, arena: Arena, n_steps: int) -> Floats:
+def _mean_move(tried: Tried, trials: PlatformTrials) -> Floats:
     return _mean_over_steps(np.abs(tried.trace.commands[:, 0]))
 
 
-def _mean_turn(tried: Tried, arena: Arena, n_steps: int) -> Floats:
+def _mean_turn(tried: Tried, trials: PlatformTrials) -> Floats:
     return _mean_over_steps(tried.trace.commands[:, 1])
+
+
+def _turn_spread(tried: Tried, trials: PlatformTrials) -> Floats:
+    return np.asarray(tried.trace.commands[:, 1].std(axis=0, dtype=np.float64)[:, None], np.float64)
 
 
 def _unit(n: int) -> Callable[[Arena], tuple[tuple[float, float], ...]]:
@@ -87,9 +107,17 @@ def _unit(n: int) -> Callable[[Arena], tuple[tuple[float, float], ...]]:
 
 DESCRIPTORS: dict[DescriptorName, Descriptor] = {
     "mean_turn": Descriptor(("mean_turn",), lambda arena: ((-1.0, 1.0),), _mean_turn, needs_trace=True),
+    "turn_spread": Descriptor(("turn_spread",), _unit(1), _turn_spread, needs_trace=True),
     "mean_move": Descriptor(("mean_move",), _unit(1), _mean_move, needs_trace=True),
     "stall_share": Descriptor(("stall_share",), _unit(1), _stall_shares),
+    "wall_share": Descriptor(("wall_share",), _unit(1), _wall_shares, needs_trace=True),
     "end": Descriptor(("end_x", "end_y"), _limits, _ended),
+    "path": Descriptor(
+        tuple(f"path_{axis}_{stage}" for stage in range(1, STAGES + 1) for axis in "xy"),
+        lambda arena: _limits(arena) * STAGES,
+        _path,
+        needs_trace=True,
+    ),
     "region_share": Descriptor(
         tuple(f"region_{column}_{row}" for row in range(REGIONS[1]) for column in range(REGIONS[0])),
         _unit(math.prod(REGIONS)),
@@ -115,9 +143,11 @@ class ArchiveSettings(Settings):
         ("mean_turn", "mean_move", "stall_share"),
         min_length=1,
         max_length=len(DESCRIPTORS),
-        description="Numbers that describe a trial. mean_turn: mean turn command, -1..1. mean_move: mean size of the "
-        "move command. stall_share: share of blocked steps. end: x and y at the end [m]. region_share: shares of the "
-        "visited cells in 3 x 2 regions of the arena.",
+        description="Numbers that describe a trial. mean_turn: mean turn command, -1..1. turn_spread: standard "
+        "deviation of the turn command. mean_move: mean size of the move command. stall_share: share of blocked steps. "
+        "wall_share: share of steps after which a range sensor measures less than the side of a cell. end: x and y at "
+        "the end [m]. path: x and y after each third of the trial [m]. region_share: shares of the visited cells in "
+        "3 x 2 regions of the arena.",
     )
     cells: Annotated[tuple[int, ...], BeforeValidator(as_tuple)] = Field(
         (20, 10, 5),
@@ -167,11 +197,9 @@ class ArchiveSettings(Settings):
         """Return the lowest and the highest value of each number that describes a trial in an arena, (d, 2)."""
         return tuple(limits for each in self.descriptor for limits in DESCRIPTORS[each].ranges(arena))
 
-    def describe(self, tried: Tried, arena: Arena, n_steps: int) -> Floats:
-        """Return the numbers that describe t trials in an arena, (t, d)."""
-        return np.concatenate(
-            [DESCRIPTORS[each].of(tried, arena, n_steps) for each in self.descriptor], axis=1
-        )
+    def describe(self, tried: Tried, trials: PlatformTrials) -> Floats:
+        """Return the numbers, (t, d), that describe what was tried by some trials."""
+        return np.concatenate([DESCRIPTORS[each].of(tried, trials) for each in self.descriptor], axis=1)
 
     def cells_in(self, arena: Arena, key: int) -> Cells:
         """Return the cells in an arena as kernels read them; the centroids of a CVT depend on a key."""

@@ -47,6 +47,8 @@ def drive_by(page, shown: playwright.Locator, press: Callable[[], None], let_go:
             shown.first.wait_for(timeout=5000)
             return
         let_go()
+        with contextlib.suppress(playwright.TimeoutError):
+            page.get_by_text(re.compile("^Standing")).first.wait_for(timeout=5000)
         if blocked.is_visible() and start.is_visible():
             start.click()
     raise AssertionError("the robot does not drive")

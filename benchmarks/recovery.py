@@ -41,7 +41,7 @@ from realitygap.stats import mean_interval
 from realitygap.study import choose_condition, transfer
 from realitygap.study._transfer.attempt import Simulation
 from realitygap.study._transfer.noise import changed_condition
-from realitygap.study._transfer.repertoire import joined, tried_under
+from realitygap.study._transfer.repertoire import finalists, joined, tried_under
 from realitygap.study._transfer.simulated import crossed_cells, try_repeatedly
 from realitygap.study._transfer.trial_and_error import SearchRules, damaged_conditions, search
 from realitygap.trials import NoiseKey
@@ -267,7 +267,7 @@ def parameters() -> dict[str, Any]:
     best = []
     for replicate in range(REPLICATES):
         simulation, conditions = Simulation(RUNS, REPEATS), damaged_conditions(condition)
-        each = [simulation.repertoire(one, replicate, len(conditions)) for one in conditions]
+        each = [finalists(simulation.repertoire(one, replicate, len(conditions))) for one in conditions]
         repertoire = tried_under(joined(each), conditions, replicate)
         genomes = [champion.genome for champion in repertoire.champions]
         place = {id(genome): k for k, genome in enumerate(genomes)}

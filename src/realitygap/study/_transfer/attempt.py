@@ -16,7 +16,7 @@ from realitygap.world import Calibration, RobotModel
 
 from .._kept_target import KeptTarget
 from .._targets import open_trials
-from .repertoire import Repertoire, evolve_repertoire, joined, repertoire_condition, tried_under
+from .repertoire import Repertoire, evolve_repertoire, repertoire_condition
 from .simulated import Champion, evolve_champions
 
 
@@ -117,11 +117,9 @@ class Attempt:
         """Return champions evolved under a condition, the attempt's own by default; the best in simulation first."""
         return self.simulation.champions(condition or self.condition, self.replicate)
 
-    def repertoire(self, *conditions: Condition) -> Repertoire:
-        """Return a repertoire evolved under a condition, the attempt's own by default, or under each of several."""
-        evolving = conditions or (self.condition,)
-        each = [self.simulation.repertoire(one, self.replicate, len(evolving)) for one in evolving]
-        return each[0] if len(each) == 1 else tried_under(joined(each), evolving, self.replicate)
+    def repertoire(self, condition: Condition | None = None, parts: int = 1) -> Repertoire:
+        """Return a repertoire evolved under a condition, the attempt's own by default; see `Simulation.repertoire`."""
+        return self.simulation.repertoire(condition or self.condition, self.replicate, parts)
 
     def try_on_target(self, genomes: Sequence[Genome]) -> tuple[list[float], list[tuple[int, ...]]]:
         """Try genomes on the target, once each; the score of each, and the cells that it visited, if they are known."""

@@ -107,11 +107,23 @@ def evolve_repertoire(condition: Condition, replicate: int) -> Repertoire:
     )
 
 
+def finalists(repertoire: Repertoire) -> Repertoire:
+    """Return the best elites of a repertoire."""
+    n = FINALISTS
+    return Repertoire(
+        repertoire.champions[:n],
+        repertoire.descriptors[:n],
+        repertoire.variances[:n],
+        repertoire.simulated[:, :n],
+        repertoire.visits[:, :n],
+    )
+
+
 def joined(repertoires: Sequence[Repertoire]) -> Repertoire:
-    """Return the best elites of several repertoires as one; it has no scores yet in all their simulations."""
-    champions = tuple(each for one in repertoires for each in one.champions[:FINALISTS])
-    parts = [(one.descriptors[:FINALISTS], one.variances[:FINALISTS]) for one in repertoires]
-    descriptors, variances = (np.concatenate(each) for each in zip(*parts, strict=True))
+    """Return several repertoires as one; it has no scores yet in all their simulations."""
+    champions = tuple(each for one in repertoires for each in one.champions)
+    descriptors = np.concatenate([one.descriptors for one in repertoires])
+    variances = np.concatenate([one.variances for one in repertoires])
     visits = np.empty((0, len(champions), repertoires[0].visits.shape[2]))
     return Repertoire(champions, descriptors, variances, np.empty((0, len(champions))), visits)
 

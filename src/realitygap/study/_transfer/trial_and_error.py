@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -15,7 +15,7 @@ from realitygap.runs import Condition
 from .attempt import Attempt
 from .calibrated import fitted
 from .noise import changed_condition, needs_sim
-from .repertoire import Repertoire, tried_under
+from .repertoire import Repertoire, finalists, joined, tried_under
 from .simulated import Champion
 from .transferability import distances
 
@@ -95,16 +95,22 @@ def trial_and_error_damage(attempt: Attempt) -> Champion:
     target weigh the damages, by the likelihood of the score and by the distance of the visited cells to those in
     simulation.
     """
-    return search(attempt, attempt.repertoire(*damaged_conditions(attempt.condition)))
+    conditions = damaged_conditions(attempt.condition)
+    each = [finalists(attempt.repertoire(one, len(conditions))) for one in conditions]
+    return search(attempt, tried_under(joined(each), conditions, attempt.replicate))
 
 
 def trial_and_error_combined(attempt: Attempt) -> Champion:
-    """As `trial_and_error_damage`, with one more repertoire from the calibrated simulator.
+    """As `trial_and_error_posterior`, with the repertoires of `trial_and_error_damage` in addition.
 
-    Half of the budget calibrates.
+    Half of the budget calibrates. The calibrated simulator gets half of the trials in simulation, and is as probable
+    beforehand as all damages together.
     """
-    posterior = fitted(attempt, "posterior")
-    return search(attempt, attempt.repertoire(posterior, *damaged_conditions(attempt.condition)))
+    posterior, damages = fitted(attempt, "posterior"), damaged_conditions(attempt.condition)
+    each = [attempt.repertoire(posterior, 2)]
+    each += [finalists(attempt.repertoire(one, 2 * len(damages))) for one in damages]
+    repertoire = tried_under(joined(each), [posterior, *damages], attempt.replicate)
+    return search(attempt, repertoire, expected=[len(damages), *[1] * len(damages)])
 
 
 def damaged_conditions(condition: Condition) -> list[Condition]:
@@ -136,10 +142,21 @@ def suspected_damages(numbers: Mapping[str, float]) -> dict[str, dict[str, float
     return damages | {f"{name}-x-{DEAD:g}": {name: DEAD * numbers[name]} for name in blind}
 
 
-def search(attempt: Attempt, repertoire: Repertoire, rules: SearchRules = RULES) -> Champion:
+def search(
+    attempt: Attempt,
+    repertoire: Repertoire,
+    rules: SearchRules = RULES,
+    expected: Sequence[float] | None = None,
+) -> Champion:
     """Spend the rest of the budget on elites of a repertoire, and return the one of the highest expected score.
 
     Its score in simulation is the mean over the simulations, as the trials weigh them.
+
+    Args:
+        attempt: The attempt.
+        repertoire: The repertoire, with scores in h simulations.
+        rules: Numbers of the search.
+        expected: (h,) how probable each simulation is before a trial, up to a factor; all alike if not given.
     """
     simulated = repertoire.simulated
     low, high = attempt.condition.task_of_trials.score_range
@@ -153,6 +170,8 @@ def search(attempt: Attempt, repertoire: Repertoire, rules: SearchRules = RULES)
         offset=rules.offset,
         noise=np.maximum(repertoire.variances / scale**2, rules.least_variance),
     )
+    if expected is not None:
+        process.weigh(np.log(expected))
     while attempt.left and (attempt.stop_at is None or not process.is_enough(attempt.stop_at)):
         k = process.choose(rules.kappa)
         (score,), (cells,) = attempt.try_on_target([repertoire.champions[k].genome])
@@ -163,5 +182,5 @@ def search(attempt: Attempt, repertoire: Repertoire, rules: SearchRules = RULES)
             on_target[0, list(cells)] = 1.0
             process.weigh(-distances(visits, on_target)[:, 0] / rules.unlikely)
     best = int(process.predict().mean.argmax())
-    expected = float(process.weights @ simulated[:, best])
-    return replace(repertoire.champions[best], simulated=expected)
+    worth = float(process.weights @ simulated[:, best])
+    return replace(repertoire.champions[best], simulated=worth)

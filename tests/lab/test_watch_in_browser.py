@@ -56,6 +56,54 @@ def test_a_study_is_shown_in_figures_and_its_trials_are_played(lab, visit):
     assert "step 87 of 87" in player.locator(".rg-clock").text_content()
 
 
+ARCHIVE = """
+[study]
+name = "maps"
+replicates = 2
+
+[neat]
+population = 30
+generations = 5
+
+[[condition]]
+name = "coverage"
+
+[[condition]]
+name = "elites"
+platform = "sim"
+selection = "map-elites"
+archive = { descriptor = ["end", "stall_share"], cells = [5, 4, 2] }
+"""
+
+
+@pytest.mark.parametrize("size", [DESKTOP, PHONE])
+def test_a_cell_of_an_archive_is_tapped_and_its_trial_plays(lab, visit, size):
+    run_study(parse_study(ARCHIVE, "study.toml"), lab.root / "maps")
+    page = visit("study/maps", size=size)
+    page.get_by_role("tab", name="Replay").click()
+    replay = page.locator(".lab-replay")
+    replay.locator(".rg-player").wait_for()
+    assert replay.locator(".lab-elites").count() == 0  # the first condition has no archive
+    page.get_by_label("Condition", exact=True).click()
+    page.get_by_role("option", name="elites").click()
+    maps = replay.locator(".lab-elites svg")
+    maps.nth(1).wait_for()
+    assert maps.count() == 2
+    elite = maps.first.get_by_role("button").last
+    words = elite.get_attribute("aria-label")
+    generation, individual = re.search(r"generation (\d+), individual (\d+)", words).groups()
+    elite.click()
+    title = f"generation {generation}, individual {individual}"
+    replay.locator(".rg-player").get_by_text(title).first.wait_for()
+    expect(page.get_by_label("Generation", exact=True)).to_have_value(generation)
+    expect(page.get_by_label("Individual", exact=True)).to_have_value(individual)
+    maps.first.locator("[tabindex='0']").press("ArrowDown")
+    page.keyboard.press("Enter")
+    focused = page.evaluate("document.activeElement.getAttribute('aria-label')")
+    title = re.search(r"generation \d+, individual \d+", focused).group()
+    replay.locator(".rg-player").get_by_text(title).first.wait_for()
+
+
 def test_compare_adds_up_to_three_trials_to_the_one_that_plays(lab, visit):
     carry_out(lab.root)
     page = visit("study/seen")

@@ -14,7 +14,7 @@ from collections import deque
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 from pydantic import TypeAdapter
@@ -35,6 +35,7 @@ from realitygap.report import (
     draw_paths,
     draw_scores,
     draw_species,
+    elite_maps,
     read_tally,
     summarize,
     touch_network,
@@ -52,6 +53,7 @@ DrawingWish = (
     | messages.ThumbnailWish
     | messages.ReplayWish
     | messages.RunWish
+    | messages.ArchiveWish
     | messages.TouchWish
     | messages.ReportWish
 )
@@ -71,7 +73,13 @@ IDLE_S = 600.0
 """Time without a wish after which the process ends; the next wish starts another [s]."""
 _POLITE = 10
 """Lowers the priority of the process below that of studies."""
-_QUICK = (messages.ReplayWish, messages.RunWish, messages.TouchWish, messages.ReportWish)
+_QUICK = (
+    messages.ReplayWish,
+    messages.RunWish,
+    messages.ArchiveWish,
+    messages.TouchWish,
+    messages.ReportWish,
+)
 """Wishes that are granted between two figures, because a visitor waits for them."""
 _DIGITS = 4
 MOST_GENERATIONS, MOST_PATHS, MOST_SLOW = 40, 12, 20
@@ -159,12 +167,8 @@ class _Wishes:
     def __init__(self, channel: Channel) -> None:
         self._queue: queue.Queue[DrawingWish] = queue.Queue()
         self._waiting: deque[DrawingWish] = deque()
-        channel.at_once(messages.FiguresWish, self._queue.put)
-        channel.at_once(messages.ThumbnailWish, self._queue.put)
-        channel.at_once(messages.ReplayWish, self._queue.put)
-        channel.at_once(messages.RunWish, self._queue.put)
-        channel.at_once(messages.TouchWish, self._queue.put)
-        channel.at_once(messages.ReportWish, self._queue.put)
+        for kind in get_args(DrawingWish):
+            channel.at_once(kind, self._queue.put)
 
     def next(self, timeout: float) -> DrawingWish | None:
         """Return the first quick wish, otherwise the first one; None if none comes in this time [s]."""
@@ -201,6 +205,9 @@ def _grant(channel: Channel, wish: DrawingWish, wishes: _Wishes) -> None:
                 channel.say(_replay(folder, wish))
             case messages.RunWish():
                 channel.say(_paths_of_run(folder, wish))
+            case messages.ArchiveWish():
+                maps = elite_maps(ResultsFolder.open(folder), wish.condition)
+                channel.say(messages.Archive(wish.folder, wish.key, {} if maps is None else maps._asdict()))
             case messages.TouchWish():
                 moving, weights, inputs = touch_network(folder, wish.weights, wish.cut, **wish.choice)
                 scene = pack_scene(moving[0].arena, "As evolved, and changed")
@@ -213,7 +220,7 @@ def _grant(channel: Channel, wish: DrawingWish, wishes: _Wishes) -> None:
         match wish:
             case messages.FiguresWish() if not wish.condition:
                 channel.say(messages.FiguresDrawn(wish.folder, 0.0))
-            case messages.ReplayWish() | messages.RunWish() | messages.TouchWish():
+            case messages.ReplayWish() | messages.RunWish() | messages.ArchiveWish() | messages.TouchWish():
                 channel.say(messages.ReplayRefused(wish.folder, wish.key, str(error)))
             case messages.ReportWish():
                 channel.say(messages.ReportWritten(wish.folder, str(error)))

@@ -398,6 +398,14 @@ class ReplayWish(Wish):
     choices: list[TrialChoice]
 
 
+class ArchiveWish(Wish):
+    """List the elites of the typical run of a condition; the answer has the same key."""
+
+    folder: str
+    key: str
+    condition: str
+
+
 class TouchWish(Wish):
     """Run a trial again with other weights by link, and without some inputs; the answer has the same key."""
 
@@ -802,8 +810,15 @@ class Replay(StudyReport):
     generations: list[GenerationPaths] = field(default_factory=list)
 
 
+class Archive(StudyReport):
+    """The elites of a run, as `EliteMaps` has them; none if the condition has no archive."""
+
+    key: str
+    maps: dict[str, Any]
+
+
 class ReplayRefused(StudyReport):
-    """The trials of this key cannot be played."""
+    """The trials of this key cannot be played, or its elites not listed."""
 
     key: str
     text: str

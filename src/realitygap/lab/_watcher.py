@@ -48,6 +48,7 @@ class Watcher:
         rows: Condition, label, number of runs, median best coverage, and its interval, for each condition.
         curves: Best coverage of each condition by generation, as `curves_of` returns it.
         replays: What was asked to be played, by the key of who asked; or why it cannot be.
+        archives: The elites of the typical run of each condition; or why they cannot be listed.
         report_problem: Why no report could be written; empty otherwise.
         report_stamp: Changes whenever one was written, or could not be.
 
@@ -63,6 +64,7 @@ class Watcher:
         self.rows: list[messages.SummaryRow] = []
         self.curves: list[messages.Curve] = []
         self.replays: dict[str, messages.Replay | messages.ReplayRefused] = {}
+        self.archives: dict[str, messages.Archive | messages.ReplayRefused] = {}
         self.report_problem = ""
         self.report_stamp = 0
         self._folder, self._drawer, self._changed = folder, drawer, changed
@@ -73,6 +75,7 @@ class Watcher:
         self._not_before = 0.0
         self._is_drawing = False
         self._typical: set[str] = set()
+        self._archive_of: dict[str, tuple[int, int, bool] | None] = {}
         self._drawn_of: dict[str, tuple[int, int, bool] | None] = {}
         self._version = 0
         self._thumbnail: tuple[int, int] | None = None
@@ -137,6 +140,13 @@ class Watcher:
         key = f"run {self.n_drawn if is_last else self._stamp} {condition}"
         return self._once(messages.RunWish(str(self._folder), key, condition, is_last))
 
+    def archive(self, condition: str) -> messages.Archive | messages.ReplayRefused | None:
+        """Return the elites of the typical run of a condition, or why there are none; ask and return None before."""
+        if condition not in self._archive_of or self._archive_of[condition] != self._stamp:
+            self._archive_of[condition] = self._stamp
+            self._want(messages.ArchiveWish(str(self._folder), condition, condition))
+        return self.archives.get(condition)
+
     def _once(
         self, wish: messages.ReplayWish | messages.RunWish
     ) -> messages.Replay | messages.ReplayRefused | None:
@@ -188,6 +198,10 @@ class Watcher:
                 self._due = now + max(LEAST_S, pause)
             case messages.StudySummary():
                 self.rows, self.curves = message.rows, message.curves
+            case messages.Archive():
+                self.archives[message.key] = message
+            case messages.ReplayRefused() if message.key in self._archive_of:
+                self.archives[message.key] = message
             case messages.Replay() | messages.ReplayRefused():
                 self.replays[message.key] = message
             case messages.ReportWritten():
@@ -195,6 +209,9 @@ class Watcher:
                 self.report_stamp += 1
             case messages.Ended():
                 self._typical.intersection_update(self.replays)
+                self._archive_of = {
+                    name: of for name, of in self._archive_of.items() if name in self.archives
+                }
                 for condition in list(self._drawn_of):
                     if not any(name.endswith(f"-{condition}") for name in list(self.figures)):
                         del self._drawn_of[condition]

@@ -26,7 +26,7 @@ from realitygap.report._comparisons import compare_conditions
 from realitygap.report._distance_audit import DistanceAudit, audit_distance, distance_notes
 from realitygap.report._distance_figure import draw_distance, save_distance
 from realitygap.report._divergence_figure import compare_trials, save_divergence
-from realitygap.report._elites_figure import draw_elites
+from realitygap.report._elites_figure import EliteMaps, draw_elites, elite_maps
 from realitygap.report._files import export_frame, export_individual
 from realitygap.report._formats import check_ending, save_drawing
 from realitygap.report._gap_figures import draw_gap_pairs
@@ -56,6 +56,7 @@ __all__ = [
     "DistanceAudit",
     "Drawing",
     "Each",
+    "EliteMaps",
     "Subject",
     "TableOnPage",
     "Tally",
@@ -86,6 +87,7 @@ __all__ = [
     "draw_scores",
     "draw_species",
     "draw_trial",
+    "elite_maps",
     "export_frame",
     "export_individual",
     "family_table",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 from urllib.parse import quote
 
 import numpy as np
@@ -181,6 +181,65 @@ def _places(condition: Condition, cells: pl.Series) -> tuple[npt.NDArray[np.int6
     return z if slices > 1 else np.zeros_like(numbers), y, x
 
 
+def _shown(condition: Condition, elites: pl.DataFrame, cell: str, fitness: str) -> pl.DataFrame:
+    """Return the elites that maps show, the fittest of each place: its map, row, column, and value; the best first."""
+    slices, rows, columns = _places(condition, elites[cell])
+    placed = elites.select("generation", "individual", value=pl.col(fitness)).with_columns(
+        slice=slices, row=rows, column=columns
+    )
+    best = placed.sort("value", descending=True, maintain_order=True)
+    return best.unique(["slice", "row", "column"], keep="first", maintain_order=True)
+
+
+class EliteMaps(NamedTuple):
+    """The elites of an archive as found, to be chosen on maps.
+
+    Attributes:
+        title: Label, condition, and run.
+        replicate: Number of the run.
+        columns, rows: Number of places across and up.
+        axes: Names of the descriptors across and up; none for a CVT.
+        ranges: Lowest and highest value of these.
+        slices: Title of each map.
+        elites: Map, column, row, fitness, generation, and individual of each elite that is shown.
+    """
+
+    title: str
+    replicate: int
+    columns: int
+    rows: int
+    axes: tuple[str, ...]
+    ranges: tuple[tuple[float, float], ...]
+    slices: tuple[str, ...]
+    elites: tuple[tuple[int, int, int, float, int, int], ...]
+
+
+def elite_maps(folder: Results, condition: str) -> EliteMaps | None:
+    """Return the elites of the typical run of a condition; None if its selection is another one.
+
+    Raises:
+        RecordError: there is no such folder, a file in it is damaged, or it holds no trials yet.
+        ValueError: there is no such condition.
+    """
+    tally = read_tally(folder)
+    if condition not in [each["name"] for each in tally.selecting_by("map-elites")]:
+        return None
+    run = choose_run(tally, condition)
+    shown = _shown(run.condition, elites_of(run.condition, run.rows), "cell", "fitness")
+    n_slices, rows, columns = _shape(run.condition)
+    n_axes = 0 if run.condition.archive.kind == "cvt" else min(2, len(run.condition.archive.cells))
+    return EliteMaps(
+        f"{run.label}: {run.name}, run {run.replicate}",
+        run.replicate,
+        columns,
+        rows,
+        run.condition.archive.names[:n_axes],
+        run.condition.archive.ranges(run.arena)[:n_axes],
+        tuple(_slice(run.condition, k, n_slices) for k in range(n_slices)),
+        tuple(shown.select("slice", "column", "row", "value", "generation", "individual").iter_rows()),
+    )
+
+
 def _panels(
     what: str,
     run: ChosenRun,
@@ -189,13 +248,7 @@ def _panels(
     played: Collection[tuple[int, int]],
 ) -> list[Panel]:
     """Return the marks of the elites that maps show: the fittest of each place."""
-    cell, fitness = columns
-    slices, rows, columns_of = _places(run.condition, elites[cell])
-    placed = elites.select("generation", "individual", value=pl.col(fitness)).with_columns(
-        slice=slices, row=rows, column=columns_of
-    )
-    best = placed.sort("value", descending=True, maintain_order=True)
-    best = best.unique(["slice", "row", "column"], keep="first", maintain_order=True).head(MOST_MARKS // 2)
+    best = _shown(run.condition, elites, *columns).head(MOST_MARKS // 2)
     link = f"#replay={quote(run.name, safe='')}/{run.replicate}/"
     panels = []
     for k in range(_shape(run.condition)[0]):

@@ -282,6 +282,18 @@ class Generations(Element, component="generations.js"):
         self.update()
 
 
+class Elites(Element, component="elites.js"):
+    """Maps of the elites of an archive; a tap on one emits `choose` with its generation and individual.
+
+    Args:
+        maps: `EliteMaps` as a dictionary.
+    """
+
+    def __init__(self, maps: dict[str, Any]) -> None:
+        super().__init__()
+        self._props["shown"] = json.dumps(maps)  # one text, as in `Player`
+
+
 class Scatter(Element, component="scatter.js"):
     """Mean score of each controller on the simulator and on the target.
 

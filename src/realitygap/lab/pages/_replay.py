@@ -11,12 +11,12 @@ from realitygap.errors import StudyError
 from realitygap.lab._choices import Choices
 from realitygap.lab._lab import Lab
 from realitygap.lab._live import LiveJob, live_mistakes
-from realitygap.lab._messages import ReplayRefused, TrialChoice
+from realitygap.lab._messages import Archive, ReplayRefused, TrialChoice
 from realitygap.lab._mistakes import Mistakes
 from realitygap.lab._watcher import Watcher
 from realitygap.orders import Limits
 
-from ._elements import Player
+from ._elements import Elites, Player
 from ._fields import Form
 from ._frame import hint, section
 from ._part import Part
@@ -95,14 +95,18 @@ class Replays:
         self._form = form = Form()
         form.summary()
         with ui.element("div").classes("lab-fields"):
-            form.choice("condition", "Condition", self._conditions, self._conditions[0])
-            for key, label in _NUMBERS.items():
-                form.number(key, label, None, Limits(high=2**31))
+            self._condition = form.choice("condition", "Condition", self._conditions, self._conditions[0])
+            self._numbers = {
+                key: form.number(key, label, None, Limits(high=2**31)) for key, label in _NUMBERS.items()
+            }
         hint("If you don't choose a run, the run with the median best coverage is shown.")
         with ui.row().classes("lab-row"):
             ui.button("Show trial", on_click=lambda: self._play()).props("unelevated no-caps")
             ui.button("Compare", on_click=lambda: self._play(compares=True)).props("outline no-caps")
         hint(f"Compare adds the chosen trial to those shown, up to {MOST_TRIALS}.")
+        self._archive = Part(self._archive_state, self._show_archive)
+        self._archive.show()
+        self._condition.on_value_change(self._archive.look)
         self._stage = ui.refreshable(self._show_stage)
         self._stage()
         self._touch = Touch(self._watcher, lambda: self._choices[-1] if self._choices else None)
@@ -127,6 +131,7 @@ class Replays:
             if isinstance(self._watcher.replays[self._key], ReplayRefused):
                 self._choices = self._choices[:-1]
             self._stage.refresh()
+        self._archive.look()
         self._live.look()
         self._touch.look()
 
@@ -182,6 +187,26 @@ class Replays:
 
     def _drive(self, values: dict[str, Any]) -> None:
         self._lab.drive_live(self._name, values["platform"], _choice_of(values))
+
+    def _archive_state(self) -> Archive | ReplayRefused | None:
+        return self._watcher.archive(str(self._condition.value)) if self._has_played else None
+
+    def _show_archive(self, archive: Archive | ReplayRefused | None) -> None:
+        if isinstance(archive, ReplayRefused):
+            ui.label(archive.text).classes("lab-problem").props('role="alert"')
+        elif archive is not None and archive.maps:
+            section("Archive")
+            replicate = archive.maps["replicate"]
+            Elites(archive.maps).on("choose", lambda event: self._play_elite(replicate, event.args))
+
+    async def _play_elite(self, replicate: int, elite: Any) -> None:
+        """Show the trial of an elite, and enter its numbers, with which it can be driven."""
+        if not isinstance(elite, dict):
+            return
+        for key, number in {"replicate": replicate, **elite}.items():
+            if key in self._numbers and isinstance(number, int):
+                self._numbers[key].set_value(number)
+        await self._play()
 
     def _live_state(self) -> tuple[int, bool, bool] | None:
         job = self._lab.lives.get(self._name)

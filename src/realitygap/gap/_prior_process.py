@@ -42,9 +42,9 @@ class PriorProcess:
             process.tell(k, score_of(k))
         best = process.predict().mean.argmax()
 
-    Difference to the simulation: k(x, x') = offset² + spread² Matern(|x - x'| / length), smoothness 5/2. Several
-    simulations, such as one for each suspected damage, have a process each with the same kernel. The prediction is
-    their mixture, weighted by the likelihood of the trials under each.
+    Difference to the simulation: k(r) = offset² + spread² Matern(r / length) of the distance r between two
+    descriptors, with smoothness 5/2. Several simulations, such as one for each suspected damage, have a process each
+    with the same kernel. The prediction is their mixture, weighted by the likelihood of the trials under each.
 
     Source: Cully, Clune, Tarapore & Mouret (2015), Nature 521, "Intelligent Trial and Error" (offset 0, spread 1, one
     simulation); several priors as in Pautrat, Chatzilygeroudis & Mouret (2018), ICRA, which weighs the acquisition

@@ -205,8 +205,10 @@ class TransferOrder(Order):
     )
     runs: int = option(100, help="Evolutions in simulation per replicate.", at_least=1)
     repeats: int = option(8, help="Trials per individual in simulation.", at_least=1)
-    stop_at: Annotated[float, Field(gt=0, le=1)] | None = option(
+    stop_at: float | None = option(
         None,
+        above=0,
+        at_most=1,
         help="Strategies trial-and-error end when their best trial has this share of the highest predicted score, 0 to "
         "1.",
         default_is="use the whole budget",

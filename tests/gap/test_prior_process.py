@@ -142,6 +142,13 @@ def test_the_search_finds_the_best_arm_under_a_break():
     assert after < 0.1
 
 
+def test_trials_without_noise_may_be_repeated():
+    process = PriorProcess([[0.1], [0.2]], [0.5, 0.4], noise=1e-18)
+    for _ in range(3):
+        process.tell(0, 0.3)
+    assert process.predict().mean[0] == pytest.approx(0.3, abs=1e-6)
+
+
 def test_other_evidence_multiplies_the_likelihood_of_a_simulation():
     process = PriorProcess([[0.0], [1.0]], [[0.2, 0.4], [0.6, 0.8]])
     process.weigh([0.0, np.log(3)])
@@ -165,6 +172,8 @@ def test_other_evidence_multiplies_the_likelihood_of_a_simulation():
         ({"spread": -1}, "spread is -1"),
         ({"offset": -0.1}, "offset is -0.1"),
         ({"noise": 0}, "noise is 0"),
+        ({"noise": [0.1, 0.1, 0.1]}, "noise has shape"),
+        ({"simulated": np.empty((0, 2))}, "one score for each of 2 controllers"),
     ],
 )
 def test_wrong_arguments_are_refused(arguments, says):

@@ -32,8 +32,8 @@ VARIANTS: list[dict[str, Any]] = [
     {"platform": "sim", "archive": {"descriptor": ["mean_turn", "mean_move"], "cells": [6, 5]}},
     {"platform": "sim", "archive": {"descriptor": ["end", "stall_share"], "cells": [7, 4, 3], "repeats": 3}},
     {"archive": {"descriptor": ["stall_share", "region_share"], "kind": "cvt", "cells": [50]}},
-    {"platform": "sim", "archive": {"descriptor": ["turn_spread", "wall_share"], "cells": [6, 5]}},
-    {"archive": {"descriptor": ["wall_share", "path"], "kind": "cvt", "cells": [40]}},
+    {"platform": "sim", "archive": {"descriptor": ["turn_spread", "stall_share"], "cells": [6, 5]}},
+    {"archive": {"descriptor": ["mean_move", "path"], "kind": "cvt", "cells": [40]}},
     {"archive": {"crossover": 1.0, "descriptor": ["end"], "cells": [9, 9]}, "task": {"cells": "ends"}},
 ]
 
@@ -58,9 +58,6 @@ def described(condition: Condition, trace: Any) -> list[float]:
         elif name == "turn_spread":
             turns = trace.commands[:, 1]
             found.append(float(np.sqrt(np.mean((turns - turns.mean()) ** 2))))
-        elif name == "wall_share":
-            near = [min(distances) < arena.grid.cell for distances in trace.readings[1:]]
-            found.append(sum(near) / len(near))
         elif name == "path":
             steps = len(trace.commands)
             for at in (steps // 3, 2 * steps // 3, steps):

@@ -21,7 +21,7 @@ from realitygap.study._transfer.repertoire import (
 )
 from realitygap.study._transfer.simulated import evolve_champions, rank_genomes
 from realitygap.study._transfer.trial_and_error import damaged_conditions, suspected_damages
-from realitygap.world import paper_arena
+from realitygap.world import load_robot, paper_arena
 
 pytestmark = pytest.mark.slow
 
@@ -78,13 +78,29 @@ def test_pooled_elites_are_tried_under_every_condition(condition):
 
 
 def test_damages_are_of_every_wheel_and_sensor(condition):
-    numbers = condition.on.model.centers()
-    damages = suspected_damages(numbers)
+    damages = suspected_damages(condition.on.model)
     changed = {name for each in damages.values() for name in each}
     assert changed >= {"drive.gain_left", "drive.gain_right", "range.0.amplitude", "range.2.amplitude"}
     assert damages["intact"] == {}
     names = [each.name for each in damaged_conditions(condition)]
     assert len(set(names)) == len(names) == len(damages)
+
+
+@pytest.mark.parametrize(
+    ("robot", "number"),
+    [("pioneer", "range.15.reach"), ("khepera", "range.7.amplitude"), ("scribbler-s2", None)],
+)
+def test_a_blind_sensor_sees_nothing_whatever_its_response(robot, number):
+    damages = suspected_damages(load_robot(robot))
+    blind = {name for each in damages.values() for name in each if name.startswith("range.")}
+    assert blind == set() if number is None else number in blind
+    for each in damages.values():
+        load_robot(robot).with_numbers(each)
+
+
+def test_a_repertoire_sees_what_the_networks_of_its_condition_see():
+    novelty = choose_condition("sim-paper", "novelty-sim", 1)
+    assert repertoire_condition(novelty, 1000).network_inputs == novelty.network_inputs
 
 
 def test_a_suspected_damage_is_recognized_and_costs_less(tmp_path, condition):

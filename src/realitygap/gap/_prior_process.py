@@ -80,22 +80,31 @@ class PriorProcess:
             raise ValueError(
                 f"descriptors have shape {self._x.shape}, expected (m, d) with m and d of at least 1."
             )
-        if self._prior.ndim != 2 or self._prior.shape[1] != len(self._x):
+        if self._prior.ndim != 2 or self._prior.shape[1] != len(self._x) or not len(self._prior):
             raise ValueError(
                 f"simulated has shape {np.shape(simulated)}, expected one score for each of {len(self._x)} controllers."
             )
-        self._noise = np.broadcast_to(finite_numbers("noise", noise), len(self._x))
+        variances = finite_numbers("noise", noise)
+        if variances.shape not in ((), (len(self._x),)):
+            raise ValueError(
+                f"noise has shape {variances.shape}, expected one number, or one for each controller."
+            )
+        self._noise = np.broadcast_to(variances, len(self._x))
+        length, spread, offset = (
+            float(finite_numbers(name, value))
+            for name, value in (("length", length), ("spread", spread), ("offset", offset))
+        )
         for name, value, is_right in (
             ("length", length, length > 0),
             ("spread", spread, spread > 0),
             ("offset", offset, offset >= 0),
             ("noise", self._noise.min(), self._noise.min() > 0),
         ):
-            if not (is_right and math.isfinite(value)):
+            if not is_right:
                 raise ValueError(
                     f"{name} is {value}, expected a number {'>=' if name == 'offset' else '>'} 0."
                 )
-        self._length, self._spread, self._offset = float(length), float(spread), float(offset)
+        self._length, self._spread, self._offset = length, spread, offset
         self._evidence = np.zeros(len(self._prior))
         self._tried: list[int] = []
         self._scores: list[float] = []
@@ -168,7 +177,8 @@ class PriorProcess:
         if not self._tried:
             return _shares(self._evidence), self._prior, np.full(len(self._x), own)
         at = np.array(self._tried)
-        among = self._kernel(self._x[at], self._x[at]) + np.diag(self._noise[at])
+        # a little more, so that repeated trials without noise can be solved
+        among = self._kernel(self._x[at], self._x[at]) + np.diag(self._noise[at] + 1e-10 * own)
         factor = scipy.linalg.cho_factor(among, lower=True)
         across = self._kernel(self._x, self._x[at])
         residuals = np.array(self._scores) - self._prior[:, at]

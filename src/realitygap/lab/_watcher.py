@@ -76,6 +76,7 @@ class Watcher:
         self._is_drawing = False
         self._typical: set[str] = set()
         self._archive_of: dict[str, tuple[int, int, bool] | None] = {}
+        self._archives_due: set[str] = set()
         self._drawn_of: dict[str, tuple[int, int, bool] | None] = {}
         self._version = 0
         self._thumbnail: tuple[int, int] | None = None
@@ -144,6 +145,7 @@ class Watcher:
         """Return the elites of the typical run of a condition, or why there are none; ask and return None before."""
         if condition not in self._archive_of or self._archive_of[condition] != self._stamp:
             self._archive_of[condition] = self._stamp
+            self._archives_due.add(condition)
             self._want(messages.ArchiveWish(str(self._folder), condition, condition))
         return self.archives.get(condition)
 
@@ -198,10 +200,9 @@ class Watcher:
                 self._due = now + max(LEAST_S, pause)
             case messages.StudySummary():
                 self.rows, self.curves = message.rows, message.curves
-            case messages.Archive():
+            case messages.Archive() | messages.ReplayRefused() if message.key in self._archive_of:
                 self.archives[message.key] = message
-            case messages.ReplayRefused() if message.key in self._archive_of:
-                self.archives[message.key] = message
+                self._archives_due.discard(message.key)
             case messages.Replay() | messages.ReplayRefused():
                 self.replays[message.key] = message
             case messages.ReportWritten():

@@ -215,7 +215,7 @@ class EliteMaps(NamedTuple):
 
 
 def elite_maps(folder: Results, condition: str) -> EliteMaps | None:
-    """Return the elites of the typical run of a condition; None if its selection is another one.
+    """Return the elites of the typical run of a condition, the fittest of many; None if its selection is another one.
 
     Raises:
         RecordError: there is no such folder, a file in it is damaged, or it holds no trials yet.
@@ -225,7 +225,7 @@ def elite_maps(folder: Results, condition: str) -> EliteMaps | None:
     if condition not in [each["name"] for each in tally.selecting_by("map-elites")]:
         return None
     run = choose_run(tally, condition)
-    shown = _shown(run.condition, elites_of(run.condition, run.rows), "cell", "fitness")
+    shown = _shown(run.condition, elites_of(run.condition, run.rows), "cell", "fitness").head(MOST_MARKS)
     n_slices, rows, columns = _shape(run.condition)
     n_axes = 0 if run.condition.archive.kind == "cvt" else min(2, len(run.condition.archive.cells))
     return EliteMaps(

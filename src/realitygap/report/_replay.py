@@ -221,8 +221,8 @@ def _pack_run(tally: Tally, described: DescribedCondition, room: int, packed: by
             return _Run(name, replicate, None, 0, rows.height, note)
         n_fitting = room // (condition.on.steps + 1) // condition.arena.robots
         column = tally.score_column(name)
-        is_archive = condition.selection == "map-elites"
-        chosen = _elites(condition, rows, n_fitting) if is_archive else _choose(rows, n_fitting, column)
+        has_elites = condition.selection == "map-elites" and rows.height > n_fitting
+        chosen = _elites(condition, rows, n_fitting) if has_elites else _choose(rows, n_fitting, column)
         trials = [_pack_row(condition, row, packed) for row in chosen.iter_rows(named=True)]
         bests = _bests(tally, name, replicate, n_fitting - len(trials))
         others = [
@@ -238,7 +238,7 @@ def _pack_run(tally: Tally, described: DescribedCondition, room: int, packed: by
         return _Run(name, replicate, None, 0, rows.height, note)
     note = ""
     if len(trials) < rows.height:
-        which = "elites of its archive" if is_archive else "the best ones of each generation"
+        which = "elites of its archive" if has_elites else "the best ones of each generation"
         note = f"{len(trials):,} of {rows.height:,} trials, {which}; more would make the page too large."
     data = _set_up(condition) | {
         "name": name,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Annotated, Any, Literal, NamedTuple, Self
+from typing import Annotated, Literal, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +28,7 @@ STAGES = 3
 """Places along a path: the last is its end."""
 
 DescriptorName = Literal[
-    "mean_turn", "turn_spread", "mean_move", "stall_share", "wall_share", "end", "path", "region_share"
+    "mean_turn", "turn_spread", "mean_move", "stall_share", "end", "path", "region_share"
 ]
 
 
@@ -80,12 +80,7 @@ def _stall_shares(tried: Tried, trials: PlatformTrials) -> Floats:
     return np.divide(tried.batch.n_stalls, trials.n_steps)[:, None]
 
 
-def _wall_shares(tried: Tried, trials: PlatformTrials) -> Floats:
-    nearest = tried.distances[1:].min(axis=1, initial=np.inf) * trials.distance_unit
-    return _mean_over_steps(nearest < trials.arena.grid.cell)
-
-
-def _mean_over_steps(values: NDArray[Any]) -> Floats:
+def _mean_over_steps(values: NDArray[np.floating]) -> Floats:
     return np.asarray(values.mean(axis=0, dtype=np.float64)[:, None], np.float64)
 
 
@@ -110,7 +105,6 @@ DESCRIPTORS: dict[DescriptorName, Descriptor] = {
     "turn_spread": Descriptor(("turn_spread",), _unit(1), _turn_spread, needs_trace=True),
     "mean_move": Descriptor(("mean_move",), _unit(1), _mean_move, needs_trace=True),
     "stall_share": Descriptor(("stall_share",), _unit(1), _stall_shares),
-    "wall_share": Descriptor(("wall_share",), _unit(1), _wall_shares, needs_trace=True),
     "end": Descriptor(("end_x", "end_y"), _limits, _ended),
     "path": Descriptor(
         tuple(f"path_{axis}_{stage}" for stage in range(1, STAGES + 1) for axis in "xy"),
@@ -145,9 +139,8 @@ class ArchiveSettings(Settings):
         max_length=len(DESCRIPTORS),
         description="Numbers that describe a trial. mean_turn: mean turn command, -1..1. turn_spread: standard "
         "deviation of the turn command. mean_move: mean size of the move command. stall_share: share of blocked steps. "
-        "wall_share: share of steps after which a range sensor measures less than the side of a cell. end: x and y at "
-        "the end [m]. path: x and y after each third of the trial [m]. region_share: shares of the visited cells in "
-        "3 x 2 regions of the arena.",
+        "end: x and y at the end [m]. path: x and y after each third of the trial [m]. region_share: shares of the "
+        "visited cells in 3 x 2 regions of the arena.",
     )
     cells: Annotated[tuple[int, ...], BeforeValidator(as_tuple)] = Field(
         (20, 10, 5),

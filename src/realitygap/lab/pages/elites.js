@@ -10,7 +10,7 @@ export default {
                @pointermove="at = near($event, k)" @pointerleave="at = null" @click="choose(near($event, k))">
             <rect v-for="{ elite, n } in of(k)" :key="n" :data-elite="n" :x="elite[1]" :y="maps.rows - 1 - elite[2]" width="1" height="1"
                   role="button" :aria-label="words(elite)" :tabindex="n === focus ? 0 : -1" :class="{ 'lab-elite-at': n === at }"
-                  :style="{ fillOpacity: 0.1 + 0.9 * elite[3] / most }" @focus="at = focus = n" @keydown="key($event, n)" />
+                  :style="{ fillOpacity: 0.1 + 0.9 * (elite[3] - ends[0]) / (ends[1] - ends[0] || 1) }" @focus="at = focus = n" @keydown="key($event, n)" />
           </svg>
         </figure>
       </div>
@@ -19,7 +19,10 @@ export default {
   data() { return { at: null, focus: 0 }; },
   computed: {
     maps() { return JSON.parse(this.shown); },
-    most() { return Math.max(...this.maps.elites.map((elite) => elite[3])) || 1; },
+    ends() { // of the colors, with 0 where all are positive
+      const values = this.maps.elites.map((elite) => elite[3]);
+      return [Math.min(0, ...values), Math.max(...values)];
+    },
     hint() {
       const axes = this.maps.axes.map((name, k) => `${k ? "up" : "across"}: ${name} ${this.maps.ranges[k].map((end) => end.toPrecision(3)).join(" to ")}`);
       return `${this.maps.title}. Tap a cell to show its trial.${axes.length ? ` ${axes.join(", ")}.` : ""}`;

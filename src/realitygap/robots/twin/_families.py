@@ -208,7 +208,7 @@ class FamilyRow(NamedTuple):
     Attributes:
         number: Dotted name of the number.
         low, high: Limits between which it is drawn uniformly; equal if it is set.
-        part: Origin of the number: the family itself, every twin, or one of an alien's oddities.
+        part: Origin of the number: the family itself, every twin, or one of its oddities.
     """
 
     number: str

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from realitygap.evolution import Genome
+from realitygap.kernels.math.philox import MAX_GENERATIONS
 from realitygap.runs import (
     Condition,
     corrected_archive,
@@ -31,10 +32,8 @@ MOST_EVALUATIONS = 100_000
 """Controllers of a repertoire. Where more trials are due, each controller gets several: rows of more of them fill the
 memory, and by then the cells are full."""
 
-
 FINALISTS = 60
-"""Elites of each of several repertoires, its best ones: trials of all under all conditions take the time of another
-evolution."""
+"""Elites of each of several repertoires, its best ones: all are tried under all conditions."""
 
 POOL_TRIALS = 16
 """Trials of each of them under each condition."""
@@ -64,7 +63,7 @@ def repertoire_condition(condition: Condition, n_trials: int, parts: int = 1) ->
 
     Args:
         condition: Condition on a platform that computes, with one robot. One with this selection keeps its own number
-            of trials.
+            of trials, or a part of it, of at least a batch.
         n_trials: Trials in simulation, rounded to whole batches.
         parts: Number of repertoires that share the trials.
     """
@@ -78,7 +77,10 @@ def repertoire_condition(condition: Condition, n_trials: int, parts: int = 1) ->
     generations = max(1, round(n_trials / (repeats * population)))
     neat = condition.neat.model_copy(update={"population": population, "generations": generations})
     archive = condition.archive.model_copy(update={"repeats": repeats})
-    return condition.model_copy(update={"selection": "map-elites", "neat": neat, "archive": archive})
+    # what networks see may depend on the selection
+    controller = condition.controller.model_copy(update={"inputs": condition.network_inputs})
+    changes = {"selection": "map-elites", "neat": neat, "archive": archive, "controller": controller}
+    return condition.model_copy(update=changes)
 
 
 def evolve_repertoire(condition: Condition, replicate: int) -> Repertoire:
@@ -146,9 +148,7 @@ def tried_under(repertoire: Repertoire, conditions: Sequence[Condition], replica
 
 def _tried(condition: Condition, genomes: Sequence[Genome], replicate: int) -> tuple[Floats, Floats]:
     """Return (m, `POOL_TRIALS`) scores of genomes in fresh trials, and (m, c) shares of these that visit each cell."""
-    # beyond the batches of the evolution and the trials of its elites, so that the noise is fresh
-    keys = [
-        NoiseKey(condition.key, replicate, condition.neat.generations + 1, k) for k in range(len(genomes))
-    ]
+    # beyond the batches of all evolutions, so that the noise is fresh
+    keys = [NoiseKey(condition.key, replicate, MAX_GENERATIONS - 1, k) for k in range(len(genomes))]
     batch, scores = try_repeatedly(condition, genomes, keys, range(POOL_TRIALS))
     return scores, visited_share(batch, POOL_TRIALS)

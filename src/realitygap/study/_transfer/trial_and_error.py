@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -11,6 +10,7 @@ import numpy as np
 
 from realitygap.gap import PriorProcess
 from realitygap.runs import Condition
+from realitygap.world import RobotModel
 
 from .attempt import Attempt
 from .calibrated import fitted
@@ -44,16 +44,19 @@ class SearchRules(NamedTuple):
 
 RULES = SearchRules()
 
-DEAD = 0.01
-"""Share of the number of a part that does next to nothing; 0 is refused."""
-WEAK = (DEAD, 0.3, 0.6)
-"""Shares of the gain of one wheel under suspected damages."""
+WEAK = (0.01, 0.3, 0.6)
+"""Shares of the gain of one wheel under suspected damages; a gain of 0 is refused."""
 LOADED = (0.5, 0.75)
 """Shares of the gains of both wheels."""
 PULLS = (-1.0, 1.0)
 """Drift to a side [rad/m]."""
-SENSOR = re.compile(r"range\.\d+\.amplitude")
-"""The number of a range sensor that is small if it is blind."""
+BLIND = {
+    "ir": ("amplitude", 0.0),
+    "pulses": ("amplitude", 0.0),
+    "lorentz": ("amplitude", 0.0),
+    "linear": ("reach", 1e-3),
+}
+"""Number of a range sensor that sees nothing, by its response; none makes one with a table blind."""
 
 
 def trial_and_error(attempt: Attempt) -> Champion:
@@ -91,9 +94,9 @@ def trial_and_error_posterior(attempt: Attempt) -> Champion:
 def trial_and_error_damage(attempt: Attempt) -> Champion:
     """As `trial_and_error`, with a repertoire for the intact robot and for each suspected damage.
 
-    The repertoires share the trials in simulation. Their best elites are tried under each damage. The trials on the
-    target weigh the damages, by the likelihood of the score and by the distance of the visited cells to those in
-    simulation.
+    The repertoires share the trials in simulation. Further trials try their best elites under each damage. The trials
+    on the target weigh the damages, by the likelihood of the score and, where cells are observed, by the distance of
+    the visited cells to those in simulation.
     """
     conditions = damaged_conditions(attempt.condition)
     each = [finalists(attempt.repertoire(one, len(conditions))) for one in conditions]
@@ -122,15 +125,16 @@ def damaged_conditions(condition: Condition) -> list[Condition]:
     sim = needs_sim(condition, "trial-and-error-damage")
     return [
         changed_condition(condition, name, set={**sim.set, **numbers}) if numbers else condition
-        for name, numbers in suspected_damages(sim.model.centers()).items()
+        for name, numbers in suspected_damages(sim.model).items()
     ]
 
 
-def suspected_damages(numbers: Mapping[str, float]) -> dict[str, dict[str, float]]:
-    """Return the numbers of a robot that each suspected damage changes, from its numbers when it is intact.
+def suspected_damages(model: RobotModel) -> dict[str, dict[str, float]]:
+    """Return the numbers of an intact robot that each suspected damage changes.
 
     A wheel is weak or dead, both are weak, such as under a load, a sensor is blind, or the robot pulls to a side.
     """
+    numbers = model.centers()
     left, right = (f"drive.gain_{side}" for side in ("left", "right"))
     damages: dict[str, dict[str, float]] = {"intact": {}}
     for share in WEAK:
@@ -138,8 +142,11 @@ def suspected_damages(numbers: Mapping[str, float]) -> dict[str, dict[str, float
     for share in LOADED:
         damages[f"drive.gains-x-{share:g}"] = {wheel: share * numbers[wheel] for wheel in (left, right)}
     damages |= {f"drive.drift_per_m-{drift:g}": {"drive.drift_per_m": drift} for drift in PULLS}
-    blind = (name for name in numbers if SENSOR.fullmatch(name))
-    return damages | {f"{name}-x-{DEAD:g}": {name: DEAD * numbers[name]} for name in blind}
+    for k, sensor in enumerate(model.range):
+        if sensor.response in BLIND:
+            name, value = BLIND[sensor.response]
+            damages[f"range.{k}-blind"] = {f"range.{k}.{name}": value}
+    return damages
 
 
 def search(
@@ -160,8 +167,10 @@ def search(
     """
     simulated = repertoire.simulated
     low, high = attempt.condition.task_of_trials.score_range
-    if not np.isfinite(high - low):  # a score without range has that of the elites
-        low, high = float(simulated.min()), float(simulated.max())
+    if not np.isfinite(
+        high - low
+    ):  # a score without range has that of most elites: one may be far worse than all
+        low, high = np.quantile(simulated, (0.1, 1.0)).tolist()
     scale = high - low or 1.0
     process = PriorProcess(
         repertoire.descriptors,

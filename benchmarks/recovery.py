@@ -295,7 +295,11 @@ def parameters() -> dict[str, Any]:
         "best_by_12_trials_of_each": float(np.mean(best)),
         "budgets": BUDGETS_OF_PARAMETERS,
         "table": [
-            {**rules._asdict(), "scores": np.mean(found, axis=0).round(4).tolist()}
+            {
+                **rules._asdict(),
+                "unlikely": rules.unlikely if math.isfinite(rules.unlikely) else None,
+                "scores": np.mean(found, axis=0).round(4).tolist(),
+            }
             for rules, found in judged.items()
         ],
     }

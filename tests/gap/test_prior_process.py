@@ -185,5 +185,6 @@ def test_wrong_arguments_are_refused(arguments, says):
         process.tell(2, 0.5)
     with pytest.raises(ValueError, match="score"):
         process.tell(0, float("inf"))
+    assert process.tried == process.scores == ()
     with pytest.raises(ValueError, match=r"evidence has shape \(2,\), expected \(1,\)"):
         process.weigh([0.0, 0.0])

@@ -125,8 +125,12 @@ class PriorProcess:
         Raises:
             ValueError: There is no such controller, or the score is not finite.
         """
-        self._tried.append(whole_number("controller", controller, 0, len(self._x) - 1))
-        self._scores.append(float(finite_numbers("score", score)))
+        which, value = (
+            whole_number("controller", controller, 0, len(self._x) - 1),
+            finite_numbers("score", score),
+        )
+        self._tried.append(which)
+        self._scores.append(float(value))
 
     def weigh(self, evidence: ArrayLike) -> None:
         """Take in what else speaks for each simulation, such as where the robot was in the trial.
@@ -144,7 +148,7 @@ class PriorProcess:
 
     @property
     def weights(self) -> Floats:
-        """(h,) probability of each simulation after the trials; before, all are equally probable."""
+        """(h,) probability of each simulation after the trials and other evidence; before, all are equally probable."""
         return self._solve()[0]
 
     def predict(self) -> Predicted:

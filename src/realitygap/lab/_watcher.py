@@ -210,9 +210,9 @@ class Watcher:
                 self.report_stamp += 1
             case messages.Ended():
                 self._typical.intersection_update(self.replays)
-                self._archive_of = {
-                    name: of for name, of in self._archive_of.items() if name in self.archives
-                }
+                for condition in self._archives_due:  # without an answer, they are asked for again
+                    del self._archive_of[condition]
+                self._archives_due.clear()
                 for condition in list(self._drawn_of):
                     if not any(name.endswith(f"-{condition}") for name in list(self.figures)):
                         del self._drawn_of[condition]

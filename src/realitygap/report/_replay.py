@@ -239,7 +239,7 @@ def _pack_run(tally: Tally, described: DescribedCondition, room: int, packed: by
     note = ""
     if len(trials) < rows.height:
         which = "elites of its archive" if has_elites else "the best ones of each generation"
-        note = f"{len(trials):,} of {rows.height:,} trials, {which}; more would make the page too large."
+        note = f"{len(trials):,} of {rows.height:,} trials, {which}; all would make the page too large."
     data = _set_up(condition) | {
         "name": name,
         "run": replicate,

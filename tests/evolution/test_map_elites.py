@@ -34,7 +34,7 @@ def step(archive, n=1):
 
 def state(archive):
     kept = [
-        (elite.cell, elite.fitness, elite.descriptor.tolist(), elite.batch, elite.genome)
+        (elite.cell, elite.fitness, elite.descriptor.tolist(), elite.batch, elite.genome, elite.tries)
         for elite in archive.elites()
     ]
     return kept, archive.ask(), archive.batch, archive.parents.tolist()
@@ -113,6 +113,67 @@ def test_elites_are_those_of_a_plain_reference_with_their_genomes():
     assert np.nansum(filled) == pytest.approx(sum(value for value, _ in kept.values()))
 
 
+class Told:
+    """A genome of the plain reference, with all that was told of it."""
+
+    def __init__(self, genome):
+        self.genome, self.fitness, self.places = genome, [], []
+
+    @property
+    def mean(self):
+        return np.mean(self.fitness)
+
+    @property
+    def cell(self):
+        x, y = np.clip((np.mean(self.places, axis=0) + [1, 0]) / 2, 0, 1)
+        return min(int(x * 4), 3) * 3 + min(int(y * 3), 2)
+
+
+@pytest.mark.parametrize(("retry", "depth"), [(0.0, 3), (0.25, 1), (0.5, 2), (0.9, 4)])
+def test_elites_that_are_tried_again_are_those_of_a_plain_reference(retry, depth):
+    archive, rng = archive_of(retry=retry, depth=depth), np.random.default_rng(8)
+    held, order, moves = {}, [], 0  # genomes of each cell; cells as they were filled
+    for _ in range(15):
+        elites = [max(held[cell], key=lambda one: one.mean) for cell in order]
+        again = sorted(elites, key=lambda one: len(one.fitness))[: round(retry * 12)]
+        genomes = archive.ask()
+        assert [one.genome for one in again] == genomes[: len(again)]
+        fitness, places = deeds(genomes)
+        fitness += rng.normal(0, 0.3, 12)
+        places += rng.normal(0, 0.2, (12, 2))
+        batch = again + [Told(genome) for genome in genomes[len(again) :]]
+        for one in again:
+            before = one.cell
+            held[before].remove(one)
+            if not held[before]:
+                del held[before]
+                order[order.index(before)] = order[-1]
+                order.pop()
+        for one, value, place in zip(batch, fitness, places, strict=True):
+            before = one.cell if one.fitness else None
+            one.fitness.append(value)
+            one.places.append(place)
+            moves += before not in (None, one.cell)
+            inside = held.setdefault(one.cell, [])
+            if not inside:
+                order.append(one.cell)
+            if len(inside) < depth:
+                inside.append(one)
+            elif one.mean > min(other.mean for other in inside):
+                inside.remove(min(inside, key=lambda other: other.mean))
+                inside.append(one)
+        archive.tell(fitness, places)
+        expected = {cell: max(inside, key=lambda one: one.mean) for cell, inside in held.items()}
+        found = {elite.cell: elite for elite in archive.elites()}
+        assert found.keys() == expected.keys()
+        for cell, one in expected.items():
+            assert found[cell].genome == one.genome
+            assert found[cell].tries == len(one.fitness)
+            assert found[cell].fitness == pytest.approx(one.mean)
+            np.testing.assert_allclose(found[cell].descriptor, np.mean(one.places, axis=0))
+    assert (moves > 0) == (retry > 0)
+
+
 def test_children_are_children_of_the_elites_before_their_batch():
     archive = step(archive_of(neat=STILL, crossover=0.0))
     for _ in range(3):
@@ -139,9 +200,9 @@ def test_first_batch_is_that_of_a_population():
     assert archive_of().ask() == Population(2, 1, GROWING, seed=5).ask()
 
 
-@pytest.mark.parametrize("cells", [(4, 3), 10])
-def test_saved_and_loaded_it_goes_on_as_if_nothing_had_been(tmp_path, cells):
-    straight, resumed = archive_of(cells), archive_of(cells)
+@pytest.mark.parametrize(("cells", "options"), [((4, 3), {}), (10, {}), (10, {"retry": 0.4, "depth": 3})])
+def test_saved_and_loaded_it_goes_on_as_if_nothing_had_been(tmp_path, cells, options):
+    straight, resumed = archive_of(cells, **options), archive_of(cells, **options)
     for batch in range(10):
         resumed.save(tmp_path / "archive.npz")
         resumed = MapElites.load(tmp_path / "archive.npz")
@@ -180,6 +241,10 @@ def test_damaged_file_is_refused(tmp_path):
     for name, wrong in (
         ("elites.filled", arrays["elites.filled"] + 1),
         ("elites.n_filled", arrays["elites.n_filled"] + 1),
+        ("elites.best", arrays["elites.best"] + 1),
+        ("elites.rank", arrays["elites.rank"] + 1),
+        ("elites.tries", arrays["elites.tries"] * 0),
+        ("again", arrays["again"] + 99),
         ("elites.genomes.target", arrays["elites.genomes.target"] + 90),
         ("genomes.n_connections", arrays["genomes.n_connections"] + 999),
         ("elites.fitness", np.full(12, np.nan)),
@@ -210,6 +275,12 @@ def test_centroids_are_spread_and_the_same_for_the_same_key():
         ({"ranges": (0, 1)}, r"ranges has shape \(2,\)"),
         ({"ranges": ((0, 1), (0, math.inf))}, r"ranges\[1, 1\] is inf"),
         ({"crossover": 1.5}, "crossover is 1.5"),
+        ({"retry": 1.0}, "retry is 1.0, expected 0 to less than 1"),
+        ({"depth": 0}, "depth is 0"),
+        (
+            {"cells": (1000, 1000), "depth": 2},
+            "1,000,000 cells for 2 genomes each, expected at most 1,000,000 genomes",
+        ),
     ],
 )
 def test_wrong_archive_gets_one_message(options, message):

@@ -37,10 +37,11 @@ class Elite(NamedTuple):
 
     Attributes:
         cell: Number of its cell; of a grid, in row-major order of the descriptors.
-        fitness: Its fitness, as told.
-        descriptor: (d,) its descriptors, as told.
-        batch: Number of the batch in which it was told.
+        fitness: Its fitness, the mean of all that was told.
+        descriptor: (d,) its descriptors, in the same way.
+        batch: Number of the batch in which it was told last.
         genome: The genome.
+        tries: How often it was told.
     """
 
     cell: int
@@ -48,6 +49,7 @@ class Elite(NamedTuple):
     descriptor: NDArray[np.float64]
     batch: int
     genome: Genome
+    tries: int
 
 
 class MapElites:
@@ -63,11 +65,16 @@ class MapElites:
     because cells protect diversity. Parents are elites of before the batch. So the archive is a function of the
     seed, the settings, and what was told, on any machine, also if it was saved and loaded in between.
 
-    Fitness is compared as told. If it is noisy, elites are lucky ones: try them again before you trust them.
+    If fitness is noisy, elites are lucky ones: try them again before you trust them. With `retry`, a share of each
+    batch are elites again, those first that were told least often, and means count. With `depth`, cells hold more
+    genomes than their elite, which follow when it proves less fit (Flageat & Cully 2020, without their choice of
+    parents).
 
     Attributes:
         settings: NEAT's settings; `population` is the size of a batch.
         share: Share of children with two parents.
+        retry: Share of a batch that are elites again.
+        depth: Genomes that a cell holds.
         ranges: Lowest and highest value of each descriptor.
         cells: Cells along each descriptor of a grid, or the number of cells of a CVT.
         batch: Number of the present batch.
@@ -82,6 +89,8 @@ class MapElites:
         settings: NeatSettings | None = None,
         *,
         crossover: float = 0.25,
+        retry: float = 0.0,
+        depth: int = 1,
         seed: int = 0,
         replicate: int = 0,
         bias: bool = True,
@@ -97,6 +106,8 @@ class MapElites:
             ranges: Lowest and highest value of each of d descriptors. One out of its range counts as at the end.
             settings: NEAT's settings, 'default' if not given.
             crossover: Share of children with two parents, 0 to 1.
+            retry: Share of each batch that are elites again, for noisy tasks, 0 to less than 1.
+            depth: Genomes that a cell holds, >= 1.
             seed: Seed of the random numbers, 0 to 2**63 - 1.
             replicate: Number of the run with this seed, 0 to 2**32 - 1.
             bias: True for a constant input, which is the last one.
@@ -119,10 +130,19 @@ class MapElites:
         self.share = float(finite_numbers("crossover", crossover))
         if not 0 <= self.share <= 1:
             raise ValueError(f"crossover is {crossover}, expected 0 to 1.")
+        self.retry = float(finite_numbers("retry", retry))
+        if not 0 <= self.retry < 1:
+            raise ValueError(f"retry is {retry}, expected 0 to less than 1.")
+        self.depth = whole_number("depth", depth, 1)
         limits = _checked_ranges(ranges)
         self.ranges = tuple(map(tuple, limits.tolist()))
         self._cells = cells_of(cells, limits, int(self._key))
         self.cells = tuple(map(int, cells)) if isinstance(cells, Sequence) else int(cells)
+        if self.n_cells * self.depth > MOST_CELLS:
+            raise ValueError(
+                f"There are {self.n_cells:,} cells for {self.depth:,} genomes each, expected at most {MOST_CELLS:,} "
+                "genomes."
+            )
         self._rules = self.settings.rules(n_inputs + bias, n_outputs, bias_input=n_inputs if bias else -1)
         self.batch = 0
         self._asked: int | None = None
@@ -133,8 +153,10 @@ class MapElites:
         self._innovations: Innovations = make_innovations(self._rules, n)
         for array in self._innovations[1:]:  # room that is not read yet, but saved
             array[:] = 0
-        self._elites: Elites = make_elites(self.n_cells, len(self.ranges), n_outputs, room, hidden_room)
-        self._parents = np.full((n, 2), -1, np.int32)
+        self._elites: Elites = make_elites(
+            self.n_cells, len(self.ranges), n_outputs, room, hidden_room, self.depth
+        )
+        self._parents, self._again = np.full((n, 2), -1, np.int32), np.full(n, -1, np.int32)
         first_genomes(self._genomes, self._rules, self._key, self._replicate, 0)
 
     @property
@@ -159,7 +181,7 @@ class MapElites:
     @property
     def parents(self) -> NDArray[np.int32]:
         """The cells of each genome's parents, (n, 2); -1 for a missing parent."""
-        return self._parents.copy()
+        return np.where(self._parents < 0, -1, self._parents // self.depth).astype(np.int32)
 
     def ask(self) -> list[Genome]:
         """Return the genomes of this batch, in the order in which `tell` wants what they did."""
@@ -181,8 +203,8 @@ class MapElites:
         """
         n, d = self.settings.population, len(self.ranges)
         check_told_once(self._asked, self.batch)
-        values = np.ascontiguousarray(finite_numbers("fitness", fitness))
-        places = np.ascontiguousarray(finite_numbers("descriptors", descriptors))
+        values = np.array(finite_numbers("fitness", fitness), order="C")
+        places = np.array(finite_numbers("descriptors", descriptors), order="C")
         if values.shape != (n,):
             raise ValueError(
                 f"fitness has shape {values.shape}, expected ({n},): one number for each genome asked."
@@ -191,7 +213,10 @@ class MapElites:
             raise ValueError(
                 f"descriptors has shape {places.shape}, expected ({n}, {d}): {d} numbers for each genome asked."
             )
-        kernels.place_elites(self._genomes, values, places, self._cells, self._elites, self.batch)
+        tries, kept = np.empty((2, n), np.int32)
+        kernels.place_elites(
+            self._genomes, values, places, self._again, tries, self._cells, self._elites, self.batch, kept
+        )
         room, hidden_room = self._genomes.innovation.shape[1], self._genomes.hidden.shape[1]
         while True:
             children = make_genomes(n, self._rules.n_outputs, room, hidden_room)
@@ -199,6 +224,7 @@ class MapElites:
             kernels.vary_elites(
                 self._elites,
                 self.share,
+                min(round(self.retry * n), n - 1),
                 self._rules,
                 innovations,
                 self._key,
@@ -206,6 +232,7 @@ class MapElites:
                 self.batch + 1,
                 children,
                 self._parents,
+                self._again,
             )
             if not children.full[0]:
                 break
@@ -232,19 +259,21 @@ class MapElites:
         held, value = self._elites, float(self.settings.bias_value)
         return [
             Elite(
-                int(cell),
-                float(held.fitness[cell]),
-                held.descriptors[cell].copy(),
-                int(held.batch[cell]),
-                Genome(held.genomes, int(cell), self._rules, value),
+                int(place) // self.depth,
+                float(held.fitness[place]),
+                held.descriptors[place].copy(),
+                int(held.batch[place]),
+                Genome(held.genomes, int(place), self._rules, value),
+                int(held.tries[place]),
             )
-            for cell in held.filled[: len(self)]
+            for place in held.best[held.filled[: len(self)]]
         ]
 
     @property
     def fitness(self) -> NDArray[np.float64]:
         """Fitness of the elite of each cell, in the shape of the grid or (c,); NaN for an empty cell."""
-        values = np.where(self._elites.batch < 0, np.nan, self._elites.fitness)
+        best = self._elites.best
+        values = np.where(best < 0, np.nan, self._elites.fitness[best])
         return values if isinstance(self.cells, int) else values.reshape(self.cells)
 
     @property
@@ -292,6 +321,8 @@ class MapElites:
             "cells": self.cells,
             "ranges": self.ranges,
             "crossover": self.share,
+            "retry": self.retry,
+            "depth": self.depth,
             "key": int(self._key),
             "replicate": self._replicate,
             "batch": self.batch,
@@ -315,6 +346,8 @@ class MapElites:
                 about["ranges"],
                 NeatSettings(**about["settings"]),
                 crossover=about["crossover"],
+                retry=about["retry"],
+                depth=about["depth"],
                 replicate=about["replicate"],
                 bias=about["bias"],
                 key=about["key"],
@@ -332,7 +365,7 @@ class MapElites:
         held = self._elites
         tables = {"genomes": self._genomes, "innovations": self._innovations, "elites.genomes": held.genomes}
         parts = {f"elites.{name}": array for name, array in held._asdict().items() if name != "genomes"}
-        return arrays_of(tables) | parts | {"parents": self._parents}
+        return arrays_of(tables) | parts | {"parents": self._parents, "again": self._again}
 
     def _restore(self, arrays: dict[str, NDArray[Any]]) -> None:
         """Put `_arrays` back; only the room for genes may differ.
@@ -344,18 +377,36 @@ class MapElites:
         check_shapes(arrays, self._arrays(), self._rules.n_outputs)
         counters = arrays["innovations.counters"]
         genomes = genomes_of(self._genomes, "genomes", arrays, self._rules, counters)
-        n_filled = int(arrays["elites.n_filled"][0])
-        filled = arrays["elites.filled"][: max(n_filled, 0)].tolist()
-        if len(filled) != n_filled or sorted(filled) != np.flatnonzero(arrays["elites.batch"] >= 0).tolist():
-            raise ValueError("cells and their elites do not agree")
-        held = genomes_of(self._elites.genomes, "elites.genomes", arrays, self._rules, counters, filled)
-        if held.innovation.shape != (self.n_cells, genomes.innovation.shape[1]):
+        used = np.flatnonzero(arrays["elites.batch"] >= 0).tolist()
+        held = genomes_of(self._elites.genomes, "elites.genomes", arrays, self._rules, counters, used)
+        if held.innovation.shape != (self.n_cells * self.depth, genomes.innovation.shape[1]):
             raise ValueError("elites and children have different room")
-        finite_numbers("fitness", arrays["elites.fitness"][filled])
+        finite_numbers("fitness", arrays["elites.fitness"][used])
         finite_numbers("descriptors", arrays["elites.descriptors"])
         self._genomes, self._innovations = genomes, table_of(self._innovations, "innovations", arrays)
-        self._elites = table_of(self._elites, "elites", arrays)._replace(genomes=held)
-        self._parents = arrays["parents"]
+        elites = table_of(self._elites, "elites", arrays)._replace(genomes=held)
+        if not _agree(elites, arrays["again"], self.depth):
+            raise ValueError("cells and their elites do not agree")
+        self._elites, self._parents, self._again = elites, arrays["parents"], arrays["again"]
+
+
+def _agree(elites: Elites, again: NDArray[np.int32], depth: int) -> bool:
+    """Return whether the parts of an archive that was read name each other rightly."""
+    n_cells = len(elites.best)
+    fitness = np.where(elites.batch < 0, -math.inf, elites.fitness).reshape(n_cells, depth)
+    filled, n_filled = np.flatnonzero(fitness.max(axis=1) > -math.inf), int(elites.n_filled[0])
+    order, best = elites.filled[: max(n_filled, 0)], elites.best[filled]
+    are_free = np.delete(elites.best, filled) == -1
+    return bool(
+        np.array_equal(elites.fitness.reshape(n_cells, depth), fitness)
+        and np.array_equal(np.sort(order), filled)
+        and np.array_equal(elites.rank[order], np.arange(n_filled))
+        and are_free.all()
+        and np.array_equal(best // depth, filled)
+        and np.array_equal(elites.fitness[best], fitness.max(axis=1)[filled])
+        and (elites.tries[elites.batch >= 0] > 0).all()
+        and np.isin(again, [-1, *best]).all()
+    )
 
 
 def _checked_ranges(ranges: Sequence[tuple[float, float]]) -> NDArray[np.float64]:

@@ -109,6 +109,12 @@ EXTRA: tuple[Column, ...] = (
         "then counted from the first individual of the run, and `fitness` is a mean over its trials.",
     ),
     Column(
+        "tries",
+        pl.UInt32(),
+        "With `archive.retry`: how often the genome has been tried. From 2 on, the parent is the same genome when it "
+        "was tried before; `fitness` and `descriptor` are of this time alone.",
+    ),
+    Column(
         "partners",
         pl.List(pl.Struct({column.name: column.dtype for column in _GENOME})),
         'With `networks = "each"`: genomes of the other robots in the trial, in order, with the fields of `genome`.',

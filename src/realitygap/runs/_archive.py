@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,8 @@ from numpy.typing import NDArray
 
 from realitygap.evolution import decode_all, place_in_cells, ribs_archive
 from realitygap.kernels.math.philox import MAX_REPEATS
+from realitygap.kernels.neat import elites as kernels
+from realitygap.kernels.neat.elites import Cells, Elites, make_elites
 from realitygap.platforms import open_trials, scores_of, traced_at_once
 from realitygap.trials import NoiseKey, counters_of
 
@@ -31,12 +34,57 @@ def elites_of(condition: Condition, rows: pl.DataFrame) -> pl.DataFrame:
 
     Returns:
         The rows, with the column `cell`: its number, of a grid in row-major order of the descriptors. Sorted by
-        replicate and cell.
+        replicate and cell. Of an elite that was tried again it is the last row, with the means of all its trials.
 
     Raises:
         ValueError: Selection is another one.
     """
-    return _best(rows.with_columns(cell=_cells(condition, rows["descriptor"])), "cell", "fitness")
+    parts = [_elites(run, archive) for run, archive in _archives(condition, rows)]
+    return pl.concat(parts) if parts else rows.with_columns(cell=pl.lit(0, pl.UInt32))
+
+
+def _elites(run: pl.DataFrame, archives: Iterable[Elites]) -> pl.DataFrame:
+    """Return the elites of the last archive of a run."""
+    *_, last = archives
+    best = last.best[last.best >= 0]
+    frame = run.with_row_index("row").select("row", "generation", "individual")
+    told = pl.DataFrame({"generation": last.batch[best], "individual": last.individual[best]})
+    told = told.cast({"generation": pl.UInt32, "individual": pl.UInt32})
+    places = told.join(frame, on=["generation", "individual"], how="left", maintain_order="left")
+    return run[places["row"]].with_columns(
+        fitness=pl.Series(last.fitness[best]),
+        descriptor=pl.Series(last.descriptors[best]).arr.to_list(),
+        cell=pl.Series(np.flatnonzero(last.best >= 0).astype(np.uint32)),
+    )
+
+
+def _archives(condition: Condition, rows: pl.DataFrame) -> Iterator[tuple[pl.DataFrame, Iterator[Elites]]]:
+    """Yield the sorted rows of each run, and its archive after each batch, without genomes; it changes in place."""
+    _refuse_other_selections(condition)
+    cells = condition.archive.cells_in(condition.placed_arena, condition.key)
+    by = ["replicate", "generation", "individual"]
+    for run in rows.sort(by, maintain_order=True).partition_by("replicate", maintain_order=True):
+        yield run, _archives_of(condition, run, cells)
+
+
+def _archives_of(condition: Condition, run: pl.DataFrame, cells: Cells) -> Iterator[Elites]:
+    d, n = len(cells.low), condition.neat.population
+    elites = make_elites(condition.archive.n_cells, d, 0, 0, 0, condition.archive.depth, n_genomes=0)
+    for batch in run.partition_by("generation", maintain_order=True):
+        descriptors = batch["descriptor"].explode().to_numpy().reshape(batch.height, d).copy()
+        again = np.full(batch.height, -1, np.int32)
+        if "tries" in batch.columns:
+            is_again = batch["tries"].to_numpy() > 1
+            place_of = {
+                int(elites.batch[place]) * n + int(elites.individual[place]): place
+                for place in elites.best[elites.best >= 0]
+            }
+            parents = batch.filter(is_again)["parents"].list.first()
+            again[is_again] = [place_of[parent] for parent in parents]
+        tries, kept = np.empty((2, batch.height), np.int32)
+        fitness, number = batch["fitness"].to_numpy().copy(), int(batch["generation"][0])
+        kernels.place_results(fitness, descriptors, again, tries, cells, elites, number, kept)
+        yield elites
 
 
 def _best(rows: pl.DataFrame, cell: str, fitness: str) -> pl.DataFrame:
@@ -49,10 +97,7 @@ def _best(rows: pl.DataFrame, cell: str, fitness: str) -> pl.DataFrame:
 
 def _cells(condition: Condition, descriptors: pl.Series) -> NDArray[np.uint32]:
     """Return the cell of each list of descriptors, (n,)."""
-    if condition.selection != "map-elites":
-        raise ValueError(
-            f"Condition {condition.name!r} has selection {condition.selection!r}, expected 'map-elites'."
-        )
+    _refuse_other_selections(condition)
     values = descriptors.explode().to_numpy().reshape(len(descriptors), -1)
     cells = condition.archive.cells_in(condition.placed_arena, condition.key)
     return place_in_cells(np.ascontiguousarray(values, np.float64), cells).astype(np.uint32)
@@ -73,20 +118,13 @@ def archive_progress(condition: Condition, rows: pl.DataFrame) -> pl.DataFrame:
         ValueError: Selection is another one.
     """
     n_cells, per_batch = condition.archive.n_cells, condition.neat.population * condition.repeats
-    cells = _cells(condition, rows["descriptor"])
-    replicate, generation, fitness = (
-        rows[name].to_numpy() for name in ("replicate", "generation", "fitness")
-    )
     lines = []
-    for run in np.unique(replicate):
-        elites = np.full(n_cells, -np.inf)
-        for batch in range(condition.neat.generations):
-            here = (replicate == run) & (generation == batch)
-            np.maximum.at(elites, cells[here], fitness[here])
-            held = elites[elites > -np.inf]
+    for run, archives in _archives(condition, rows):
+        for batch, elites in enumerate(archives):
+            held = elites.fitness[elites.best[elites.best >= 0]]
             lines.append(
                 {
-                    "replicate": int(run),
+                    "replicate": int(run["replicate"][0]),
                     "generation": batch,
                     "trials": (batch + 1) * per_batch,
                     "filled": len(held) / n_cells,
@@ -95,6 +133,13 @@ def archive_progress(condition: Condition, rows: pl.DataFrame) -> pl.DataFrame:
                 }
             )
     return pl.DataFrame(lines)
+
+
+def _refuse_other_selections(condition: Condition) -> None:
+    if condition.selection != "map-elites":
+        raise ValueError(
+            f"Condition {condition.name!r} has selection {condition.selection!r}, expected 'map-elites'."
+        )
 
 
 def retry_elites(condition: Condition, elites: pl.DataFrame, trials: int = RETRIES) -> pl.DataFrame:

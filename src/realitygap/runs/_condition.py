@@ -347,6 +347,11 @@ class Condition(Settings):
         return self.archive.names if self.selection == "map-elites" else ()
 
     @property
+    def retries_elites(self) -> bool:
+        """True if its rows tell how often each genome was tried."""
+        return self.selection == "map-elites" and self.archive.retry > 0
+
+    @property
     def records_behavior(self) -> bool:
         """True if its distance of behaviors compares final positions, which need their own column."""
         return self.selection == "novelty" and DISTANCES[self.novelty.distance].compares != "cells"

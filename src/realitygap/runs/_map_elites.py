@@ -154,6 +154,20 @@ class ArchiveSettings(Settings):
         le=1000,
         description="Trials of each genome, with different noise. Its fitness and descriptors are their means.",
     )
+    retry: float = Field(
+        0.0,
+        ge=0,
+        lt=1,
+        description="Share of each batch that tries elites again, those first that were tried least. Their fitness "
+        "and descriptors become the means over all their trials, and they move to the cells of these.",
+    )
+    depth: int = Field(
+        1,
+        ge=1,
+        le=100,
+        description="Number of genomes that a cell holds (Flageat and Cully 2020). The fittest is its elite. The next "
+        "one follows if the elite is tried again and proves less fit, or belongs in another cell.",
+    )
 
     @model_validator(mode="after")
     def _cells_fit_the_descriptors(self) -> Self:
@@ -169,12 +183,21 @@ class ArchiveSettings(Settings):
         most = MOST_CELLS if self.kind == "grid" else MOST_CENTROIDS
         if min(self.cells) < 1 or self.n_cells > most:
             raise ValueError(f"cells are {self.n_cells:,} in all, expected 1 to {most:,}")
+        if self.n_cells * self.depth > MOST_CELLS:
+            raise ValueError(
+                f"{self.n_cells:,} cells of depth {self.depth} hold {self.n_cells * self.depth:,} genomes, expected at "
+                f"most {MOST_CELLS:,}"
+            )
         return self
 
     @property
     def n_cells(self) -> int:
         """Number of cells."""
         return math.prod(self.cells)
+
+    def n_again(self, population: int) -> int:
+        """Return the number of elites that a batch tries again."""
+        return min(round(self.retry * population), population - 1)
 
     @property
     def needs_trace(self) -> bool:
@@ -218,6 +241,7 @@ class Archives:
         arena: Arena of the trials.
         key: Key of the runs' random numbers.
         n_runs: Number of runs, each with an archive.
+        population: Number of genomes in a batch.
         neat: NEAT's rules.
         room, hidden_room: Genes and hidden nodes that a genome may have.
     """
@@ -228,6 +252,7 @@ class Archives:
         arena: Arena,
         key: int,
         n_runs: int,
+        population: int,
         neat: NeatRules,
         room: int,
         hidden_room: int,
@@ -236,13 +261,17 @@ class Archives:
         self._cells = settings.cells_in(arena, key)
         d = len(self._cells.low)
         self._each: list[Elites] = [
-            make_elites(settings.n_cells, d, neat.n_outputs, room, hidden_room) for _ in range(n_runs)
+            make_elites(settings.n_cells, d, neat.n_outputs, room, hidden_room, settings.depth)
+            for _ in range(n_runs)
         ]
+        self._n_again = settings.n_again(population)
+        self._again, self._tries, self._kept = np.zeros((3, n_runs, population), np.int32)
 
     def empty(self) -> None:
         """Forget all elites."""
         for elites in self._each:
-            elites.fitness[:], elites.batch[:], elites.n_filled[0] = -math.inf, -1, 0
+            elites.fitness[:], elites.batch[:], elites.best[:], elites.n_filled[0] = -math.inf, -1, -1, 0
+        self._again[:] = -1
 
     def breed(
         self,
@@ -259,15 +288,22 @@ class Archives:
         """Keep the elites of a batch of each run, and write their children.
 
         Args:
-            runs: Fitness is read; innovations and parents are written. Parents are numbers of individuals in the run.
+            runs: Innovations and parents are written. Parents are numbers of individuals in the run. Fitness becomes
+                the mean over all trials of a genome.
             genomes: (r * n,) genomes of the batch.
             children: Written, as `genomes`; `children.full` as in `begin_runs`.
-            descriptors: (r, n, d) descriptors of the genomes.
+            descriptors: (r, n, d) descriptors of the genomes; overwritten as fitness.
             neat, rules: Rules of the runs.
             key, first_replicate, generation: Which random numbers.
         """
         for run, places in enumerate(descriptors):
             block_kernels.breed_elites(
-                runs, genomes, children, run, places, self._cells, self._each[run], self._settings.crossover, neat,
-                rules, np.uint64(key), np.int64(first_replicate + run), generation,
+                runs, genomes, children, run, places, self._again[run], self._tries[run], self._kept[run],
+                self._cells, self._each[run], self._settings.crossover, self._n_again, neat, rules, np.uint64(key),
+                np.int64(first_replicate + run), generation,
             )  # fmt: skip
+
+    def tries(self, n_runs: int) -> NDArray[np.int32]:
+        """Return how often the genomes of the present batch have been tried, it included, (r, n)."""
+        tried = [each.tries[again] for each, again in zip(self._each, self._again[:n_runs], strict=False)]
+        return np.where(self._again[:n_runs] < 0, 0, tried) + np.int32(1)

@@ -85,6 +85,7 @@ def _empty_rows(condition: Condition, n_runs: int, n_cells: int, room: int, hidd
         drawn=zeros(np.float64, len(condition.drawn_names)),
         task_fitness=zeros(np.float64),
         descriptor=zeros(np.float64, len(condition.descriptor_names)),
+        tries=zeros(np.int32),
     )
 
 
@@ -234,7 +235,7 @@ def _frame_of(condition: Condition, first_replicate: int, rows: RunRows) -> pl.D
         }
     ).to_struct("genome")
     novelty = pl.Series("novelty", flat(rows.novelty)).fill_nan(None)
-    extra: dict[str, pl.Series | NDArray[np.float64]] = {}
+    extra: dict[str, pl.Series | NDArray[Any]] = {}
     if condition.on.records_draws:
         extra["drawn"] = list_column(flat(rows.drawn), np.full(total, rows.drawn.shape[-1]))
     if condition.coverage is None:
@@ -244,6 +245,8 @@ def _frame_of(condition: Condition, first_replicate: int, rows: RunRows) -> pl.D
         extra["behavior"] = list_column(flat(rows.ended) + np.array([start.x, start.y]), np.full(total, 2))
     if condition.descriptor_names:
         extra["descriptor"] = list_column(flat(rows.descriptor), np.full(total, rows.descriptor.shape[-1]))
+    if condition.retries_elites:
+        extra["tries"] = flat(rows.tries).astype(np.uint32)
     if condition.arena.networks == "each":
         extra["partners"] = _partners(condition, genome, first_replicate, n_runs)
     return pl.DataFrame(

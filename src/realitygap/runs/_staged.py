@@ -81,7 +81,9 @@ def run_staged(
     together = runs_together(rules.population)
     if condition.selection == "map-elites":
         in_trials = -(-BLOCK_TRIALS // (rules.population * condition.repeats))
-        together = max(1, min(in_trials, MOST_ELITES // condition.archive.n_cells))
+        together = max(
+            1, min(in_trials, MOST_ELITES // (condition.archive.n_cells * condition.archive.depth))
+        )
     together = min(together, total)
     staged = _Staged(condition, rules, together, room, hidden_room)
     for first_run in range(0, total, staged.together):
@@ -125,7 +127,14 @@ class _Staged:
         if condition.selection == "map-elites":
             self.needs_trace |= condition.archive.needs_trace
             self.archives = Archives(
-                condition.archive, self.trials.arena, condition.key, together, self.neat, room, hidden_room
+                condition.archive,
+                self.trials.arena,
+                condition.key,
+                together,
+                rules.population,
+                self.neat,
+                room,
+                hidden_room,
             )
         self.teams = np.empty((0, rules.population, self.arena.n_robots), np.int32)
 
@@ -267,5 +276,7 @@ class _Staged:
         n = self.rules.population
         rows.drawn[place] = scored.drawn.reshape(n_runs, n, -1)
         rows.descriptor[place] = scored.descriptors.reshape(n_runs, n, -1)
+        if self.condition.retries_elites and self.archives is not None:
+            rows.tries[place] = self.archives.tries(n_runs)
         if self.task is not None:
             rows.task_fitness[place] = scored.fitness.reshape(n_runs, n)

@@ -66,6 +66,7 @@ class RunRows(NamedTuple):
     drawn: NDArray[np.float64]  # (r, g, n, d)
     task_fitness: NDArray[np.float64]  # (r, g, n)
     descriptor: NDArray[np.float64]  # (r, g, n, d) where selection is by elites
+    tries: NDArray[np.int32]  # (r, g, n) how often a genome was tried; where elites are tried again
 
 
 class Runs(NamedTuple):
@@ -395,9 +396,13 @@ def breed_elites(
     children,
     run,
     descriptors,
+    again,
+    tries,
+    kept,
     cells,
     elites,
     share,
+    n_again,
     neat,
     rules,
     key,
@@ -407,17 +412,19 @@ def breed_elites(
     """Keep the elites of a batch of one run, and write their children; `children.full` as in `begin_runs`.
 
     Args:
-        descriptors: (n, d) of the batch.
-        cells, elites, share: As in `place_elites` and `vary_elites`.
-        runs: Parents are written: numbers of individuals, counted from the first of the run.
+        descriptors, again, tries, kept, cells, elites, share, n_again: As in `place_elites` and `vary_elites`; `again`
+            is read and written.
+        runs: Fitness is overwritten with means. Parents are written: numbers of individuals, counted from the first of
+            the run.
     """
     n = rules.population
     own = rows_of(genomes, run * n, n)
-    place_elites(own, runs.fitness[run], descriptors, cells, elites, generation)
+    place_elites(own, runs.fitness[run], descriptors, again, tries, cells, elites, generation, kept)
     parents = runs.parents[run]
     vary_elites(
         elites,
         share,
+        n_again,
         neat,
         _innovations_of(runs.innovations, run),
         key,
@@ -425,9 +432,10 @@ def breed_elites(
         generation + 1,
         rows_of(children, run * n, n),
         parents,
+        again,
     )
     for child in range(n):
         for k in range(2):
-            cell = parents[child, k]
-            if cell >= 0:
-                parents[child, k] = elites.batch[cell] * n + elites.individual[cell]
+            place = parents[child, k]
+            if place >= 0:
+                parents[child, k] = elites.batch[place] * n + elites.individual[place]

@@ -1,7 +1,8 @@
 """Elites, the best genome of each cell of a space of descriptors, and children of them (MAP-Elites).
 
 Source: Mouret & Clune, "Illuminating search spaces by mapping elites" (2015), with the variation of NEAT. Cells of a
-CVT are those of Vassiliades, Chatzilygeroudis & Mouret (2018).
+CVT are those of Vassiliades, Chatzilygeroudis & Mouret (2018). Where trials are noisy, a cell may hold several genomes,
+as in Flageat & Cully (2020), and elites may be tried again.
 """
 
 from __future__ import annotations
@@ -30,23 +31,33 @@ class Cells(NamedTuple):
 
 
 class Elites(NamedTuple):
-    """The elites of c cells, and the order in which cells were filled."""
+    """The genomes of c cells with room for p of them each, and the order in which cells were filled.
 
-    genomes: Genomes  # c rows
-    fitness: NDArray[np.float64]  # (c,)
-    descriptors: NDArray[np.float64]  # (c, d)
-    batch: NDArray[np.int32]  # (c,) in which the elite was told; -1: empty
-    individual: NDArray[np.int32]  # (c,) its place in that batch
+    Genomes of cell k are in the places p * k to p * k + p - 1.
+    """
+
+    genomes: Genomes  # c * p rows
+    fitness: NDArray[np.float64]  # (c * p,) mean over the trials
+    descriptors: NDArray[np.float64]  # (c * p, d) means
+    batch: NDArray[np.int32]  # (c * p,) in which the genome was told last; -1: empty
+    individual: NDArray[np.int32]  # (c * p,) its place in that batch
+    tries: NDArray[np.int32]  # (c * p,) how often it was told
+    best: NDArray[np.int32]  # (c,) place of the elite of each cell; -1: empty
     filled: NDArray[np.int32]  # (c,) cells, the first filled one first
+    rank: NDArray[np.int32]  # (c,) of each cell in `filled`
     n_filled: NDArray[np.int64]  # (1,)
 
 
-def make_elites(n_cells, n_descriptors, n_outputs, room, hidden_room):
-    """Return an empty archive."""
+def make_elites(n_cells, n_descriptors, n_outputs, room, hidden_room, depth=1, n_genomes=None):
+    """Return an empty archive; `n_genomes` is 0 for one that keeps no genomes."""
+    n = n_cells * depth
     return Elites(
-        make_genomes(n_cells, n_outputs, room, hidden_room),
-        np.full(n_cells, -math.inf),
-        np.zeros((n_cells, n_descriptors)),
+        make_genomes(n if n_genomes is None else n_genomes, n_outputs, room, hidden_room),
+        np.full(n, -math.inf),
+        np.zeros((n, n_descriptors)),
+        np.full(n, -1, np.int32),
+        np.zeros(n, np.int32),
+        np.zeros(n, np.int32),
         np.full(n_cells, -1, np.int32),
         np.zeros(n_cells, np.int32),
         np.zeros(n_cells, np.int32),
@@ -86,58 +97,149 @@ def cells_of(descriptors, cells, found):
         found[row] = cell_of(descriptors, row, cells)
 
 
+@inlined
+def _find_best(elites, cell, depth):
+    """Make the fittest genome of a cell its elite, the one in the first place of equally fit ones."""
+    best = -1
+    for place in range(cell * depth, (cell + 1) * depth):
+        if elites.batch[place] >= 0 and (best < 0 or elites.fitness[place] > elites.fitness[best]):
+            best = place
+    elites.best[cell] = best
+
+
+@inlined
+def _remove(elites, place, depth):
+    """Empty a place."""
+    cell = place // depth
+    elites.batch[place] = -1
+    elites.fitness[place] = -math.inf
+    if elites.best[cell] == place:
+        _find_best(elites, cell, depth)
+        if elites.best[cell] < 0:
+            n = elites.n_filled[0] - 1
+            last = elites.filled[n]
+            elites.filled[elites.rank[cell]] = last
+            elites.rank[last] = elites.rank[cell]
+            elites.n_filled[0] = n
+
+
 @shared
-def place_elites(genomes, fitness, descriptors, cells, elites, batch):
-    """Keep those individuals, in their order, that are fitter than the elite of their cell.
+def place_results(fitness, descriptors, again, tries, cells, elites, batch, kept):
+    """Place what individuals of a batch did, in their order, without their genomes.
+
+    One that finds no room in its cell takes the place of the least fit there, if it is fitter. Of equally fit ones the
+    earlier one stays.
 
     Args:
-        genomes: n individuals; their room is that of the elites.
-        fitness: (n,) finite.
-        descriptors: (n, d) finite.
+        fitness: (n,) finite. Overwritten with the mean over all that was told of a genome.
+        descriptors: (n, d) finite. Overwritten in the same way.
+        again: (n,) int32 places of the elites that were tried again; -1 for a new genome.
+        tries: (n,) int32, written: how often each was told.
         cells: The cells.
-        elites: Written. Of equally fit ones the earlier one stays.
+        elites: Written. Elites that were tried again leave their places first.
         batch: Number of this batch.
+        kept: (n,) int32, written: place in the archive, -1 if there is none.
     """
+    d = cells.low.size
+    depth = elites.fitness.size // elites.best.size
+    for row in range(fitness.size):
+        place = again[row]
+        tries[row] = 1
+        if place < 0:
+            continue
+        tries[row] += elites.tries[place]
+        fitness[row] = elites.fitness[place] + (fitness[row] - elites.fitness[place]) / tries[row]
+        for k in range(d):
+            mean = elites.descriptors[place, k]
+            descriptors[row, k] = mean + (descriptors[row, k] - mean) / tries[row]
+        _remove(elites, place, depth)
     for row in range(fitness.size):
         cell = cell_of(descriptors, row, cells)
-        if not fitness[row] > elites.fitness[cell]:
+        place = cell * depth
+        for other in range(place + 1, (cell + 1) * depth):
+            if elites.fitness[other] < elites.fitness[place]:
+                place = other
+        kept[row] = -1
+        if not fitness[row] > elites.fitness[place]:
             continue
-        if elites.batch[cell] < 0:
+        kept[row] = place
+        elites.fitness[place] = fitness[row]
+        elites.batch[place] = batch
+        elites.individual[place] = row
+        elites.tries[place] = tries[row]
+        for k in range(d):
+            elites.descriptors[place, k] = descriptors[row, k]
+        if elites.best[cell] < 0:
             elites.filled[elites.n_filled[0]] = cell
+            elites.rank[cell] = elites.n_filled[0]
             elites.n_filled[0] += 1
-        copy_genome(genomes, row, elites.genomes, cell)
-        elites.fitness[cell] = fitness[row]
-        elites.batch[cell] = batch
-        elites.individual[cell] = row
-        for k in range(cells.low.size):
-            elites.descriptors[cell, k] = descriptors[row, k]
+        if elites.best[cell] < 0 or fitness[row] > elites.fitness[elites.best[cell]]:
+            elites.best[cell] = place
 
 
 @shared
-def vary_elites(elites, share, rules, innovations, key, replicate, batch, children, parents):
-    """Fill `children` with children of elites, which are drawn with equal chances.
+def place_elites(genomes, fitness, descriptors, again, tries, cells, elites, batch, kept):
+    """As `place_results`, and keep the genomes, whose room is that of the elites."""
+    place_results(fitness, descriptors, again, tries, cells, elites, batch, kept)
+    for row in range(fitness.size):
+        if kept[row] >= 0:
+            copy_genome(genomes, row, elites.genomes, kept[row])
+
+
+@inlined
+def _least_tried(elites, n, found):
+    """Write the places of the n elites that were tried least often, those first whose cells were filled first."""
+    k = 0
+    tries = 0
+    while k < n:
+        next_tries = np.iinfo(np.int32).max
+        for rank in range(elites.n_filled[0]):
+            place = elites.best[elites.filled[rank]]
+            if elites.tries[place] > tries:
+                next_tries = min(next_tries, elites.tries[place])
+            elif elites.tries[place] == tries and k < n:
+                found[k] = place
+                k += 1
+        tries = next_tries
+
+
+@shared
+def vary_elites(elites, share, n_again, rules, innovations, key, replicate, batch, children, parents, again):
+    """Fill `children` with elites to be tried again, and with children of elites, which are drawn with equal chances.
+
+    Those are tried again that were tried least often; of those tried equally often, those whose cells were filled
+    first.
 
     Where `children.full` is set afterwards, a gene found no room and everything written is worth nothing.
 
     Args:
         elites: At least one.
         share: Share of children with two parents. All are mutated, but those that `rules.crossover_only` excepts.
+        n_again: Number of elites to be tried again, less than n.
         rules: NEAT's rates and choices; those of species have no effect.
         innovations: The numbers of the run; what arose in the batch before is forgotten first.
         key, replicate, batch: Which random numbers; `batch` is that of the children.
         children: Room for n genomes.
-        parents: (n, 2) int32, written: cells; -1 where there is no second parent.
+        parents: (n, 2) int32, written: places of elites; -1 where there is no second parent.
+        again: (n,) int32, written: place of the elite that is tried again; -1 for a child.
     """
     start_generation(innovations)
     n_filled = elites.n_filled[0]
     cursor = children.cursor
-    for child in range(children.n_connections.size):
+    n_again = min(n_again, n_filled)
+    _least_tried(elites, n_again, again)
+    for child in range(n_again):
+        copy_genome(elites.genomes, again[child], children, child)
+        parents[child, 0] = again[child]
+        parents[child, 1] = -1
+    for child in range(n_again, children.n_connections.size):
+        again[child] = -1
         stream = make_stream(key, replicate, batch, child, FIRST, PURPOSE_CHILD)
         cursor[0] = 0
-        first = elites.filled[next_below(stream, cursor, n_filled)]
+        first = elites.best[elites.filled[next_below(stream, cursor, n_filled)]]
         second = np.int32(-1)
         if next_uniform(stream, cursor) < share:
-            second = elites.filled[next_below(stream, cursor, n_filled)]
+            second = elites.best[elites.filled[next_below(stream, cursor, n_filled)]]
             if second == first:
                 second = np.int32(-1)
         is_mutated = True

@@ -40,6 +40,29 @@ def state(archive):
     return kept, archive.ask(), archive.batch, archive.parents.tolist()
 
 
+class Told:
+    """A genome of the plain reference, with all that was told of it."""
+
+    def __init__(self, genome):
+        self.genome, self.fitness, self.places = genome, [], []
+
+    @property
+    def mean(self):
+        mean = 0.0
+        for n, value in enumerate(self.fitness, 1):  # so that equal means are equal as floats
+            mean += (value - mean) / n
+        return mean
+
+    @property
+    def middle(self):
+        return np.mean(self.places, axis=0)
+
+    @property
+    def cell(self):
+        x, y = np.clip(np.add(self.middle, [1, 0]) / 2, 0, 1)
+        return min(int(x * 4), 3) * 3 + min(int(y * 3), 2)
+
+
 streams = st.integers(0, 2**32 - 1)
 
 
@@ -97,6 +120,60 @@ def compare(theirs, archive, rng, to_theirs=lambda places: places):
     ]
 
 
+@settings(max_examples=60, deadline=None)
+@given(seed=streams)
+def test_dominated_novelty_keeps_what_pyribs_keeps(ribs, seed):
+    rng = np.random.default_rng(seed)
+    d, k, capacity = int(rng.integers(1, 4)), int(rng.integers(1, 6)), int(rng.integers(2, 30))
+    ranges = [(0.0, float(high)) for high in rng.uniform(0.5, 3, d)]
+    high = np.array(ranges)[:, 1]
+    archive = archive_of(capacity, ranges, neighbors=k)
+    theirs = ribs.DNSArchive(solution_dim=1, measure_dim=d, capacity=capacity, k_neighbors=k)
+    for batch in range(4):
+        fitness, places = rng.normal(size=12), rng.uniform(-0.2, 1.2, (12, d)) * high
+        archive.ask()
+        archive.tell(fitness, places)
+        theirs.add(batch + np.arange(12)[:, None] / 100, fitness, places / high)
+        expected = sorted(zip(theirs.data("objective"), theirs.data("solution")[:, 0] // 1, strict=True))
+        assert sorted((elite.fitness, elite.batch) for elite in archive.elites()) == expected
+
+
+def test_dominated_novelty_of_equals_and_of_elites_that_are_tried_again():
+    """Against a plain computation, where equals are common."""
+    archive, rng, held = archive_of(9, retry=0.4, neighbors=2), np.random.default_rng(3), []
+    for _ in range(12):
+        genomes, tried_again = archive.ask(), round(0.4 * 12)
+        again = sorted(held, key=lambda one: one.rank)
+        again = sorted(again, key=lambda one: len(one.fitness))[:tried_again] if held else []
+        assert [one.genome for one in again] == genomes[: len(again)]
+        batch = again + [Told(genome) for genome in genomes[len(again) :]]
+        fitness, places = rng.integers(0, 3, 12) / 2, rng.uniform(-1, 1, (12, 2)) * [1, 2]
+        for one, value, place in zip(batch, fitness, places, strict=True):
+            one.fitness.append(value)
+            one.places.append(place)
+        everybody = [one for one in held if one not in again] + batch
+        everybody.sort(key=lambda one: (one in batch, one.place if one not in batch else batch.index(one)))
+        worth = []
+        for k, one in enumerate(everybody):
+            fitter = everybody[:k] + [each for each in everybody[k:] if each.mean > one.mean]
+            fitter = [each for each in fitter if each.mean >= one.mean]
+            off = [np.subtract(one.middle, each.middle) / 2 for each in fitter]
+            worth.append(np.mean(sorted(np.hypot(*each) for each in off)[:2]) if off else math.inf)
+        order = sorted(range(len(everybody)), key=lambda k: (-worth[k], k))[:9]
+        survivors = [everybody[k] for k in sorted(order)]
+        archive.tell(fitness, places)
+        found = archive.elites()
+        assert sorted((elite.fitness, elite.tries) for elite in found) == sorted(
+            (one.mean, len(one.fitness)) for one in survivors
+        )
+        held = []
+        for rank, elite in enumerate(found):
+            (one,) = [one for one in survivors if np.allclose(one.middle, elite.descriptor)]
+            assert one.genome == elite.genome
+            one.rank, one.place = rank, elite.cell
+            held.append(one)
+
+
 def test_elites_are_those_of_a_plain_reference_with_their_genomes():
     archive, kept = archive_of(), {}
     for _ in range(6):
@@ -111,22 +188,6 @@ def test_elites_are_those_of_a_plain_reference_with_their_genomes():
     filled = archive.fitness
     assert filled.shape == (4, 3)
     assert np.nansum(filled) == pytest.approx(sum(value for value, _ in kept.values()))
-
-
-class Told:
-    """A genome of the plain reference, with all that was told of it."""
-
-    def __init__(self, genome):
-        self.genome, self.fitness, self.places = genome, [], []
-
-    @property
-    def mean(self):
-        return np.mean(self.fitness)
-
-    @property
-    def cell(self):
-        x, y = np.clip((np.mean(self.places, axis=0) + [1, 0]) / 2, 0, 1)
-        return min(int(x * 4), 3) * 3 + min(int(y * 3), 2)
 
 
 @pytest.mark.parametrize(("retry", "depth"), [(0.0, 3), (0.25, 1), (0.5, 2), (0.9, 4)])
@@ -170,7 +231,7 @@ def test_elites_that_are_tried_again_are_those_of_a_plain_reference(retry, depth
             assert found[cell].genome == one.genome
             assert found[cell].tries == len(one.fitness)
             assert found[cell].fitness == pytest.approx(one.mean)
-            np.testing.assert_allclose(found[cell].descriptor, np.mean(one.places, axis=0))
+            np.testing.assert_allclose(found[cell].descriptor, one.middle)
     assert (moves > 0) == (retry > 0)
 
 
@@ -200,7 +261,9 @@ def test_first_batch_is_that_of_a_population():
     assert archive_of().ask() == Population(2, 1, GROWING, seed=5).ask()
 
 
-@pytest.mark.parametrize(("cells", "options"), [((4, 3), {}), (10, {}), (10, {"retry": 0.4, "depth": 3})])
+@pytest.mark.parametrize(
+    ("cells", "options"), [((4, 3), {}), (10, {}), (10, {"retry": 0.4, "depth": 3}), (9, {"neighbors": 2})]
+)
 def test_saved_and_loaded_it_goes_on_as_if_nothing_had_been(tmp_path, cells, options):
     straight, resumed = archive_of(cells, **options), archive_of(cells, **options)
     for batch in range(10):
@@ -277,6 +340,7 @@ def test_centroids_are_spread_and_the_same_for_the_same_key():
         ({"crossover": 1.5}, "crossover is 1.5"),
         ({"retry": 1.0}, "retry is 1.0, expected 0 to less than 1"),
         ({"depth": 0}, "depth is 0"),
+        ({"neighbors": 3}, "neighbors is 3, expected 0 with a grid"),
         (
             {"cells": (1000, 1000), "depth": 2},
             "1,000,000 cells for 2 genomes each, expected at most 1,000,000 genomes",

@@ -35,6 +35,7 @@ VARIANTS: list[dict[str, Any]] = [
     {"platform": "sim", "archive": {"descriptor": ["turn_spread", "stall_share"], "cells": [6, 5]}},
     {"archive": {"descriptor": ["mean_move", "path"], "kind": "cvt", "cells": [40]}},
     {"archive": {"descriptor": ["end"], "cells": [9, 9], "retry": 0.3, "depth": 2, "repeats": 2}},
+    {"archive": {"descriptor": ["end"], "cells": [5, 5], "retry": 0.2, "competition": "dominated-novelty"}},
     {"archive": {"crossover": 1.0, "descriptor": ["end"], "cells": [9, 9]}, "task": {"cells": "ends"}},
 ]
 

@@ -70,11 +70,16 @@ class MapElites:
     genomes than their elite, which follow when it proves less fit (Flageat & Cully 2020, without their choice of
     parents).
 
+    With `neighbors`, there are no cells: the archive keeps those genomes that differ most from fitter ones, in parts of
+    the ranges (dominated novelty search, Bahlous-Boldi and others 2025). Of equally fit genomes an earlier one counts
+    as fitter, so that copies do not fill it. An elite's `cell` is then its place.
+
     Attributes:
         settings: NEAT's settings; `population` is the size of a batch.
         share: Share of children with two parents.
         retry: Share of a batch that are elites again.
         depth: Genomes that a cell holds.
+        neighbors: Neighbors of dominated novelty; 0 for cells.
         ranges: Lowest and highest value of each descriptor.
         cells: Cells along each descriptor of a grid, or the number of cells of a CVT.
         batch: Number of the present batch.
@@ -91,6 +96,7 @@ class MapElites:
         crossover: float = 0.25,
         retry: float = 0.0,
         depth: int = 1,
+        neighbors: int = 0,
         seed: int = 0,
         replicate: int = 0,
         bias: bool = True,
@@ -108,6 +114,8 @@ class MapElites:
             crossover: Share of children with two parents, 0 to 1.
             retry: Share of each batch that are elites again, for noisy tasks, 0 to less than 1.
             depth: Genomes that a cell holds, >= 1.
+            neighbors: For an archive without cells, of as many genomes as `cells` says: number of the nearest fitter
+                genomes whose mean distance counts. 0 for cells.
             seed: Seed of the random numbers, 0 to 2**63 - 1.
             replicate: Number of the run with this seed, 0 to 2**32 - 1.
             bias: True for a constant input, which is the last one.
@@ -134,6 +142,12 @@ class MapElites:
         if not 0 <= self.retry < 1:
             raise ValueError(f"retry is {retry}, expected 0 to less than 1.")
         self.depth = whole_number("depth", depth, 1)
+        self.neighbors = whole_number("neighbors", neighbors, 0, MOST_CENTROIDS)
+        if self.neighbors and (self.depth > 1 or isinstance(cells, Sequence)):
+            raise ValueError(
+                f"neighbors is {neighbors}, expected 0 with a grid and with a depth: an archive without cells has one "
+                "number of genomes."
+            )
         limits = _checked_ranges(ranges)
         self.ranges = tuple(map(tuple, limits.tolist()))
         self._cells = cells_of(cells, limits, int(self._key))
@@ -154,7 +168,12 @@ class MapElites:
         for array in self._innovations[1:]:  # room that is not read yet, but saved
             array[:] = 0
         self._elites: Elites = make_elites(
-            self.n_cells, len(self.ranges), n_outputs, room, hidden_room, self.depth
+            self.n_cells,
+            len(self.ranges),
+            make_genomes(self.n_cells * self.depth, n_outputs, room, hidden_room),
+            self.depth,
+            batch=n,
+            neighbors=self.neighbors,
         )
         self._parents, self._again = np.full((n, 2), -1, np.int32), np.full(n, -1, np.int32)
         first_genomes(self._genomes, self._rules, self._key, self._replicate, 0)
@@ -323,6 +342,7 @@ class MapElites:
             "crossover": self.share,
             "retry": self.retry,
             "depth": self.depth,
+            "neighbors": self.neighbors,
             "key": int(self._key),
             "replicate": self._replicate,
             "batch": self.batch,
@@ -348,6 +368,7 @@ class MapElites:
                 crossover=about["crossover"],
                 retry=about["retry"],
                 depth=about["depth"],
+                neighbors=about["neighbors"],
                 replicate=about["replicate"],
                 bias=about["bias"],
                 key=about["key"],

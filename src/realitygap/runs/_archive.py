@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator
 from typing import Any
 
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 from realitygap.evolution import decode_all, place_in_cells, ribs_archive
 from realitygap.kernels.math.philox import MAX_REPEATS
 from realitygap.kernels.neat import elites as kernels
-from realitygap.kernels.neat.elites import Cells, Elites, make_elites
+from realitygap.kernels.neat.elites import Cells, Elites
 from realitygap.platforms import open_trials, scores_of, traced_at_once
 from realitygap.trials import NoiseKey, counters_of
 
@@ -39,12 +40,13 @@ def elites_of(condition: Condition, rows: pl.DataFrame) -> pl.DataFrame:
     Raises:
         ValueError: Selection is another one.
     """
-    parts = [_elites(run, archive) for run, archive in _archives(condition, rows)]
-    return pl.concat(parts) if parts else rows.with_columns(cell=pl.lit(0, pl.UInt32))
+    parts = [_held(run, archives) for run, archives in _archives(condition, rows)]
+    held = pl.concat(parts) if parts else rows
+    return _best(held.with_columns(cell=_cells(condition, held["descriptor"])), "cell", "fitness")
 
 
-def _elites(run: pl.DataFrame, archives: Iterable[Elites]) -> pl.DataFrame:
-    """Return the elites of the last archive of a run."""
+def _held(run: pl.DataFrame, archives: Iterable[Elites]) -> pl.DataFrame:
+    """Return the rows of the elites of the last archive of a run, with their means."""
     *_, last = archives
     best = last.best[last.best >= 0]
     frame = run.with_row_index("row").select("row", "generation", "individual")
@@ -54,7 +56,6 @@ def _elites(run: pl.DataFrame, archives: Iterable[Elites]) -> pl.DataFrame:
     return run[places["row"]].with_columns(
         fitness=pl.Series(last.fitness[best]),
         descriptor=pl.Series(last.descriptors[best]).arr.to_list(),
-        cell=pl.Series(np.flatnonzero(last.best >= 0).astype(np.uint32)),
     )
 
 
@@ -69,7 +70,7 @@ def _archives(condition: Condition, rows: pl.DataFrame) -> Iterator[tuple[pl.Dat
 
 def _archives_of(condition: Condition, run: pl.DataFrame, cells: Cells) -> Iterator[Elites]:
     d, n = len(cells.low), condition.neat.population
-    elites = make_elites(condition.archive.n_cells, d, 0, 0, 0, condition.archive.depth, n_genomes=0)
+    elites = condition.archive.make_elites(d, n)
     for batch in run.partition_by("generation", maintain_order=True):
         descriptors = batch["descriptor"].explode().to_numpy().reshape(batch.height, d).copy()
         again = np.full(batch.height, -1, np.int32)
@@ -118,10 +119,14 @@ def archive_progress(condition: Condition, rows: pl.DataFrame) -> pl.DataFrame:
         ValueError: Selection is another one.
     """
     n_cells, per_batch = condition.archive.n_cells, condition.neat.population * condition.repeats
+    cells = condition.archive.cells_in(condition.placed_arena, condition.key)
     lines = []
     for run, archives in _archives(condition, rows):
         for batch, elites in enumerate(archives):
-            held = elites.fitness[elites.best[elites.best >= 0]]
+            places = elites.best[elites.best >= 0]
+            best = np.full(n_cells, -math.inf)
+            np.maximum.at(best, place_in_cells(elites.descriptors[places], cells), elites.fitness[places])
+            held = best[best > -math.inf]
             lines.append(
                 {
                     "replicate": int(run["replicate"][0]),

@@ -14,7 +14,7 @@ from realitygap.evolution import MOST_CELLS, MOST_CENTROIDS, cells_of, cvt_point
 from realitygap.kernels.neat import block as block_kernels
 from realitygap.kernels.neat.block import RunRules, Runs
 from realitygap.kernels.neat.elites import Cells, Elites, make_elites
-from realitygap.kernels.neat.genome import Genomes, NeatRules
+from realitygap.kernels.neat.genome import Genomes, NeatRules, make_genomes
 from realitygap.settings import Settings, as_tuple
 from realitygap.trials import PlatformTrials, Tried
 from realitygap.world import Arena
@@ -166,7 +166,21 @@ class ArchiveSettings(Settings):
         ge=1,
         le=100,
         description="Number of genomes that a cell holds (Flageat and Cully 2020). The fittest is its elite. The next "
-        "one follows if the elite is tried again and proves less fit, or belongs in another cell.",
+        "one follows if the elite is tried again and proves less fit, or belongs in another cell. With competition "
+        "cells only.",
+    )
+    competition: Literal["cells", "dominated-novelty"] = Field(
+        "cells",
+        description="Which genomes an archive keeps. cells: the fittest of each cell (MAP-Elites). dominated-novelty: "
+        "as many as there are cells, those that are most unlike fitter ones (Bahlous-Boldi and others 2025); cells "
+        "then show and measure the archive only.",
+    )
+    neighbors: int = Field(
+        3,
+        ge=1,
+        le=100,
+        description="With competition dominated-novelty: number of the nearest fitter genomes whose mean distance "
+        "counts.",
     )
 
     @model_validator(mode="after")
@@ -183,10 +197,15 @@ class ArchiveSettings(Settings):
         most = MOST_CELLS if self.kind == "grid" else MOST_CENTROIDS
         if min(self.cells) < 1 or self.n_cells > most:
             raise ValueError(f"cells are {self.n_cells:,} in all, expected 1 to {most:,}")
-        if self.n_cells * self.depth > MOST_CELLS:
+        if self.n_places > MOST_CELLS:
             raise ValueError(
-                f"{self.n_cells:,} cells of depth {self.depth} hold {self.n_cells * self.depth:,} genomes, expected at "
+                f"{self.n_cells:,} cells of depth {self.depth} hold {self.n_places:,} genomes, expected at "
                 f"most {MOST_CELLS:,}"
+            )
+        if self.competition != "cells" and self.n_cells > MOST_CENTROIDS:
+            raise ValueError(
+                f"cells are {self.n_cells:,} in all, expected at most {MOST_CENTROIDS:,} with competition "
+                f"{self.competition!r}, which compares all genomes with each other"
             )
         return self
 
@@ -194,6 +213,20 @@ class ArchiveSettings(Settings):
     def n_cells(self) -> int:
         """Number of cells."""
         return math.prod(self.cells)
+
+    @property
+    def n_places(self) -> int:
+        """Number of genomes that an archive holds."""
+        return self.n_cells * (self.depth if self.competition == "cells" else 1)
+
+    def make_elites(
+        self, d: int, batch: int, n_outputs: int = 0, room: int = 0, hidden_room: int = 0
+    ) -> Elites:
+        """Return an empty archive of d descriptors; without genomes if there is no room for genes."""
+        genomes = make_genomes(self.n_places if room else 0, n_outputs, room, hidden_room)
+        if self.competition == "cells":
+            return make_elites(self.n_cells, d, genomes, self.depth)
+        return make_elites(self.n_cells, d, genomes, batch=batch, neighbors=self.neighbors)
 
     def n_again(self, population: int) -> int:
         """Return the number of elites that a batch tries again."""
@@ -261,8 +294,7 @@ class Archives:
         self._cells = settings.cells_in(arena, key)
         d = len(self._cells.low)
         self._each: list[Elites] = [
-            make_elites(settings.n_cells, d, neat.n_outputs, room, hidden_room, settings.depth)
-            for _ in range(n_runs)
+            settings.make_elites(d, population, neat.n_outputs, room, hidden_room) for _ in range(n_runs)
         ]
         self._n_again = settings.n_again(population)
         self._again, self._tries, self._kept = np.zeros((3, n_runs, population), np.int32)

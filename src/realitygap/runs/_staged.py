@@ -81,9 +81,7 @@ def run_staged(
     together = runs_together(rules.population)
     if condition.selection == "map-elites":
         in_trials = -(-BLOCK_TRIALS // (rules.population * condition.repeats))
-        together = max(
-            1, min(in_trials, MOST_ELITES // (condition.archive.n_cells * condition.archive.depth))
-        )
+        together = max(1, min(in_trials, MOST_ELITES // condition.archive.n_places))
     together = min(together, total)
     staged = _Staged(condition, rules, together, room, hidden_room)
     for first_run in range(0, total, staged.together):

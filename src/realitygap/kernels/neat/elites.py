@@ -2,7 +2,8 @@
 
 Source: Mouret & Clune, "Illuminating search spaces by mapping elites" (2015), with the variation of NEAT. Cells of a
 CVT are those of Vassiliades, Chatzilygeroudis & Mouret (2018). Where trials are noisy, a cell may hold several genomes,
-as in Flageat & Cully (2020), and elites may be tried again.
+as in Flageat & Cully (2020), and elites may be tried again. Without cells, genomes compete by dominated novelty
+(Bahlous-Boldi, Faldor and others 2025, arXiv 2502.00593).
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from realitygap.kernels.compile.decorators import inlined, shared
 from realitygap.kernels.math.philox import FIRST, PURPOSE_CHILD, make_stream
 
 from .crossover import crossover
-from .genome import Genomes, copy_genome, make_genomes, next_below, next_uniform
+from .genome import Genomes, copy_genome, next_below, next_uniform
 from .mutation import mutate, start_generation
 
 
@@ -33,7 +34,7 @@ class Cells(NamedTuple):
 class Elites(NamedTuple):
     """The genomes of c cells with room for p of them each, and the order in which cells were filled.
 
-    Genomes of cell k are in the places p * k to p * k + p - 1.
+    Genomes of cell k are in the places p * k to p * k + p - 1. An archive without cells has one place for each genome.
     """
 
     genomes: Genomes  # c * p rows
@@ -46,13 +47,24 @@ class Elites(NamedTuple):
     filled: NDArray[np.int32]  # (c,) cells, the first filled one first
     rank: NDArray[np.int32]  # (c,) of each cell in `filled`
     n_filled: NDArray[np.int64]  # (1,)
+    worth: NDArray[np.float64]  # (c + n,) room for the dominated novelty of a batch of n; (0,) of cells
+    nearest: NDArray[np.float64]  # (k,) room for distances to neighbors; (0,) of cells
 
 
-def make_elites(n_cells, n_descriptors, n_outputs, room, hidden_room, depth=1, n_genomes=None):
-    """Return an empty archive; `n_genomes` is 0 for one that keeps no genomes."""
+def make_elites(n_cells, n_descriptors, genomes, depth=1, batch=0, neighbors=0):
+    """Return an empty archive.
+
+    Args:
+        n_cells: Number of cells, or of genomes without cells.
+        n_descriptors: Numbers that describe a genome.
+        genomes: A row for each place; none if the archive keeps no genomes.
+        depth: Genomes of a cell.
+        batch: Individuals of a batch; of an archive without cells.
+        neighbors: Neighbors of dominated novelty; 0 for cells.
+    """
     n = n_cells * depth
     return Elites(
-        make_genomes(n if n_genomes is None else n_genomes, n_outputs, room, hidden_room),
+        genomes,
         np.full(n, -math.inf),
         np.zeros((n, n_descriptors)),
         np.full(n, -1, np.int32),
@@ -62,6 +74,8 @@ def make_elites(n_cells, n_descriptors, n_outputs, room, hidden_room, depth=1, n
         np.zeros(n_cells, np.int32),
         np.zeros(n_cells, np.int32),
         np.zeros(1, np.int64),
+        np.zeros(n_cells + batch if neighbors else 0),
+        np.zeros(neighbors),
     )
 
 
@@ -123,12 +137,102 @@ def _remove(elites, place, depth):
             elites.n_filled[0] = n
 
 
+@inlined
+def _put(elites, place, cell, fitness, descriptors, tries, batch, row):
+    """Let an individual have a place."""
+    elites.fitness[place] = fitness[row]
+    elites.batch[place] = batch
+    elites.individual[place] = row
+    elites.tries[place] = tries[row]
+    for k in range(descriptors.shape[1]):
+        elites.descriptors[place, k] = descriptors[row, k]
+    if elites.best[cell] < 0:
+        elites.filled[elites.n_filled[0]] = cell
+        elites.rank[cell] = elites.n_filled[0]
+        elites.n_filled[0] += 1
+    if elites.best[cell] < 0 or fitness[row] > elites.fitness[elites.best[cell]]:
+        elites.best[cell] = place
+
+
+@inlined
+def _dominated_novelty(elites, fitness, descriptors, cells, one):
+    """Return the mean distance of one to the nearest of those that are fitter, or as fit and before it.
+
+    Infinite for the fittest. Numbers below the places of the archive are those; others are individuals of the batch.
+    """
+    c = elites.best.size
+    nearest = elites.nearest
+    d = descriptors.shape[1]
+    own = elites.fitness[one] if one < c else fitness[one - c]
+    n = 0
+    for other in range(c + fitness.size):
+        if other == one or (other < c and elites.batch[other] < 0):
+            continue
+        value = elites.fitness[other] if other < c else fitness[other - c]
+        if value < own or (value == own and other > one):
+            continue
+        distance = 0.0
+        for k in range(d):
+            here = elites.descriptors[one, k] if one < c else descriptors[one - c, k]
+            there = elites.descriptors[other, k] if other < c else descriptors[other - c, k]
+            off = (here - there) / (cells.high[k] - cells.low[k])
+            distance += off * off
+        if n < nearest.size:
+            n += 1
+        elif distance >= nearest[n - 1]:
+            continue
+        at = n - 1
+        while at > 0 and nearest[at - 1] > distance:
+            nearest[at] = nearest[at - 1]
+            at -= 1
+        nearest[at] = distance
+    if n == 0:
+        return math.inf
+    total = 0.0
+    for k in range(n):
+        total += math.sqrt(nearest[k])
+    return total / n
+
+
+@inlined
+def _keep_novel(fitness, descriptors, tries, cells, elites, batch, kept):
+    """Keep the most novel of the archive and a batch, by dominated novelty; of equal ones the earlier."""
+    c = elites.best.size
+    n = fitness.size
+    surplus = elites.n_filled[0] + n - c
+    for one in range(c + n):
+        if one < c and elites.batch[one] < 0:
+            elites.worth[one] = math.inf  # nobody to be removed
+        else:
+            elites.worth[one] = _dominated_novelty(elites, fitness, descriptors, cells, one)
+    for row in range(n):
+        kept[row] = 0
+    for _ in range(surplus):
+        least = -1
+        for one in range(c + n):
+            is_there = elites.batch[one] >= 0 if one < c else kept[one - c] == 0
+            if is_there and (least < 0 or elites.worth[one] <= elites.worth[least]):
+                least = one
+        if least < c:
+            _remove(elites, least, 1)
+        else:
+            kept[least - c] = -1
+    place = 0
+    for row in range(n):
+        if kept[row] < 0:
+            continue
+        while elites.batch[place] >= 0:
+            place += 1
+        kept[row] = place
+        _put(elites, place, place, fitness, descriptors, tries, batch, row)
+
+
 @shared
 def place_results(fitness, descriptors, again, tries, cells, elites, batch, kept):
     """Place what individuals of a batch did, in their order, without their genomes.
 
     One that finds no room in its cell takes the place of the least fit there, if it is fitter. Of equally fit ones the
-    earlier one stays.
+    earlier one stays. Without cells the archive keeps those with the largest dominated novelty.
 
     Args:
         fitness: (n,) finite. Overwritten with the mean over all that was told of a genome.
@@ -153,6 +257,9 @@ def place_results(fitness, descriptors, again, tries, cells, elites, batch, kept
             mean = elites.descriptors[place, k]
             descriptors[row, k] = mean + (descriptors[row, k] - mean) / tries[row]
         _remove(elites, place, depth)
+    if elites.nearest.size:
+        _keep_novel(fitness, descriptors, tries, cells, elites, batch, kept)
+        return
     for row in range(fitness.size):
         cell = cell_of(descriptors, row, cells)
         place = cell * depth
@@ -163,18 +270,7 @@ def place_results(fitness, descriptors, again, tries, cells, elites, batch, kept
         if not fitness[row] > elites.fitness[place]:
             continue
         kept[row] = place
-        elites.fitness[place] = fitness[row]
-        elites.batch[place] = batch
-        elites.individual[place] = row
-        elites.tries[place] = tries[row]
-        for k in range(d):
-            elites.descriptors[place, k] = descriptors[row, k]
-        if elites.best[cell] < 0:
-            elites.filled[elites.n_filled[0]] = cell
-            elites.rank[cell] = elites.n_filled[0]
-            elites.n_filled[0] += 1
-        if elites.best[cell] < 0 or fitness[row] > elites.fitness[elites.best[cell]]:
-            elites.best[cell] = place
+        _put(elites, place, cell, fitness, descriptors, tries, batch, row)
 
 
 @shared

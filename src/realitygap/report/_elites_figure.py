@@ -145,7 +145,8 @@ def _chosen(tally: Tally, condition: str | None) -> str:
 
 
 def _progress(tally: Tally, run: ChosenRun) -> pl.DataFrame:
-    frames = tally.folder.frames(run.name, columns=_COLUMNS)
+    also = ("parents", "tries") if run.condition.retries_elites else ()
+    frames = tally.folder.frames(run.name, columns=(*_COLUMNS, *also))
     return pl.concat([archive_progress(run.condition, frame) for frame in frames])
 
 

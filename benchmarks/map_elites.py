@@ -1,4 +1,4 @@
-"""MAP-Elites with noisy trials, and its speed beside pyribs that drives our simulator, as JSON.
+"""MAP-Elites with noisy trials, and its speed beside pyribs in our simulator and beside QDax in Kheperax, as JSON.
 
 `python benchmarks/map_elites.py noise --out docs/data` compares ways to deal with noise at equal trials: 20,480 a run,
 10 runs, batches of 256, on `sim` in the paper's arena, for each of three spaces of descriptors. They are 1, 2, 4, and 8
@@ -13,7 +13,10 @@ trials alone; one trial won. Then 2 or 3 runs with other seeds were looked at, o
 `python benchmarks/map_elites.py speed --out docs/data` measures evaluations a second with one thread: `selection =
 "map-elites"`, and a loop of pyribs (GridArchive, GaussianEmitter) that tries networks of fixed structure by
 `try_genomes`. Both have batches of 256, one trial of a network, and the descriptor `region_share` with 3 cells along
-each share. The two are measured in turn, five times each; medians count.
+each share. The two are measured in turn, five times each; medians count. Then the example of Kheperax is measured,
+with QDax on one core, beside `kheperax/study.toml`, which is that example as far as `sim` can be like it: maze, robot,
+steps, fitness, descriptor, cells, and batches are the same. Networks have as many nodes, but NEAT varies them; those of
+Kheperax read -1 where a ray meets nothing, ours 0; and ours are scored by a function of all steps.
 """
 
 from __future__ import annotations
@@ -28,10 +31,14 @@ from typing import Any
 
 import numpy as np
 
+import kheperax_peer
+from environments import build_environment, measure
 from realitygap.evolution import genome_from_record
 from realitygap.platforms import SimPlatform, try_genomes
 from realitygap.runs import Condition, corrected_archive, elites_of, retry_elites, run_replicates
 from realitygap.stats import mean_interval
+from realitygap.study import load_study
+from realitygap.tasks import PythonTask
 from realitygap.trials import NoiseKey
 
 TRIALS, BATCH, RUNS = 20_480, 256, 10
@@ -51,7 +58,7 @@ SPACES: dict[str, dict[str, Any]] = {
     "regions": {"kind": "cvt", "descriptor": ["region_share"], "cells": [500]},
 }
 SEED, NOISE_SEED = 4127, 4128
-TIMES, SPEED_BATCHES = 5, 100
+TIMES, SPEED_BATCHES, MAZE_BATCHES = 5, 100, 10
 
 
 def noise() -> dict[str, Any]:
@@ -158,12 +165,39 @@ def pyribs() -> float:
     return BATCH * SPEED_BATCHES / (time.perf_counter() - began)
 
 
+def maze_condition(batches: int) -> Condition:
+    """Return the condition of the maze of Kheperax."""
+    folder = Path(__file__).parent / "kheperax"
+    condition = load_study(folder / "study.toml").conditions[0]
+    task = PythonTask.from_file(f"python:{folder / 'energy.py'}:energy").allowed()
+    neat = condition.neat.model_copy(update={"generations": batches})
+    return condition.model_copy(update={"task": task, "neat": neat})
+
+
+def maze() -> float:
+    """Return evaluations a second of runs in the maze of Kheperax."""
+    condition = maze_condition(MAZE_BATCHES)
+    began = time.perf_counter()
+    run_replicates(condition, 0, 1)
+    return MAZE_BATCHES * condition.neat.population / (time.perf_counter() - began)
+
+
 def speed() -> dict[str, Any]:
-    """Return the medians of both, measured in turn, and their ratio."""
-    ours(), pyribs()  # compile
-    pairs = [(ours(), pyribs()) for _ in range(TIMES)]
-    mine, others = (statistics.median(each) for each in zip(*pairs, strict=True))
-    return {"ours": mine, "pyribs": others, "ratio": mine / others, "times": TIMES}
+    """Return the medians of each, measured in turn, and the ratios."""
+    ours(), pyribs(), maze()  # compile
+    times = [(ours(), pyribs(), maze()) for _ in range(TIMES)]
+    mine, others, in_maze = (statistics.median(each) for each in zip(*times, strict=True))
+    peer = measure(kheperax_peer.PEER, build_environment(kheperax_peer.PEER, fresh=False), "elites")
+    return {
+        "ours": mine,
+        "pyribs": others,
+        "ratio": mine / others,
+        "ours_in_maze": in_maze,
+        "kheperax": peer["median"],
+        "ratio_in_maze": in_maze / peer["median"],
+        "times": TIMES,
+        "versions": peer["versions"],
+    }
 
 
 def main() -> None:

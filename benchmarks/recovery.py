@@ -13,7 +13,8 @@ the mean over their twins; and `trial-and-error-combined` is better than each of
 with an interval that excludes 0. Strategies with damages try their elites under each damage as well, with more trials
 in simulation than the others have. A twin that fails is tried again by the next call; the tables list what is missing.
 The numbers of the search were chosen on damaged robots on `sim`, and on no twin. One twin of seed 900 of each family
-was looked at while the code was written. The plan was set before the first run.
+was looked at while the code was written. The plan was set before the first run. Between plan and first run, archives
+began to try their elites again by default.
 
 `python benchmarks/recovery.py parameters --out docs/data` shows how the numbers of the search were chosen: repertoires
 for suspected damages evolve on `sim`, twice. Each is searched on 24 robots on `sim` with other numbers and a damage

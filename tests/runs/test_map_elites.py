@@ -28,15 +28,19 @@ from realitygap.world import paper_arena
 pytestmark = pytest.mark.slow
 
 NEAT = {"population": 40, "generations": 6, "add_node": 0.3, "add_link": 0.3}
+ONCE = {"retry": 0.0, "depth": 1}
 VARIANTS: list[dict[str, Any]] = [
-    {"platform": "sim", "archive": {"descriptor": ["mean_turn", "mean_move"], "cells": [6, 5]}},
+    {"platform": "sim", "archive": {"descriptor": ["mean_turn", "mean_move"], "cells": [6, 5], **ONCE}},
     {"platform": "sim", "archive": {"descriptor": ["end", "stall_share"], "cells": [7, 4, 3], "repeats": 3}},
     {"archive": {"descriptor": ["stall_share", "region_share"], "kind": "cvt", "cells": [50]}},
     {"platform": "sim", "archive": {"descriptor": ["turn_spread", "stall_share"], "cells": [6, 5]}},
     {"archive": {"descriptor": ["mean_move", "path"], "kind": "cvt", "cells": [40]}},
     {"archive": {"descriptor": ["end"], "cells": [9, 9], "retry": 0.3, "depth": 2, "repeats": 2}},
     {"archive": {"descriptor": ["end"], "cells": [5, 5], "retry": 0.2, "competition": "dominated-novelty"}},
-    {"archive": {"crossover": 1.0, "descriptor": ["end"], "cells": [9, 9]}, "task": {"cells": "ends"}},
+    {
+        "archive": {"crossover": 1.0, "descriptor": ["end"], "cells": [9, 9], **ONCE},
+        "task": {"cells": "ends"},
+    },
 ]
 
 
@@ -81,16 +85,17 @@ def described(condition: Condition, trace: Any) -> list[float]:
 def test_a_run_is_that_of_ask_and_tell(variant: dict[str, Any]) -> None:
     condition = condition_of(variant)
     archive, replicate = condition.archive, 5
-    bias = condition.has_bias_input
+    bias, has_cells = condition.has_bias_input, archive.competition == "cells"
     told = MapElites(
         len(condition.network_inputs) - bias,
         2,
-        archive.cells if archive.kind == "grid" else archive.cells[0],
+        archive.cells if archive.kind == "grid" and has_cells else archive.n_cells,
         archive.ranges(condition.arena.arena()),
         condition.neat,
         crossover=archive.crossover,
         retry=archive.retry,
-        depth=archive.depth,
+        depth=archive.depth if has_cells else 1,
+        neighbors=0 if has_cells else archive.neighbors,
         replicate=replicate,
         bias=bias,
         key=condition.key,
@@ -119,12 +124,18 @@ def test_a_run_is_that_of_ask_and_tell(variant: dict[str, Any]) -> None:
         told.tell(own["fitness"].to_numpy(), np.array(own["descriptor"].to_list()))
     elites = elites_of(condition, rows)
     expected = sorted(told.elites())
+    if not has_cells:
+        best: dict[int, Any] = {}
+        for one in sorted(expected, key=lambda one: one.fitness):
+            best[int(told.cells_of([one.descriptor])[0])] = one
+        expected = [best[cell]._replace(cell=cell) for cell in sorted(best)]
     assert elites["cell"].to_list() == [one.cell for one in expected]
-    assert elites["generation"].to_list() == [one.batch for one in expected]
     assert elites["fitness"].to_list() == [one.fitness for one in expected]
     progress = archive_progress(condition, rows)
-    assert progress["filled"][-1] == pytest.approx(told.coverage)
-    assert progress["qd_score"][-1] == pytest.approx(told.qd_score() / told.n_cells)
+    if has_cells:
+        assert elites["generation"].to_list() == [one.batch for one in expected]
+        assert progress["filled"][-1] == pytest.approx(told.coverage)
+        assert progress["qd_score"][-1] == pytest.approx(told.qd_score() / told.n_cells)
     if not archive.retry:
         assert progress["qd_score"].is_sorted()
     assert progress["trials"][-1] == 240 * archive.repeats
@@ -221,6 +232,12 @@ def test_other_selections_have_no_archive() -> None:
         ({"archive": {"descriptor": ["end", "end"], "cells": [1, 1, 1, 1]}}, "twice"),
         ({"archive": {"descriptor": ["speed"]}}, "mean_turn"),
         ({"archive": {"repeats": 0}}, "greater than or equal to 1"),
+        ({"archive": {"retry": 1.0}}, "less than 1"),
+        ({"archive": {"cells": [100, 100, 100]}}, "1,000,000 cells of depth 4 hold 4,000,000 genomes"),
+        (
+            {"archive": {"cells": [100, 100, 100], "depth": 1, "competition": "dominated-novelty"}},
+            "1,000,000 in all, expected at most 10,000 with competition 'dominated-novelty'",
+        ),
         ({"platform": "sim", "arena": {"robots": 2, "other_starts": [[0.5, 0.3, 0.0]]}}, "several robots"),
         ({"platform": "scribbler"}, "thousands of trials"),
     ],

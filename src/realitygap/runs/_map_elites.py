@@ -155,14 +155,14 @@ class ArchiveSettings(Settings):
         description="Trials of each genome, with different noise. Its fitness and descriptors are their means.",
     )
     retry: float = Field(
-        0.0,
+        0.25,
         ge=0,
         lt=1,
         description="Share of each batch that tries elites again, those first that were tried least. Their fitness "
         "and descriptors become the means over all their trials, and they move to the cells of these.",
     )
     depth: int = Field(
-        1,
+        4,
         ge=1,
         le=100,
         description="Number of genomes that a cell holds (Flageat and Cully 2020). The fittest is its elite. The next "
@@ -179,8 +179,8 @@ class ArchiveSettings(Settings):
         3,
         ge=1,
         le=100,
-        description="With competition dominated-novelty: number of the nearest fitter genomes whose mean distance "
-        "counts.",
+        description="Number of the nearest fitter genomes whose mean distance counts, with competition "
+        "dominated-novelty.",
     )
 
     @model_validator(mode="after")
@@ -225,8 +225,10 @@ class ArchiveSettings(Settings):
         """Return an empty archive of d descriptors; without genomes if there is no room for genes."""
         genomes = make_genomes(self.n_places if room else 0, n_outputs, room, hidden_room)
         if self.competition == "cells":
-            return make_elites(self.n_cells, d, genomes, self.depth)
-        return make_elites(self.n_cells, d, genomes, batch=batch, neighbors=self.neighbors)
+            elites: Elites = make_elites(self.n_cells, d, genomes, self.depth)
+        else:
+            elites = make_elites(self.n_cells, d, genomes, batch=batch, neighbors=self.neighbors)
+        return elites
 
     def n_again(self, population: int) -> int:
         """Return the number of elites that a batch tries again."""

@@ -698,6 +698,17 @@ def test_fitted_numbers_of_a_page_may_differ_by_a_tenth_of_their_interval(now, i
     assert make_outputs.are_near("delay -0.0042 s -0.0212 to 0.0126", now) == is_near
 
 
+def test_the_table_of_evaluations_a_second_follows_from_its_data():
+    found = json.loads((DOCS / "data" / "map-elites-speed.json").read_text("utf-8"))
+    page = (DOCS / "how-to" / "map-elites.md").read_text("utf-8")
+    table = page[page.index("## Speed") :]
+    shown = [float(number.replace(",", "")) for number in re.findall(r"\| ([\d,]+) \|\n", table)]
+    names = ("ours", "pyribs", "ours_in_maze", "kheperax")
+    assert shown == [round(found[name]) for name in names]
+    assert found["ratio"] == pytest.approx(found["ours"] / found["pyribs"])
+    assert found["ratio_in_maze"] == pytest.approx(found["ours_in_maze"] / found["kheperax"])
+
+
 def way_name(way):
     """Name a way to deal with noise as the page does."""
     parts = ["dominated novelty"] if "competition" in way else []

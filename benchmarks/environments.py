@@ -94,9 +94,9 @@ def run(command: Sequence[str], seconds: float | None = None) -> str:
     return done.stdout
 
 
-def measure(peer: Peer, python: Path, figure: str) -> dict[str, Any]:
+def measure(peer: Peer, python: Path, figure: str, seconds: float = SECONDS) -> dict[str, Any]:
     """One figure of a peer: `median`, `low`, `high`, and whatever else its worker tells."""
-    seconds = FIGURES[figure].seconds if figure in FIGURES else SECONDS
+    seconds = FIGURES[figure].seconds if figure in FIGURES else seconds
     lines = run([str(python), str(peer.script), "--worker", figure], seconds).strip().splitlines()
     answer: dict[str, Any] = json.loads(lines[-1])
     if "error" in answer:

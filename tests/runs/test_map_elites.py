@@ -100,7 +100,7 @@ def test_a_run_is_that_of_ask_and_tell(variant: dict[str, Any]) -> None:
         bias=bias,
         key=condition.key,
     )
-    told._cells = archive.cells_in(condition.arena.arena(), condition.key)
+    told._space = told._cells = archive.cells_in(condition.arena.arena(), condition.key)
     rows = run_replicates(condition, replicate, 1)
     for batch in range(condition.neat.generations):
         genomes, fitness, descriptors = told.ask(), [], []
@@ -214,6 +214,42 @@ def test_archives_of_pyribs_have_the_same_elites_in_the_same_cells(variant: dict
     two = elites.vstack(elites.with_columns(replicate=pl.lit(1, pl.UInt32)))
     with pytest.raises(ValueError, match="rows of 2 runs"):
         to_ribs(condition, two)
+
+
+def test_rows_that_do_not_tell_all_trials_of_elites_are_refused() -> None:
+    condition = condition_of({"platform": "sim", "archive": {"descriptor": ["end"], "cells": [6, 5]}})
+    rows = run_replicates(condition, 0, 2)
+    assert rows["tries"].max() > 1
+    for wrong, says in (
+        (rows.drop("tries"), "have no column tries"),
+        (rows.drop("tries", "parents"), "no column parents and no column tries"),
+        (rows.filter(pl.col("generation") > 1), "Rows of run 0 .* are not all rows from its first batch on"),
+        (rows.filter(pl.col("individual") > 0), "are not all rows"),
+        (rows.filter((pl.col("replicate") == 0) | (pl.col("fitness") > 0.05)), "Rows of run 1"),
+    ):
+        for read in (elites_of, archive_progress):
+            with pytest.raises(ValueError, match=says):
+                read(condition, wrong)
+    assert elites_of(condition, rows.filter(pl.col("generation") < 3)).height
+
+
+def test_means_of_elites_are_those_of_their_rows() -> None:
+    condition = condition_of(VARIANTS[3])
+    rows = run_replicates(condition, 0, 1)
+    by_number = dict(enumerate(rows.iter_rows(named=True)))
+    elites = elites_of(condition, rows)
+    assert elites["tries"].max() > 2
+    for elite in elites.iter_rows(named=True):
+        row = by_number[elite["generation"] * condition.neat.population + elite["individual"]]
+        trials = [row]
+        while trials[-1]["tries"] > 1:
+            trials.append(by_number[trials[-1]["parents"][0]])
+            assert trials[-1]["genome"] == row["genome"]
+        assert len(trials) == elite["tries"]
+        assert elite["fitness"] == pytest.approx(np.mean([each["fitness"] for each in trials]))
+        np.testing.assert_allclose(
+            elite["descriptor"], np.mean([one["descriptor"] for one in trials], axis=0)
+        )
 
 
 def test_other_selections_have_no_archive() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple, Self
 
@@ -37,8 +38,8 @@ class Elite(NamedTuple):
 
     Attributes:
         cell: Number of its cell; of a grid, in row-major order of the descriptors.
-        fitness: Its fitness, the mean of all that was told.
-        descriptor: (d,) its descriptors, in the same way.
+        fitness: Mean of its fitness, over all that was told.
+        descriptor: (d,) means of its descriptors.
         batch: Number of the batch in which it was told last.
         genome: The genome.
         tries: How often it was told.
@@ -71,8 +72,9 @@ class MapElites:
     parents).
 
     With `neighbors`, there are no cells: the archive keeps those genomes that differ most from fitter ones, in parts of
-    the ranges (dominated novelty search, Bahlous-Boldi and others 2025). Of equally fit genomes an earlier one counts
-    as fitter, so that copies do not fill it. An elite's `cell` is then its place.
+    the ranges (dominated novelty search, Bahlous-Boldi and others 2025). Of equally fit genomes one counts as fitter,
+    so that copies do not fill it: one that is held before one of the batch, and then that in the first place. An
+    elite's `cell` is then its place.
 
     Attributes:
         settings: NEAT's settings; `population` is the size of a batch.
@@ -143,14 +145,17 @@ class MapElites:
             raise ValueError(f"retry is {retry}, expected 0 to less than 1.")
         self.depth = whole_number("depth", depth, 1)
         self.neighbors = whole_number("neighbors", neighbors, 0, MOST_CENTROIDS)
-        if self.neighbors and (self.depth > 1 or isinstance(cells, Sequence)):
+        if self.neighbors and isinstance(cells, Sequence):
             raise ValueError(
-                f"neighbors is {neighbors}, expected 0 with a grid and with a depth: an archive without cells has one "
-                "number of genomes."
+                f"cells is {cells}, expected one number of genomes with neighbors = {neighbors}."
             )
+        if self.neighbors and self.depth > 1:
+            raise ValueError(f"depth is {depth}, expected 1 with neighbors = {neighbors}.")
         limits = _checked_ranges(ranges)
         self.ranges = tuple(map(tuple, limits.tolist()))
-        self._cells = cells_of(cells, limits, int(self._key))
+        if self.neighbors:
+            whole_number("cells", cells, 1, MOST_CENTROIDS)
+        self._space = cells_of(1 if self.neighbors else cells, limits, int(self._key))
         self.cells = tuple(map(int, cells)) if isinstance(cells, Sequence) else int(cells)
         if self.n_cells * self.depth > MOST_CELLS:
             raise ValueError(
@@ -177,6 +182,13 @@ class MapElites:
         )
         self._parents, self._again = np.full((n, 2), -1, np.int32), np.full(n, -1, np.int32)
         first_genomes(self._genomes, self._rules, self._key, self._replicate, 0)
+
+    @cached_property
+    def _cells(self) -> Cells:
+        """Cells for measures; without cells, those of a CVT, whose centroids take long to spread."""
+        if not self.neighbors:
+            return self._space
+        return cells_of(self.cells, np.array(self.ranges), int(self._key))
 
     @property
     def n_cells(self) -> int:
@@ -212,7 +224,7 @@ class MapElites:
         """Take the fitness and the descriptors of this batch, keep new elites, and make the next batch.
 
         Args:
-            fitness: (n,) finite; more is fitter. Of equally fit genomes the earlier one stays.
+            fitness: (n,) finite; more is fitter. A genome that is held stays where another is only as fit.
             descriptors: (n, d) finite.
 
         Raises:
@@ -234,7 +246,7 @@ class MapElites:
             )
         tries, kept = np.empty((2, n), np.int32)
         kernels.place_elites(
-            self._genomes, values, places, self._again, tries, self._cells, self._elites, self.batch, kept
+            self._genomes, values, places, self._again, tries, self._space, self._elites, self.batch, kept
         )
         room, hidden_room = self._genomes.innovation.shape[1], self._genomes.hidden.shape[1]
         while True:

@@ -222,7 +222,7 @@ DERIVED: Mapping[str, Derived] = {
             Column(
                 "parent_1",
                 _U32,
-                "Its parent in the generation before; null if it has none.",
+                "Its first parent, of the generation before or, with MAP-Elites, of any; null if it has none.",
                 nullable=True,
             ),
             Column("parent_2", _U32, "Its second parent; null if it has none.", nullable=True),

@@ -60,7 +60,8 @@ def draw_elites(
         condition: Condition. Default: the first with selection map-elites.
         replicate: Run. Default: the typical one, as in `draw_paths`.
         name: First part of the ids in the drawing.
-        played: Generation and individual of the trials that the page can play: a click on a cell plays its elite.
+        played: Generation and individual of the trials that the page can play: a click on a cell plays the last trial
+            of its elite.
 
     Raises:
         RecordError: there is no such folder, a file in it is damaged, or it holds no trials yet.
@@ -260,7 +261,7 @@ def _panels(
             points = group.select("column", "row").to_numpy()[order] + 0.5
             labels = tuple("/".join(map(str, trials[i])) for i in order)
             n_played = sum(each in played for each in trials)
-            text = "Fitness {name}, generation and individual {label}"
+            text = "Mean fitness {name}, generation and individual {label}"
             series.append(Series(text, points, f"{value:.3f}", labels, link if n_played else "", n_played))
         panels.append(Panel(f"{what}-{k}", tuple(series), (1, 1)))
     return panels

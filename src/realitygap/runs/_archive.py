@@ -38,9 +38,10 @@ def elites_of(condition: Condition, rows: pl.DataFrame) -> pl.DataFrame:
         replicate and cell. Of an elite that was tried again it is the last row, with the means of all its trials.
 
     Raises:
-        ValueError: Selection is another one.
+        ValueError: Selection is another one. Or elites are tried again, and rows or the columns `parents` and `tries`
+            are missing.
     """
-    parts = [_held(run, archives) for run, archives in _archives(condition, rows)]
+    parts = [_held(run, archives) for run, _, archives in _archives(condition, rows)]
     held = pl.concat(parts) if parts else rows
     return _best(held.with_columns(cell=_cells(condition, held["descriptor"])), "cell", "fitness")
 
@@ -59,13 +60,44 @@ def _held(run: pl.DataFrame, archives: Iterable[Elites]) -> pl.DataFrame:
     )
 
 
-def _archives(condition: Condition, rows: pl.DataFrame) -> Iterator[tuple[pl.DataFrame, Iterator[Elites]]]:
-    """Yield the sorted rows of each run, and its archive after each batch, without genomes; it changes in place."""
+def _archives(
+    condition: Condition, rows: pl.DataFrame
+) -> Iterator[tuple[pl.DataFrame, Cells, Iterator[Elites]]]:
+    """Yield the sorted rows of each run, the cells, and its archive after each batch.
+
+    The archive has no genomes, and changes in place.
+    """
     _refuse_other_selections(condition)
     cells = condition.archive.cells_in(condition.placed_arena, condition.key)
     by = ["replicate", "generation", "individual"]
     for run in rows.sort(by, maintain_order=True).partition_by("replicate", maintain_order=True):
-        yield run, _archives_of(condition, run, cells)
+        if condition.retries_elites:
+            _refuse_parts(condition, run)
+        yield run, cells, _archives_of(condition, run, cells)
+
+
+def _refuse_parts(condition: Condition, run: pl.DataFrame) -> None:
+    """Raise an error unless rows of a run begin with its first batch, whole, and say what was tried again.
+
+    Raises:
+        ValueError: A column or a row is missing.
+    """
+    missing = " and no column ".join(name for name in ("parents", "tries") if name not in run.columns)
+    if missing:
+        raise ValueError(
+            f"Rows of condition {condition.name!r} have no column {missing}. Read it as well: elites are tried again, "
+            "and their means follow from it."
+        )
+    n = condition.neat.population
+    order = np.arange(run.height)
+    is_whole = run.height % n == 0
+    is_whole &= np.array_equal(run["generation"].to_numpy(), order // n)
+    is_whole &= np.array_equal(run["individual"].to_numpy(), order % n)
+    if not is_whole:
+        raise ValueError(
+            f"Rows of run {run['replicate'][0]} of condition {condition.name!r} are not all rows from its first batch "
+            "on. Read these: its elites are tried again, and their means follow from all of their rows."
+        )
 
 
 def _archives_of(condition: Condition, run: pl.DataFrame, cells: Cells) -> Iterator[Elites]:
@@ -74,7 +106,7 @@ def _archives_of(condition: Condition, run: pl.DataFrame, cells: Cells) -> Itera
     for batch in run.partition_by("generation", maintain_order=True):
         descriptors = batch["descriptor"].explode().to_numpy().reshape(batch.height, d).copy()
         again = np.full(batch.height, -1, np.int32)
-        if "tries" in batch.columns:
+        if condition.retries_elites:
             is_again = batch["tries"].to_numpy() > 1
             place_of = {
                 int(elites.batch[place]) * n + int(elites.individual[place]): place
@@ -116,17 +148,18 @@ def archive_progress(condition: Condition, rows: pl.DataFrame) -> pl.DataFrame:
         the elites' fitness divided by the number of cells, and `best` fitness.
 
     Raises:
-        ValueError: Selection is another one.
+        ValueError: As `elites_of`.
     """
     n_cells, per_batch = condition.archive.n_cells, condition.neat.population * condition.repeats
-    cells = condition.archive.cells_in(condition.placed_arena, condition.key)
     lines = []
-    for run, archives in _archives(condition, rows):
+    for run, cells, archives in _archives(condition, rows):
         for batch, elites in enumerate(archives):
             places = elites.best[elites.best >= 0]
-            best = np.full(n_cells, -math.inf)
-            np.maximum.at(best, place_in_cells(elites.descriptors[places], cells), elites.fitness[places])
-            held = best[best > -math.inf]
+            held = elites.fitness[places]
+            if condition.archive.competition != "cells":
+                best = np.full(n_cells, -math.inf)
+                np.maximum.at(best, place_in_cells(elites.descriptors[places], cells), held)
+                held = best[best > -math.inf]
             lines.append(
                 {
                     "replicate": int(run["replicate"][0]),

@@ -152,7 +152,8 @@ class ArchiveSettings(Settings):
         1,
         ge=1,
         le=1000,
-        description="Trials of each genome, with different noise. Its fitness and descriptors are their means.",
+        description="Trials of a genome each time it is tried, with different noise. Its fitness and descriptors are "
+        "their means.",
     )
     retry: float = Field(
         0.25,
@@ -200,7 +201,7 @@ class ArchiveSettings(Settings):
         if self.n_places > MOST_CELLS:
             raise ValueError(
                 f"{self.n_cells:,} cells of depth {self.depth} hold {self.n_places:,} genomes, expected at "
-                f"most {MOST_CELLS:,}"
+                f"most {MOST_CELLS:,}. Set fewer cells or a lower depth"
             )
         if self.competition != "cells" and self.n_cells > MOST_CENTROIDS:
             raise ValueError(

@@ -156,9 +156,10 @@ def _put(elites, place, cell, fitness, descriptors, tries, batch, row):
 
 @inlined
 def _dominated_novelty(elites, fitness, descriptors, cells, one):
-    """Return the mean distance of one to the nearest of those that are fitter, or as fit and before it.
+    """Return the mean distance of one to the nearest of those that are fitter, or as fit with a lower number.
 
-    Infinite for the fittest. Numbers below the places of the archive are those; others are individuals of the batch.
+    Infinite for the fittest. Numbers below that of places are places of the archive; others are individuals of the
+    batch.
     """
     c = elites.best.size
     nearest = elites.nearest
@@ -196,7 +197,7 @@ def _dominated_novelty(elites, fitness, descriptors, cells, one):
 
 @inlined
 def _keep_novel(fitness, descriptors, tries, cells, elites, batch, kept):
-    """Keep the most novel of the archive and a batch, by dominated novelty; of equal ones the earlier."""
+    """Keep the most novel of the archive and a batch, by dominated novelty; of equal ones those of lower number."""
     c = elites.best.size
     n = fitness.size
     surplus = elites.n_filled[0] + n - c
@@ -231,8 +232,9 @@ def _keep_novel(fitness, descriptors, tries, cells, elites, batch, kept):
 def place_results(fitness, descriptors, again, tries, cells, elites, batch, kept):
     """Place what individuals of a batch did, in their order, without their genomes.
 
-    One that finds no room in its cell takes the place of the least fit there, if it is fitter. Of equally fit ones the
-    earlier one stays. Without cells the archive keeps those with the largest dominated novelty.
+    One that finds no room in its cell takes the place of the least fit there, the first of several, if it is fitter.
+    Without cells the archive keeps those with the largest dominated novelty, of equal ones those in lower places, and
+    before those of the batch.
 
     Args:
         fitness: (n,) finite. Overwritten with the mean over all that was told of a genome.

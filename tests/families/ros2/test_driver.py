@@ -416,11 +416,15 @@ def test_range_that_is_no_number_is_nothing_in_range(connect, value):
     wait_until(lambda: robot.observe().readings == (0.0, 0.0, 0.0))
 
 
-def test_no_program_is_left_when_it_is_closed(connect: Callable[..., Any]) -> None:
+@pytest.mark.parametrize("is_frozen", [False, True])
+def test_no_program_is_left_when_it_is_closed(connect: Callable[..., Any], is_frozen: bool) -> None:
     _, robot = connect()
     numbers = [process.pid for process in robot.link.port.processes]
     assert len(numbers) == 2
-    robot.close()
+    if is_frozen:
+        os.kill(numbers[0], signal.SIGSTOP)
+    with pytest.raises(RobotError) if is_frozen else contextlib.nullcontext():
+        robot.close()
     for number in numbers:
         with pytest.raises(ProcessLookupError):
             os.kill(number, 0)

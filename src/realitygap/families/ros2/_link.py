@@ -143,6 +143,8 @@ class GatewayPort:
         self._process.wait()
         self._ours.close()
         self._process, self._spare = self._spare or self._process, None
+        with contextlib.suppress(subprocess.TimeoutExpired):  # it stops the robot, and ends by itself
+            self._process.wait(ANSWER_S)
 
 
 class Link:

@@ -709,6 +709,17 @@ def test_the_table_of_evaluations_a_second_follows_from_its_data():
     assert found["ratio_in_maze"] == pytest.approx(found["ours_in_maze"] / found["kheperax"])
 
 
+def test_the_archives_of_the_maze_of_kheperax_follow_from_their_data():
+    found = json.loads((DOCS / "data" / "map-elites-kheperax.json").read_text("utf-8"))
+    page = " ".join((DOCS / "how-to" / "map-elites.md").read_text("utf-8").split())
+    filled, scores = ([run[name] for run in found["ours"]] for name in ("filled", "qd_score"))
+    theirs = found["kheperax"]
+    assert f"After {theirs['evaluations']:,} evaluations, three archives" in page
+    assert f"fill {100 * min(filled):.1f} % to {100 * max(filled):.1f} % of the cells" in page
+    assert f"that of the example {100 * theirs['filled']:.1f} %." in page
+    assert f"are {min(scores):,.0f} to {max(scores):,.0f}, and {theirs['qd_score']:,.0f}" in page
+
+
 def way_name(way):
     """Name a way to deal with noise as the page does."""
     parts = ["dominated novelty"] if "competition" in way else []

@@ -720,6 +720,20 @@ def test_the_archives_of_the_maze_of_kheperax_follow_from_their_data():
     assert f"are {min(scores):,.0f} to {max(scores):,.0f}, and {theirs['qd_score']:,.0f}" in page
 
 
+def test_the_numbers_of_the_search_follow_from_their_data():
+    found = json.loads((DOCS / "data" / "recovery-parameters.json").read_text("utf-8"))
+    page = " ".join((DOCS / "how-to" / "transfer.md").read_text("utf-8").split())
+    score = {
+        tuple(row[name] for name in ("spread", "offset", "kappa", "unlikely")): row["scores"][2]
+        for row in found["table"]
+    }
+    assert found["budgets"][2] == 10
+    own, papers = score[0.1, 0.1, 1.0, 0.1], score[1.0, 0.0, 0.05, None]
+    assert f"mean coverage is {own:.3f}, and {papers:.3f} with the paper's numbers" in page
+    assert f"12 trials of each, reaches {found['best_by_12_trials_of_each']:.3f}." in page
+    assert f"chosen on {found['robots']} damaged robots" in page
+
+
 def way_name(way):
     """Name a way to deal with noise as the page does."""
     parts = ["dominated novelty"] if "competition" in way else []

@@ -259,7 +259,7 @@ def frame_of_results(drawn: Any, folder: Path) -> None:
 
 PLACE = st.tuples(NINE_DIGITS.filter(lambda x: abs(x) < 5e3), NINE_DIGITS.filter(lambda x: abs(x) < 5e3))
 EVIDENCE = st.recursive(
-    st.booleans() | st.integers(-(2**63), 2**63 - 1) | NINE_DIGITS | TEXT,
+    st.booleans() | st.integers(-(2**63), 2**63 - 1) | NUMBER | TEXT,
     lambda inner: st.lists(inner, max_size=3) | st.dictionaries(TEXT, inner, max_size=3),
     max_leaves=6,
 )
@@ -292,8 +292,8 @@ TRIPS: dict[str, Trip] = {
                 ),
                 "name": NAME,
                 "unit": TEXT,
-                "interval": st.lists(NINE_DIGITS, min_size=5, max_size=5).map(sorted),
-                "draws": st.lists(st.floats(0.1, 0.2).map(lambda x: float(f"{x:.9g}")), min_size=1, max_size=3),
+                "interval": st.lists(NUMBER, min_size=5, max_size=5).map(sorted),
+                "draws": st.lists(st.floats(0.1, 0.2), min_size=1, max_size=3),
                 "evidence": st.dictionaries(TEXT, EVIDENCE, max_size=3),
             }
         ),

@@ -28,7 +28,7 @@ def toml_value(value: object, *, digits: int | None = DIGITS) -> str:
     if isinstance(value, int):
         return str(value)
     if isinstance(value, float):
-        return repr(value if digits is None else float(f"{value:.{digits}g}"))
+        return repr(value if digits is None else _shortened(value, digits))
     if isinstance(value, Mapping):
         parts = ", ".join(
             f"{toml_key(key)} = {toml_value(part, digits=digits)}" for key, part in value.items()
@@ -37,6 +37,23 @@ def toml_value(value: object, *, digits: int | None = DIGITS) -> str:
     if isinstance(value, list | tuple):
         return f"[{', '.join(toml_value(part, digits=digits) for part in value)}]"
     raise TypeError(f"{value!r} is a {type(value).__name__}, expected a text, a number, a list or a table.")
+
+
+def as_in_file(value: object) -> object:
+    """Return a value with its numbers as a file has them, so that computing with them does not depend on the file."""
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    if isinstance(value, float):
+        return _shortened(value, DIGITS)
+    if isinstance(value, Mapping):
+        return {key: as_in_file(part) for key, part in value.items()}
+    if isinstance(value, list | tuple):
+        return [as_in_file(part) for part in value]
+    return value
+
+
+def _shortened(value: float, digits: int) -> float:
+    return float(f"{value:.{digits}g}")
 
 
 def toml_key(key: str) -> str:

@@ -10,7 +10,7 @@ from typing import Any, Literal, Self
 from pydantic import Field, PrivateAttr, model_validator
 
 import realitygap
-from realitygap._toml import toml_table
+from realitygap._toml import as_in_file, toml_table
 from realitygap.drawing import Bar, Card, ShownAsCard, Table, card_of
 from realitygap.settings import Settings
 
@@ -27,7 +27,16 @@ _HEAD = """\
 """
 
 
-class Fitted(Settings):
+class _AsInFile(Settings):
+    """Settings whose numbers are those of their file, so that a run with them is the run with the file."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _has_the_numbers_of_its_file(cls, values: Any) -> Any:
+        return as_in_file(values)
+
+
+class Fitted(_AsInFile):
     """One fitted parameter.
 
     It may stand for several numbers of the robot: `body.length` for the x of all corners, `range.decay` for that of all
@@ -118,7 +127,7 @@ def _is_bound(values: Mapping[str, Any], lower: str = "low", upper: str = "high"
     return (least != 0.0 and first - least <= near) or ((least, most) != (0.0, 1.0) and most - last <= near)
 
 
-class Calibration(Settings, ShownAsCard):
+class Calibration(_AsInFile, ShownAsCard):
     """A calibration of a robot: the fitted parameters, the robot's numbers, and draws from the posterior."""
 
     format: Literal["realitygap calibration 1"] = "realitygap calibration 1"

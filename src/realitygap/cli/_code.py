@@ -1,4 +1,4 @@
-"""Asking whether the Python file of a task may run."""
+"""Asking whether a Python file of a study may run."""
 
 from __future__ import annotations
 
@@ -15,15 +15,24 @@ from ._keys import read_line
 
 if TYPE_CHECKING:
     from realitygap.study import AllowCode
-    from realitygap.tasks import PythonTask
+    from realitygap.tasks import PythonFunction
 
 AllowTasks = Annotated[
     bool,
     typer.Option(
-        "--allow-code", help="Run the Python files of tasks without asking. The answer is not remembered."
+        "--allow-code", help="Run the Python files of a study without asking. The answer is not remembered."
     ),
 ]
 """The option of commands that run studies."""
+
+
+AllowFiles = Annotated[
+    bool,
+    typer.Option(
+        "--allow-code", help="Run the Python files that correcting an archive needs, without asking."
+    ),
+]
+"""The option of commands that draw results."""
 
 
 def _allow_platforms(wanted: bool) -> None:
@@ -51,13 +60,13 @@ def code_permission(allow_code: bool) -> AllowCode:
 def _ask_once() -> AllowCode:
     answers: set[str] = set()
 
-    def ask(task: PythonTask) -> bool:
+    def ask(function: PythonFunction) -> bool:
         """Show a file and ask; an answer that cannot be saved holds for this command."""
-        if task.sha256 not in answers:
+        if function.sha256 not in answers:
             if not _is_terminal():
                 return False
-            _ask(task)
-            answers.add(task.sha256)
+            _ask(function)
+            answers.add(function.sha256)
         return True
 
     return ask
@@ -69,8 +78,8 @@ def _is_terminal() -> bool:
     return all(stream is not None and stream.isatty() for stream in streams)
 
 
-def _ask(task: PythonTask) -> None:
-    """Show the file of a task and remember that it may run.
+def _ask(function: PythonFunction) -> None:
+    """Show the file of a function and remember that it may run.
 
     Raises:
         TaskError: The file may not run.
@@ -78,22 +87,22 @@ def _ask(task: PythonTask) -> None:
     from realitygap.settings import visible
 
     # `splitlines` also splits at letters that do not end a line of Python.
-    lines = task.source.removesuffix("\n").split("\n")
+    lines = function.source.removesuffix("\n").split("\n")
     echo(
-        f"This study runs {task.function_name} of {visible(task.file)}, which you have not allowed before:\n",
+        f"This study runs {function.function_name} of {visible(function.file)}, which you have not allowed before:\n",
         err=True,
     )
     for number, line in enumerate(lines, 1):
         echo(f"{number:5d}  {visible(line)}", err=True)
     echo(
-        f"\n{visible(task.file)}: {len(lines)} lines, SHA-256 {task.sha256}\nThis code, and the modules that "
+        f"\n{visible(function.file)}: {len(lines)} lines, SHA-256 {function.sha256}\nThis code, and the modules that "
         "it imports, can do everything on this machine that you can do.\nRun it? [y/N] ",
         err=True,
         nl=False,
     )
     if read_line().lower() not in ("y", "yes"):
-        raise TaskError(f"{visible(task.file)} may not run. Nothing was run, and nothing was written.")
+        raise TaskError(f"{visible(function.file)} may not run. Nothing was run, and nothing was written.")
     try:
-        realitygap.tasks.remember_allowed(task.sha256, task.file)
+        realitygap.tasks.remember_allowed(function.sha256, function.file)
     except (OSError, RuntimeError) as error:
         echo(f"realitygap: note: the answer cannot be saved: {error}.", err=True)

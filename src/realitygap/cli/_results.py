@@ -13,6 +13,7 @@ import typer
 import realitygap
 from realitygap._terminal import echo
 
+from ._code import AllowFiles
 from ._options import ShowPage
 
 Folder = Annotated[Path, typer.Argument(metavar="DIR", help="Folder of results, such as results/paper.")]
@@ -30,6 +31,7 @@ def report(
         ),
     ] = None,
     open_page: ShowPage = False,
+    allow_code: AllowFiles = False,
 ) -> None:
     """Write the HTML report of a study.
 
@@ -41,7 +43,7 @@ def report(
 
     In Python: realitygap.write_report("results/paper", figures="figures")
     """
-    path = written_report(folder, out, figures=figures)
+    path = written_report(folder, out, figures=figures, allow_code=allow_code)
     if figures is not None:
         echo(f"Figures and tables: {figures}")
     if open_page:
@@ -49,12 +51,17 @@ def report(
 
 
 def written_report(
-    folder: Path, out: Path | None = None, *, figures: Path | None = None, to_stderr: bool = False
+    folder: Path,
+    out: Path | None = None,
+    *,
+    figures: Path | None = None,
+    allow_code: bool = False,
+    to_stderr: bool = False,
 ) -> Path:
     """Write a report; print its path and the seconds that it took."""
     started = time.perf_counter()
 
-    path = realitygap.report.write_report(folder, out, figures=figures)
+    path = realitygap.report.write_report(folder, out, figures=figures, allow_code=allow_code)
     echo(f"Written: {path} ({time.perf_counter() - started:.1f} s)", err=to_stderr)
     return path
 

@@ -13,6 +13,8 @@ import realitygap
 from realitygap._terminal import echo
 from realitygap.errors import RealityGapError, StudyError
 
+from ._code import AllowFiles
+
 if TYPE_CHECKING:
     from realitygap.report import Each, Subject
 
@@ -93,6 +95,7 @@ def show(
             help="Number of trials on each platform. [default: 30]", rich_help_panel=_ONLY_DIVERGENCE
         ),
     ] = None,
+    allow_code: AllowFiles = False,
 ) -> None:
     """Draw a run, trial, network, arena, or robot.
 
@@ -168,7 +171,7 @@ def show(
             )
         else:
             subject, folder = _subject(what, name, out)
-            path = realitygap.report.save_view(folder, out, subject=subject, **numbers)
+            path = realitygap.report.save_view(folder, out, subject=subject, allow_code=allow_code, **numbers)
     except ValueError as error:
         raise RealityGapError(str(error)) from error
     echo(f"Written: {path}")

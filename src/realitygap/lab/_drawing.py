@@ -93,8 +93,8 @@ class Drawer:
         root: Folder in which the process works.
     """
 
-    def __init__(self, root: Path) -> None:
-        self._root = root
+    def __init__(self, root: Path, *, allow_code: bool) -> None:
+        self._root, self._allow_code = root, allow_code
         self._child: Child | None = None
         self._hearers: dict[str, Callable[[messages.Message], None]] = {}
         self._lock = threading.Lock()
@@ -127,7 +127,7 @@ class Drawer:
 
     def _start(self) -> Child:
         if self._child is None or not self._child.is_alive:
-            self._child = Child(messages.DrawingWork(), self._root, self._hear)
+            self._child = Child(messages.DrawingWork(self._allow_code), self._root, self._hear)
         return self._child
 
     def _hear(self, message: messages.Message) -> None:
@@ -157,7 +157,7 @@ def draw(channel: Channel, work: messages.DrawingWork) -> None:
     while time.monotonic() - last < IDLE_S:
         wish = wishes.next(timeout=0.2)
         if wish is not None:
-            _grant(channel, wish, wishes)
+            _grant(channel, wish, wishes, allow_code=work.allow_code)
             last = time.monotonic()
 
 
@@ -190,12 +190,12 @@ class _Wishes:
         return None
 
 
-def _grant(channel: Channel, wish: DrawingWish, wishes: _Wishes) -> None:
+def _grant(channel: Channel, wish: DrawingWish, wishes: _Wishes, *, allow_code: bool) -> None:
     folder = Path(wish.folder)
     try:
         match wish:
             case messages.FiguresWish():
-                _draw_all(channel, wish, lambda: _grant_quick(channel, wishes))
+                _draw_all(channel, wish, lambda: _grant_quick(channel, wishes, allow_code=allow_code))
             case messages.ThumbnailWish():
                 rows = _rows(read_tally(folder, with_uncounted=True))
                 keep_thumbnail(folder, _thumbnail(folder, rows))
@@ -214,7 +214,7 @@ def _grant(channel: Channel, wish: DrawingWish, wishes: _Wishes) -> None:
                 trials = pack_trials(moving)
                 channel.say(messages.Replay(wish.folder, wish.key, scene, trials, weights, list(inputs)))
             case messages.ReportWish():
-                write_report(ResultsFolder.open(folder))
+                write_report(ResultsFolder.open(folder), allow_code=allow_code)
                 channel.say(messages.ReportWritten(wish.folder))
     except (RealityGapError, ValueError, TypeError, OSError) as error:
         match wish:
@@ -226,9 +226,9 @@ def _grant(channel: Channel, wish: DrawingWish, wishes: _Wishes) -> None:
                 channel.say(messages.ReportWritten(wish.folder, str(error)))
 
 
-def _grant_quick(channel: Channel, wishes: _Wishes) -> None:
+def _grant_quick(channel: Channel, wishes: _Wishes, *, allow_code: bool) -> None:
     while (wish := wishes.quick()) is not None:
-        _grant(channel, wish, wishes)
+        _grant(channel, wish, wishes, allow_code=allow_code)
 
 
 def _rows(tally: Tally) -> list[messages.SummaryRow]:

@@ -18,7 +18,7 @@ from realitygap.robot_families import default_family, find_family, ports_in_word
 from realitygap.robots import split_port
 from realitygap.runs import NAME_PATTERN
 from realitygap.settings import shown
-from realitygap.study import Study, python_tasks
+from realitygap.study import Study, python_functions
 
 LONGEST_TEXT = 200_000
 """Largest length of a study file [letters]."""
@@ -86,16 +86,16 @@ def files_outside(root: Path, text: str) -> tuple[list[str], dict[str, Any]]:
 
 
 def refuse_code(study: Study, allow_code: bool) -> None:
-    """Refuse a study whose tasks are Python files, unless the lab may run code.
+    """Refuse a study with functions of Python files, unless the lab may run code.
 
     Raises:
-        StudyError: It has such a task.
+        StudyError: It has such a function.
     """
-    tasks = python_tasks(study)
-    if tasks and not allow_code:
+    functions = python_functions(study)
+    if functions and not allow_code:
         raise StudyError(
-            f"{shown(tasks[0].kind)} runs code on the lab's machine, which this lab does not allow. Read the file. If "
-            "you trust it, start the lab with: realitygap lab --allow-code"
+            f"{shown(functions[0].kind)} runs code on the lab's machine, which this lab does not allow. Read the file. "
+            "If you trust it, start the lab with: realitygap lab --allow-code"
         )
 
 

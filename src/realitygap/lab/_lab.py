@@ -69,7 +69,7 @@ class Lab:
         self.version = 0
         self.gap: GapJob | None = None
         self.calibration: CalibrationJob | None = None
-        self.drawer = Drawer(root)
+        self.drawer = Drawer(root, allow_code=allow_code)
         self.watchers: dict[str, Watcher] = {}
         self._counts: dict[str, Counts] = {}
         self._photos: dict[str, Photos] = {}

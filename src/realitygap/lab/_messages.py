@@ -250,9 +250,14 @@ class HandWork(Work):
 
 
 class DrawingWork(Work):
-    """Draw what is wished for, until nobody wishes for anything."""
+    """Draw what is wished for, until nobody wishes for anything.
+
+    Attributes:
+        allow_code: Whether Python files of tasks may run.
+    """
 
     function: ClassVar[str] = "_drawing:draw"
+    allow_code: bool = False
 
 
 class GapWork(Work):

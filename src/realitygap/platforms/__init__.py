@@ -28,7 +28,15 @@ from ._spec import (
     platform_of,
     split_spec,
 )
-from ._try import open_trials, scores_of, trace_genome, trace_genomes, traced_at_once, try_genomes
+from ._try import (
+    open_trials,
+    scores_of,
+    trace_genome,
+    trace_genomes,
+    traced_at_once,
+    trajectories_of,
+    try_genomes,
+)
 from .jyro._platform import JyroPlatform
 from .jyro._robot import JyroRobot
 from .jyro._trials import jyro_rules, jyro_scene
@@ -102,5 +110,6 @@ __all__ = [
     "trace_genome",
     "trace_genomes",
     "traced_at_once",
+    "trajectories_of",
     "try_genomes",
 ]

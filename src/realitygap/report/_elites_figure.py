@@ -27,6 +27,7 @@ from realitygap.runs import (
     elites_of,
     retry_elites,
 )
+from realitygap.settings import visible
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -45,6 +46,15 @@ _MOST_SLICES = 6
 _COLUMNS = ("condition", "replicate", "generation", "individual", "fitness", "descriptor")
 
 
+class _Shown(NamedTuple):
+    """An archive that is shown: its title, its elites, and the names of the columns with cells and fitness."""
+
+    title: str
+    elites: pl.DataFrame
+    cell: str
+    fitness: str
+
+
 def draw_elites(
     folder: Results,
     condition: str | None = None,
@@ -56,7 +66,8 @@ def draw_elites(
     """Draw the archive of a run with MAP-Elites, as found and corrected, and its growth in all runs.
 
     Args:
-        folder: Results of a study, or the path to them. Elites are tried again, `RETRIES` times each.
+        folder: Results of a study, or the path to them. Elites are tried again, `RETRIES` times each, unless that runs
+            a Python file that the user has not allowed.
         condition: Condition. Default: the first with selection map-elites.
         replicate: Run. Default: the typical one, as in `draw_paths`.
         name: First part of the ids in the drawing.
@@ -70,56 +81,60 @@ def draw_elites(
     tally = read_tally(folder)
     run = choose_run(tally, _chosen(tally, condition), replicate)
     elites = elites_of(run.condition, run.rows)
-    again = retry_elites(run.condition, elites)
-    corrected = corrected_archive(again)
-    stayed = float((again["cell"] == again["again_cell"]).to_numpy().mean())
     n_cells = run.condition.archive.n_cells
-    found_score, true_score = (
-        float(frame[name].sum()) / n_cells
-        for frame, name in ((elites, "fitness"), (corrected, "again_fitness"))
+    shown = {"found": _Shown("as found", elites, "cell", "fitness")}
+    summary = (
+        f"{elites.height:,} of {n_cells:,} cells are filled, with a mean fitness per cell of "
+        f"{float(elites['fitness'].sum()) / n_cells:.3f}"
     )
+    locked = [function for function in run.condition.functions if not function.may_run]
+    if locked:
+        summary += (
+            f", which lucky trials raise. The archive is not corrected: that runs {visible(locked[0].kind)}, and you "
+            "have not allowed this file (--allow-code)"
+        )
+    else:
+        again = retry_elites(run.condition, elites)
+        corrected = corrected_archive(again)
+        shown["corrected"] = _Shown("corrected", corrected, "again_cell", "again_fitness")
+        summary += (
+            f". By {RETRIES} fresh trials of each elite, "
+            f"{float((again['cell'] == again['again_cell']).to_numpy().mean()):.0%} of them belong in their cell, and "
+            f"{corrected.height:,} cells with {float(corrected['again_fitness'].sum()) / n_cells:.3f} are left "
+            "(corrected)"
+        )
     progress = _progress(tally, run)
     n_runs = progress["replicate"].n_unique()
-    summary = (
-        f"{elites.height:,} of {n_cells:,} cells are filled, with a mean fitness per cell of {found_score:.3f}. By "
-        f"{RETRIES} fresh trials of each elite, {stayed:.0%} of them belong in their cell, and {corrected.height:,} "
-        f"cells with {true_score:.3f} are left (corrected)"
-    )
     caption = (
         f"Archive of {run.name}, run {run.replicate}: {summary}. Stronger colors mark fitter elites, and cells without "
         f"color are empty. {_hidden(run.condition)}{run.label}, n = 1 run. Below: mean fitness per cell (an empty one "
         f"counts 0) as found, by trials; line: mean of {counted(n_runs, 'run')}, area: the range."
     )
     alt = f"Archive of run {run.replicate} of {run.name}. {summary}."
-    maps = [_map(run.condition, elites["cell"], elites["fitness"])]
-    maps.append(_map(run.condition, corrected["again_cell"], corrected["again_fitness"]))
-    marks = (
-        *_panels("found", run, elites, ("cell", "fitness"), played),
-        *_panels("corrected", run, corrected, ("again_cell", "again_fitness"), played),
-    )
+    maps = [_map(run.condition, each.elites[each.cell], each.elites[each.fitness]) for each in shown.values()]
+    marks = [
+        panel
+        for what, each in shown.items()
+        for panel in _panels(what, run, each.elites, (each.cell, each.fitness), played)
+    ]
     most = max(float(np.nanmax(each, initial=0.0)) for each in maps) or 1.0
 
     def draw(width: float) -> Sheet:
-        names = [[f"found {k}" for k in range(len(maps[0]))], [f"corrected {k}" for k in range(len(maps[0]))]]
+        names = [[f"{what} {k}" for k in range(len(maps[0]))] for what in shown]
         wide = width >= IS_WIDE
         if len(maps[0]) == 1:
-            places = [[*names[0], *names[1]]] if wide else [names[0], names[1]]
+            places = [[name for row in names for name in row]] if wide else names
         else:
             places = names if wide else [list(row) for row in zip(*names, strict=True)]
         heights: list[float | None] = [1.6 if wide else 1.3] * len(places)
         places.append(["curve"] * len(places[0]))
         sheet = Sheet(width, places, [*heights, 1.5], gap=0.2, pad=0.25)
-        for what, slices in zip(("found", "corrected"), maps, strict=True):
+        for (what, each), slices in zip(shown.items(), maps, strict=True):
             for k, shares in enumerate(slices):
                 axes = sheet.panels[f"{what} {k}"]
                 axes.set_gid(f"{what}-{k}")
                 _draw_map(axes, run.condition, shares / most, is_first=k == 0 or not wide)
-                head(
-                    axes,
-                    "as found" if what == "found" else "corrected",
-                    _slice(run.condition, k, len(slices)),
-                    stacked=True,
-                )
+                head(axes, each.title, _slice(run.condition, k, len(slices)), stacked=True)
         _draw_curve(sheet.panels["curve"], progress)
         head(sheet.panels["curve"], shorten(run.name, 28), f"{run.label}, n = {n_runs}")
         keys = [
@@ -128,7 +143,7 @@ def draw_elites(
         sheet.key(keys)
         return sheet
 
-    return draw_wide(draw, name, caption, alt, marks=marks)
+    return draw_wide(draw, name, caption, alt, marks=tuple(marks))
 
 
 def _chosen(tally: Tally, condition: str | None) -> str:

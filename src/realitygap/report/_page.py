@@ -75,7 +75,11 @@ _MOST_GAPS = 12
 
 
 def write_report(
-    folder: ResultsFolder | str | Path, out: str | Path | None = None, *, figures: str | Path | None = None
+    folder: ResultsFolder | str | Path,
+    out: str | Path | None = None,
+    *,
+    figures: str | Path | None = None,
+    allow_code: bool = False,
 ) -> Path:
     """Write the page of a study: one HTML file that needs no other file and no network.
 
@@ -85,6 +89,8 @@ def write_report(
             new one is complete.
         figures: A folder for every figure as SVG and PDF and every table as CSV; it is made when it is not there.
             Nothing but the page is written when not given.
+        allow_code: True to run Python files of tasks and descriptors that the user has not allowed before. Archives
+            that need one are not corrected without.
 
     Returns:
         The path of the page.
@@ -102,7 +108,7 @@ def write_report(
     with warnings.catch_warnings(), _uncollected():
         # another version's results are announced on the page itself
         warnings.simplefilter("ignore", RecordWarning)
-        tally = read_tally(folder)
+        tally = read_tally(folder, allow_code=allow_code)
         with house_style():
             content = _content(tally)
         page = _render(content)

@@ -38,6 +38,7 @@ def save_view(
     replicate: int | None = None,
     generation: int | None = None,
     individual: int | None = None,
+    allow_code: bool = False,
 ) -> Path:
     """Draw something of a study's results into a file, recomputed from its rows.
 
@@ -52,6 +53,8 @@ def save_view(
         generation: Generation of a trial, network or lineage. Default: that of the run's best trial, and for a network
             the last one.
         individual: Individual of the generation. Default: the best one by the task.
+        allow_code: True to run Python files of tasks and descriptors that the user has not allowed before. An archive
+            that needs one is not corrected without.
 
     Returns:
         The path of the file.
@@ -70,7 +73,7 @@ def save_view(
     with warnings.catch_warnings():
         if not isinstance(folder, ResultsFolder):
             warnings.simplefilter("default", RecordWarning)
-        tally = read_tally(folder)
+        tally = read_tally(folder, allow_code=allow_code)
     if subject == "archive":
         if generation is not None or individual is not None:
             raise ValueError(

@@ -88,6 +88,7 @@ class Tally:
             `ends`, the highest coverage among them [0..1].
         driven: State of each condition that a robot drove, from the ledger.
         uncounted: Names of the conditions that are left out, because their cells were not counted.
+        allow_code: True to run Python files that the user has not allowed before.
     """
 
     folder: ResultsFolder
@@ -95,6 +96,7 @@ class Tally:
     best: pl.DataFrame
     driven: Mapping[str, DrivenCondition] = field(default_factory=dict)
     uncounted: tuple[str, ...] = ()
+    allow_code: bool = False
     _whole_runs: dict[tuple[str, int], pl.DataFrame] = field(default_factory=dict, repr=False, compare=False)
 
     def counted_only(self) -> Tally:
@@ -113,7 +115,7 @@ class Tally:
             )
         conditions = [each for each in self.conditions if each["name"] not in uncounted]
         description: Any = {**self.description, "conditions": conditions}
-        return Tally(self.folder, description, best, self.driven, uncounted)
+        return Tally(self.folder, description, best, self.driven, uncounted, self.allow_code)
 
     @property
     def conditions(self) -> list[DescribedCondition]:
@@ -138,7 +140,8 @@ class Tally:
             ValueError: there is none of that name.
             RecordVersionError: its settings are not those of this version.
         """
-        return Condition.from_settings(name, dict(settings_of(self.condition(name))))
+        condition = Condition.from_settings(name, dict(settings_of(self.condition(name))))
+        return condition.allowed() if self.allow_code else condition
 
     @property
     def with_runs(self) -> list[DescribedCondition]:
@@ -261,12 +264,13 @@ Results = Tally | ResultsFolder | str | Path
 """The results of a study, the path to them, or what `read_tally` read of them."""
 
 
-def read_tally(folder: Results, *, with_uncounted: bool = False) -> Tally:
+def read_tally(folder: Results, *, with_uncounted: bool = False, allow_code: bool = False) -> Tally:
     """Read a study chunk by chunk; memory holds one chunk, and one row for each generation of each run.
 
     Args:
         folder: Results of a study, or the path to them. A tally is returned as it is.
         with_uncounted: True to include conditions whose cells were not counted; their coverage is NaN.
+        allow_code: True to run Python files that the user has not allowed before.
 
     Raises:
         RecordError: there is no such folder, a file in it is damaged, or it holds no trials yet.
@@ -288,7 +292,7 @@ def read_tally(folder: Results, *, with_uncounted: bool = False) -> Tally:
         raise no_trials(folder, driven)
     description: Any = folder.description
     description["conditions"] = [_labeled(each, driven) for each in conditions_of(description)]
-    tally = Tally(folder, description, best, driven)
+    tally = Tally(folder, description, best, driven, allow_code=allow_code)
     return tally if with_uncounted else tally.counted_only()
 
 

@@ -241,7 +241,7 @@ def _tried_again(condition: Condition, elites: pl.DataFrame, n_trials: int) -> t
         words[:, 1] += repeat.astype(np.uint32)
         tried = trials.carry_out(networks, who.astype(np.int32), condition.key, words, trace=needs_trace)
         fitness[part] = scores_of(task, trials, tried, names)
-        descriptors[part] = condition.archive.describe(tried, trials)
+        descriptors[part] = condition.archive.describe(tried, trials, names)
     means = descriptors.reshape(len(genomes), n_trials, -1).mean(axis=1)
     return fitness.reshape(-1, n_trials), means
 

@@ -35,7 +35,7 @@ from realitygap.platforms import (
 )
 from realitygap.robot_families import default_family
 from realitygap.settings import Settings, mistakes, shown
-from realitygap.tasks import ControllerSettings, CoverageTask, Task, as_task
+from realitygap.tasks import ControllerSettings, CoverageTask, PythonFunction, PythonTask, Task, as_task
 from realitygap.trials import MOST_TEAMS, Trajectory
 from realitygap.world import Arena, ArenaSettings
 
@@ -345,6 +345,20 @@ class Condition(Settings):
     def descriptor_names(self) -> tuple[str, ...]:
         """Names of the numbers that describe its trials; none unless selection is map-elites."""
         return self.archive.names if self.selection == "map-elites" else ()
+
+    @property
+    def functions(self) -> tuple[PythonFunction, ...]:
+        """Functions of Python files: of the task, and of the archive, which a transfer may fill if the run does not."""
+        return tuple(each for each in (self.task, self.archive.own) if isinstance(each, PythonFunction))
+
+    def allowed(self) -> Self:
+        """Return the condition with the permission to run its functions of Python files."""
+        changed: dict[str, Any] = {}
+        if isinstance(self.task, PythonTask):
+            changed["task"] = self.task.allowed()
+        if self.archive.own is not None:
+            changed["archive"] = self.archive.model_copy(update={"own": self.archive.own.allowed()})
+        return self.model_copy(update=changed)
 
     @property
     def retries_elites(self) -> bool:

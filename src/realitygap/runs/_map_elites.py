@@ -4,22 +4,25 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Annotated, Literal, NamedTuple, Self
+from typing import Annotated, Any, Literal, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import BeforeValidator, Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from realitygap.evolution import MOST_CELLS, MOST_CENTROIDS, cells_of, cvt_points
 from realitygap.kernels.neat import block as block_kernels
 from realitygap.kernels.neat.block import RunRules, Runs
 from realitygap.kernels.neat.elites import Cells, Elites, make_elites
 from realitygap.kernels.neat.genome import Genomes, NeatRules, make_genomes
+from realitygap.platforms import trajectories_of
 from realitygap.settings import Settings, as_tuple
+from realitygap.tasks import PythonDescriptor
 from realitygap.trials import PlatformTrials, Tried
 from realitygap.world import Arena
 
 Floats = NDArray[np.float64]
+Inputs = tuple[str, ...]
 
 REGIONS = (3, 2)
 """Columns and rows of regions of an arena whose shares of the visited cells are descriptors."""
@@ -30,6 +33,8 @@ STAGES = 3
 DescriptorName = Literal[
     "mean_turn", "turn_spread", "mean_move", "stall_share", "end", "path", "region_share"
 ]
+OWN = "own"
+"""Name of the descriptor of a Python file."""
 
 
 class Descriptor(NamedTuple):
@@ -38,23 +43,23 @@ class Descriptor(NamedTuple):
     Attributes:
         names: Names of its numbers.
         ranges: Returns lowest and highest value of each in an arena.
-        of: Returns the numbers, (t, d), of t trials that were tried by some trials.
+        of: Returns the numbers, (t, d), of t trials that were tried by some trials, whose networks have these inputs.
         needs_trace: True if it needs every step.
         is_shares: True if its numbers add up to 1.
     """
 
     names: tuple[str, ...]
     ranges: Callable[[Arena], tuple[tuple[float, float], ...]]
-    of: Callable[[Tried, PlatformTrials], Floats]
+    of: Callable[[Tried, PlatformTrials, Inputs], Floats]
     needs_trace: bool = False
     is_shares: bool = False
 
 
-def _ended(tried: Tried, trials: PlatformTrials) -> Floats:
+def _ended(tried: Tried, trials: PlatformTrials, inputs: Inputs) -> Floats:
     return np.add(tried.ended, trials.arena.start[:2])
 
 
-def _path(tried: Tried, trials: PlatformTrials) -> Floats:
+def _path(tried: Tried, trials: PlatformTrials, inputs: Inputs) -> Floats:
     steps = [stage * trials.n_steps // STAGES for stage in range(1, STAGES + 1)]
     places = np.moveaxis(tried.trace.poses[steps, :2].astype(np.float64), 2, 0) + trials.arena.start[:2]
     return np.reshape(places, (len(places), -1))
@@ -64,7 +69,7 @@ def _limits(arena: Arena) -> tuple[tuple[float, float], ...]:
     return (arena.grid.x, arena.grid.right_end), (arena.grid.y, arena.grid.upper_end)
 
 
-def _region_shares(tried: Tried, trials: PlatformTrials) -> Floats:
+def _region_shares(tried: Tried, trials: PlatformTrials, inputs: Inputs) -> Floats:
     """Shares of the visited cells, whose sum is 1: their number itself would be coverage."""
     grid, (across, up) = trials.arena.grid, REGIONS
     row, column = np.divmod(np.arange(grid.n_cells), grid.columns)
@@ -76,7 +81,7 @@ def _region_shares(tried: Tried, trials: PlatformTrials) -> Floats:
     return counts / np.maximum(n, 1)[:, None]
 
 
-def _stall_shares(tried: Tried, trials: PlatformTrials) -> Floats:
+def _stall_shares(tried: Tried, trials: PlatformTrials, inputs: Inputs) -> Floats:
     return np.divide(tried.batch.n_stalls, trials.n_steps)[:, None]
 
 
@@ -84,15 +89,15 @@ def _mean_over_steps(values: NDArray[np.floating]) -> Floats:
     return np.asarray(values.mean(axis=0, dtype=np.float64)[:, None], np.float64)
 
 
-def _mean_move(tried: Tried, trials: PlatformTrials) -> Floats:
+def _mean_move(tried: Tried, trials: PlatformTrials, inputs: Inputs) -> Floats:
     return _mean_over_steps(np.abs(tried.trace.commands[:, 0]))
 
 
-def _mean_turn(tried: Tried, trials: PlatformTrials) -> Floats:
+def _mean_turn(tried: Tried, trials: PlatformTrials, inputs: Inputs) -> Floats:
     return _mean_over_steps(tried.trace.commands[:, 1])
 
 
-def _turn_spread(tried: Tried, trials: PlatformTrials) -> Floats:
+def _turn_spread(tried: Tried, trials: PlatformTrials, inputs: Inputs) -> Floats:
     return np.asarray(tried.trace.commands[:, 1].std(axis=0, dtype=np.float64)[:, None], np.float64)
 
 
@@ -100,7 +105,7 @@ def _unit(n: int) -> Callable[[Arena], tuple[tuple[float, float], ...]]:
     return lambda arena: ((0.0, 1.0),) * n
 
 
-DESCRIPTORS: dict[DescriptorName, Descriptor] = {
+DESCRIPTORS: dict[str, Descriptor] = {
     "mean_turn": Descriptor(("mean_turn",), lambda arena: ((-1.0, 1.0),), _mean_turn, needs_trace=True),
     "turn_spread": Descriptor(("turn_spread",), _unit(1), _turn_spread, needs_trace=True),
     "mean_move": Descriptor(("mean_move",), _unit(1), _mean_move, needs_trace=True),
@@ -121,6 +126,16 @@ DESCRIPTORS: dict[DescriptorName, Descriptor] = {
 }
 
 
+def _described_by(own: PythonDescriptor) -> Descriptor:
+    """Return the descriptor of a Python function; of several robots in an arena, the mean of their numbers."""
+
+    def describe(tried: Tried, trials: PlatformTrials, inputs: Inputs) -> Floats:
+        found = own.describe(trajectories_of(trials, tried, inputs))
+        return np.asarray(found.reshape(-1, trials.arena.n_robots, len(own.names)).mean(axis=1))
+
+    return Descriptor(own.names, lambda arena: own.ranges, describe, needs_trace=True)
+
+
 class ArchiveSettings(Settings):
     """The settings of MAP-Elites: what describes a trial, the cells, and how elites have children.
 
@@ -133,14 +148,14 @@ class ArchiveSettings(Settings):
         description="Kind of cells. grid: each descriptor is divided evenly. cvt: cells around centroids that are "
         "spread evenly over all descriptors, for more than three of them (Vassiliades and others 2018).",
     )
-    descriptor: Annotated[tuple[DescriptorName, ...], BeforeValidator(as_tuple)] = Field(
+    descriptor: Annotated[tuple[DescriptorName | Literal["own"], ...], BeforeValidator(as_tuple)] = Field(
         ("mean_turn", "mean_move", "stall_share"),
         min_length=1,
-        max_length=len(DESCRIPTORS),
+        max_length=len(DESCRIPTORS) + 1,
         description="Numbers that describe a trial. mean_turn: mean turn command, -1..1. turn_spread: standard "
         "deviation of the turn command. mean_move: mean size of the move command. stall_share: share of blocked steps. "
         "end: x and y at the end [m]. path: x and y after each third of the trial [m]. region_share: shares of the "
-        "visited cells in 3 x 2 regions of the arena.",
+        "visited cells in 3 x 2 regions of the arena. own: numbers of a Python function, which the table own names.",
     )
     cells: Annotated[tuple[int, ...], BeforeValidator(as_tuple)] = Field(
         (20, 10, 5),
@@ -184,11 +199,22 @@ class ArchiveSettings(Settings):
         "dominated-novelty.",
     )
 
+    own: PythonDescriptor | None = Field(
+        None,
+        description="The descriptor own: a function of a Python file, and the names and ranges of its numbers.",
+        json_schema_extra={"hidden": True},
+    )
+
     @model_validator(mode="after")
     def _cells_fit_the_descriptors(self) -> Self:
-        if len(set(self.descriptor)) < len(self.descriptor):
-            raise ValueError("a descriptor is there twice, expected each once")
-        numbers = [name for each in self.descriptor for name in DESCRIPTORS[each].names]
+        if (OWN in self.descriptor) != (self.own is not None):
+            raise ValueError(
+                f"the descriptor {OWN!r} and the table own belong together, but there is only the "
+                f"{'descriptor' if self.own is None else 'table'}"
+            )
+        numbers = self.names
+        if len(set(self.descriptor)) < len(self.descriptor) or len(set(numbers)) < len(numbers):
+            raise ValueError(f"a descriptor is there twice, expected each once: {', '.join(numbers)}")
         expected = len(numbers) if self.kind == "grid" else 1
         if len(self.cells) != expected:
             raise ValueError(
@@ -209,6 +235,13 @@ class ArchiveSettings(Settings):
                 f"{self.competition!r}, which compares all genomes with each other"
             )
         return self
+
+    @model_serializer(mode="wrap")
+    def _without_a_function_that_is_not_there(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        values: dict[str, Any] = handler(self)
+        if self.own is None:  # as older conditions, whose hashes stay
+            del values["own"]
+        return values
 
     @property
     def n_cells(self) -> int:
@@ -238,20 +271,29 @@ class ArchiveSettings(Settings):
     @property
     def needs_trace(self) -> bool:
         """True if a descriptor needs every step of a trial."""
-        return any(DESCRIPTORS[each].needs_trace for each in self.descriptor)
+        return any(each.needs_trace for each in self._descriptors)
 
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the numbers that describe a trial, (d,)."""
-        return tuple(name for each in self.descriptor for name in DESCRIPTORS[each].names)
+        return tuple(name for each in self._descriptors for name in each.names)
 
     def ranges(self, arena: Arena) -> tuple[tuple[float, float], ...]:
         """Return the lowest and the highest value of each number that describes a trial in an arena, (d, 2)."""
-        return tuple(limits for each in self.descriptor for limits in DESCRIPTORS[each].ranges(arena))
+        return tuple(limits for each in self._descriptors for limits in each.ranges(arena))
 
-    def describe(self, tried: Tried, trials: PlatformTrials) -> Floats:
-        """Return the numbers, (t, d), that describe what was tried by some trials."""
-        return np.concatenate([DESCRIPTORS[each].of(tried, trials) for each in self.descriptor], axis=1)
+    def describe(self, tried: Tried, trials: PlatformTrials, inputs: Inputs) -> Floats:
+        """Return the numbers, (t, d), that describe what was tried by some trials, whose networks have these inputs.
+
+        Raises:
+            TaskError: A function of the user failed, or is not allowed.
+        """
+        return np.concatenate([each.of(tried, trials, inputs) for each in self._descriptors], axis=1)
+
+    @property
+    def _descriptors(self) -> list[Descriptor]:
+        own = {} if self.own is None else {OWN: _described_by(self.own)}
+        return [(DESCRIPTORS | own)[each] for each in self.descriptor]
 
     def cells_in(self, arena: Arena, key: int) -> Cells:
         """Return the cells in an arena as kernels read them; the centroids of a CVT depend on a key."""
@@ -259,7 +301,7 @@ class ArchiveSettings(Settings):
         if self.kind == "grid":
             return cells_of(self.cells, limits, key)
         points, first = cvt_points(self.n_cells, len(limits), key), 0
-        for descriptor in (DESCRIPTORS[each] for each in self.descriptor):
+        for descriptor in self._descriptors:
             last = first + len(descriptor.names)
             if descriptor.is_shares:
                 # gaps between sorted numbers are even over all shares (Devroye 1986, V.2)

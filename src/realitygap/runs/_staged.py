@@ -227,7 +227,7 @@ class _Staged:
         counts = np.stack([batch.n_line, batch.n_ends, batch.n_stalls], axis=1)
         descriptors = np.empty((len(which), 0))
         if self.archives is not None:
-            descriptors = self.condition.archive.describe(tried, self.trials)
+            descriptors = self.condition.archive.describe(tried, self.trials, self.condition.network_inputs)
         return _Scored(batch.cells, tried.ends, counts, tried.ended, batch.drawn, fitness, descriptors)
 
     @property

@@ -16,7 +16,7 @@ from ._closing.plan import PLANS, ClosingPlan
 from ._closing.rows import CalibratedRow, ClosingSummary, GoalRow, TwinRow
 from ._closing.study import ClosingProgress, closing_the_gap
 from ._closing.summary import summarize_closing
-from ._code import AllowCode, check_files, python_tasks, task_named
+from ._code import AllowCode, check_files, python_functions, task_named
 from ._compare import ComparedScores, compare_scores
 from ._controllers import sample_controllers
 from ._design import DESIGN_NAME, amend_design, unblind_design
@@ -137,7 +137,7 @@ __all__ = [
     "placing_words",
     "plan_gap",
     "platform_sections",
-    "python_tasks",
+    "python_functions",
     "read_camera",
     "recorded_spreads",
     "run_study",

@@ -1,4 +1,4 @@
-"""Permission to run the Python files of a study's tasks."""
+"""Permission to run the Python files of a study, of tasks and of descriptors."""
 
 from __future__ import annotations
 
@@ -9,25 +9,25 @@ from realitygap.errors import StudyError, TaskError
 from realitygap.runs import Condition
 from realitygap.tasks import (
     PYTHON,
+    PythonFunction,
     PythonTask,
     Task,
     as_task,
-    is_allowed,
     not_allowed,
-    read_task_file,
+    read_python_file,
     source_hash,
 )
 
 from ._study import Study
 
-AllowCode = bool | Callable[[PythonTask], bool]
+AllowCode = bool | Callable[[PythonFunction], bool]
 """Permission to run Python files that the user has not allowed before, or a function that asks once for each file."""
 
 
-def python_tasks(study: Study) -> list[PythonTask]:
-    """Return the Python tasks of a study, one for each file and function."""
-    tasks = [each.task for each in study.conditions if isinstance(each.task, PythonTask)]
-    return list({(task.kind, task.source): task for task in tasks}.values())
+def python_functions(study: Study) -> list[PythonFunction]:
+    """Return the Python functions of a study, each once."""
+    functions = [function for each in study.conditions for function in each.functions]
+    return list({(function.kind, function.source): function for function in functions}.values())
 
 
 def with_code_allowed(study: Study, allow_code: AllowCode) -> Study:
@@ -40,37 +40,29 @@ def with_code_allowed(study: Study, allow_code: AllowCode) -> Study:
     Raises:
         TaskError: A file is not allowed, cannot be run, or lacks its function.
     """
-    tasks = python_tasks(study)
+    functions = python_functions(study)
     asked: set[str] = set()
-    for task in tasks:
-        if task.may_run or task.sha256 in asked or is_allowed(task.sha256):
+    for function in functions:
+        if function.may_run or function.sha256 in asked:
             continue
-        asked.add(task.sha256)
-        if not (allow_code(task) if callable(allow_code) else allow_code):
-            raise TaskError(not_allowed(task))
-    for task in tasks:
-        task.allowed().function()
-    return study.model_copy(update={"conditions": tuple(map(with_code, study.conditions))})
-
-
-def with_code(condition: Condition) -> Condition:
-    """Return a condition whose task may run code, if it is a Python task."""
-    task = condition.task
-    return (
-        condition.model_copy(update={"task": task.allowed()}) if isinstance(task, PythonTask) else condition
-    )
+        asked.add(function.sha256)
+        if not (allow_code(function) if callable(allow_code) else allow_code):
+            raise TaskError(not_allowed(function))
+    for function in functions:
+        function.allowed().function()
+    return study.model_copy(update={"conditions": tuple(each.allowed() for each in study.conditions)})
 
 
 def allowed_task(condition: Condition, allow_code: bool) -> Condition:
-    """Return a condition whose task may score trials.
+    """Return a condition whose task may score trials, and whose descriptors may describe them.
 
     Raises:
-        TaskError: It is a Python task that the user has not allowed.
+        TaskError: A function of it is in a Python file that the user has not allowed.
     """
-    task = condition.task
-    if isinstance(task, PythonTask) and not (task.may_run or allow_code or is_allowed(task.sha256)):
-        raise TaskError(not_allowed(task))
-    return with_code(condition)
+    for function in condition.functions:
+        if not (function.may_run or allow_code):
+            raise TaskError(not_allowed(function))
+    return condition.allowed()
 
 
 def task_named(task: str | Task, *, allow_code: bool = False) -> Task:
@@ -88,7 +80,7 @@ def task_named(task: str | Task, *, allow_code: bool = False) -> Task:
         except ValueError as error:
             raise StudyError(f"--task: {error}") from None
     own = PythonTask.from_file(task)
-    if not (allow_code or is_allowed(own.sha256)):
+    if not (allow_code or own.may_run):
         raise TaskError(not_allowed(own))
     return own.allowed()
 
@@ -101,14 +93,15 @@ def check_files(study: Study, folder: Path) -> None:
     Raises:
         StudyError: A file is missing, or has another text.
     """
-    for task in python_tasks(study):
+    for function in python_functions(study):
         try:
             # Its name alone: results name no file in another folder.
-            _, source = read_task_file(f"{PYTHON}{Path(task.file).name}:{task.function_name}", folder)
+            named = f"{PYTHON}{Path(function.file).name}:{function.function_name}"
+            _, source = read_python_file(named, folder)
         except TaskError as error:
             raise StudyError(f"Resuming the study needs its Python file: {error}") from None
-        if source != task.source:
+        if source != function.source:
             raise StudyError(
-                f"{task.file} in {folder} has SHA-256 {source_hash(source)}, and the results were computed with "
-                f"{task.sha256}. Restore the file, or start a new study."
+                f"{function.file} in {folder} has SHA-256 {source_hash(source)}, and the results were computed with "
+                f"{function.sha256}. Restore the file, or start a new study."
             )

@@ -9,7 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 from realitygap._process import usable_processors
 from realitygap.runs import Condition, prepare_kernels, run_replicates
 
-from ._code import python_tasks
+from ._code import python_functions
 from ._study import Study
 
 LEAST_S = 0.1
@@ -31,7 +31,7 @@ def estimate_seconds(study: Study) -> float | None:
         whose runs takes long, such as twins in MuJoCo.
     """
     conditions = [each for each in study.conditions if not each.is_physical]
-    if not conditions or python_tasks(study) or any(each.on.is_slow for each in conditions):
+    if not conditions or python_functions(study) or any(each.on.is_slow for each in conditions):
         return None
     replicates = study.about.replicates
     prepare_kernels(conditions)

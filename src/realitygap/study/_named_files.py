@@ -9,13 +9,13 @@ from typing import Any
 from realitygap._limits import is_file
 from realitygap.errors import TaskError
 from realitygap.platforms import Platform, built_in_platforms, platform_class, platform_names, split_spec
-from realitygap.tasks import PYTHON, read_task_file
+from realitygap.tasks import PYTHON, read_python_file
 
 from ._problems import Problems
 
 
 def find_files(data: dict[str, Any], folder: Path, problems: Problems) -> None:
-    """Put the folder in front of the files of robots and arenas that are there, and read the files of Python tasks.
+    """Put the folder in front of the files of robots and arenas that are there, and read Python files.
 
     Args:
         data: The study as its file has it; changed. What is no table there is left alone.
@@ -31,26 +31,31 @@ def find_files(data: dict[str, Any], folder: Path, problems: Problems) -> None:
         for model in _platforms_in(data):
             if model.rest_setting in model.file_settings:
                 _find(table, "platform", folder, f"{model.name}:")
-        if isinstance(task := table.get("task"), dict):
-            _read_task(task, folder, problems)
+        archive = table.get("archive")
+        for place, function in (
+            ("task", table.get("task")),
+            ("archive.own", archive.get("own") if isinstance(archive, dict) else None),
+        ):
+            if isinstance(function, dict):
+                _read_function(function, folder, place, problems)
 
 
-def _read_task(task: dict[str, Any], folder: Path, problems: Problems) -> None:
-    """Put the text of its Python file into a task that names one."""
-    if task.pop("source", None) is not None:
+def _read_function(function: dict[str, Any], folder: Path, place: str, problems: Problems) -> None:
+    """Put the text of its Python file into a function that names one."""
+    if function.pop("source", None) is not None:
         problems.add(
-            "task.source",
+            f"{place}.source",
             "code in a study file is not run. Put it into a Python file next to the study file, and name that: "
             'kind = "python:FILE.py:FUNCTION".',
         )
-    kind = task.get("kind")
+    kind = function.get("kind")
     if not isinstance(kind, str) or not kind.startswith(PYTHON) or kind.count(":") < 2:
         return
-    task["source"] = ""  # so that a file that cannot be read is one mistake
+    function["source"] = ""  # so that a file that cannot be read is one mistake
     try:
-        task["kind"], task["source"] = read_task_file(kind, folder)
+        function["kind"], function["source"] = read_python_file(kind, folder)
     except TaskError as error:
-        problems.add("task", str(error))
+        problems.add(place, str(error))
 
 
 def _tables(data: dict[str, Any]) -> Iterator[dict[str, Any]]:

@@ -15,9 +15,7 @@ from realitygap._version import __version__
 from realitygap.errors import ClusterError, RecordError
 from realitygap.records import RESULTS_VERSION, MissingInboxError, deliver
 from realitygap.runs import Condition, run_replicates
-from realitygap.tasks import PythonTask
 
-from ._code import with_code
 from ._executors import ChunkTask
 
 
@@ -53,7 +51,7 @@ def make_order(task: ChunkTask, inbox: Path) -> dict[str, Any]:
         "first": task.first,
         "n_runs": task.n_runs,
         # A worker cannot ask: the process that sent the order has the permission.
-        "may_run_code": isinstance(condition.task, PythonTask) and condition.task.may_run,
+        "may_run_code": all(function.may_run for function in condition.functions),
     }
 
 
@@ -70,7 +68,7 @@ def carry_out_order(order: dict[str, Any]) -> None:
         raise _refusal(_no_shared_folder(inbox))
     condition = Condition.from_settings(order["condition"], order["settings"])
     if order["may_run_code"]:
-        condition = with_code(condition)
+        condition = condition.allowed()
     frame = run_replicates(condition, order["first"], order["n_runs"])
     try:
         deliver(inbox, condition.name, order["first"], frame, order["hash"])

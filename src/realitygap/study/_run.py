@@ -415,7 +415,7 @@ def _differences(old: Any, new: Any, place: str = "") -> list[str]:
         return lines
     if old == new:
         return []
-    if place == "task.source" and isinstance(old, str) and isinstance(new, str):
+    if place in ("task.source", "archive.own.source") and isinstance(old, str) and isinstance(new, str):
         return [f"the text of the Python file has SHA-256 {source_hash(old)} there, {source_hash(new)} here"]
     return [f"{place} is {old!r} there, {new!r} here"]
 

@@ -5,7 +5,7 @@ from ._coverage import CoverageTask
 from ._inputs import ControllerSettings
 from ._observed import score_observed
 from ._published import CLASSICAL_TASKS, MAZE_TASKS, ClassicalTask, MazeAgent, MazeTask
-from ._python import PYTHON, PythonTask, not_allowed, read_task_file
+from ._python import PYTHON, PythonDescriptor, PythonFunction, PythonTask, not_allowed, read_python_file
 from ._step_tasks import WALL_SIDES, AvoidTask, GoalTask, LightTask, WallTask, wall_outlines
 from ._task import TASKS, Task, as_task, task_model
 from ._trajectories import TraceArrays, Trajectories
@@ -24,6 +24,8 @@ __all__ = [
     "LightTask",
     "MazeAgent",
     "MazeTask",
+    "PythonDescriptor",
+    "PythonFunction",
     "PythonTask",
     "Task",
     "TraceArrays",
@@ -32,7 +34,7 @@ __all__ = [
     "as_task",
     "is_allowed",
     "not_allowed",
-    "read_task_file",
+    "read_python_file",
     "remember_allowed",
     "score_observed",
     "source_hash",

@@ -1,57 +1,54 @@
-"""A custom task: a function of a Python file."""
+"""Functions of a Python file of the user: a task, or numbers that describe trials."""
 
 from __future__ import annotations
 
 import functools
 import linecache
 import math
+import re
 import traceback
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Self
+from typing import Annotated, Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, PrivateAttr, SerializerFunctionWrapHandler, model_serializer, model_validator
+from pydantic import (
+    BeforeValidator,
+    Field,
+    PrivateAttr,
+    SerializerFunctionWrapHandler,
+    model_serializer,
+    model_validator,
+)
 
 from realitygap._limits import MOST_TOML_BYTES, read_file
 from realitygap.errors import TaskError
 from realitygap.records import Observe
-from realitygap.settings import Settings, visible
+from realitygap.settings import Settings, as_tuple, visible
 from realitygap.world import Arena
 
-from ._allowed import source_hash
+from ._allowed import is_allowed, source_hash
 from ._trajectories import Trajectories
 
 PYTHON = "python:"
+MOST_NUMBERS = 32
 
 
-class PythonTask(Settings):
-    """A function of a Python file that scores trials.
+class PythonFunction(Settings):
+    """A function of a Python file that gets `Trajectories` of n trials and returns numbers for each.
 
-    `kind = "python:FILE.py:function"` names it. The function gets `Trajectories` of n trials and returns n numbers. A
-    better trial has a higher number. A function compiled by Numba (`numba.njit`) gets the kernels' own arrays,
-    `TraceArrays`, without conversion, the length of a step [s], and an array of n numbers to write to. The text of the
-    file is part of the condition, but its folder is not. So results belong to the function that computed them.
+    `kind = "python:FILE.py:function"` names it. A function compiled by Numba (`numba.njit`) gets the kernels' own
+    arrays, `TraceArrays`, without conversion, the length of a step [s], and an array of numbers to write to. The text
+    of the file is part of the condition, but its folder is not. So results belong to the function that computed them.
 
-    The settings are data. Making a task, copying it, or reading it back from a folder of results runs no code and opens
-    no file. `from_file` reads a file, and only the task that `allowed` returns runs the code.
+    The settings are data. Making a function, copying it, or reading it back from a folder of results runs no code and
+    opens no file. `from_file` reads a file, and the code runs only after `allowed`, or if the user has allowed a file
+    with this text before.
     """
 
     kind: str = Field(
         pattern=r"^python:.+\.py:[A-Za-z_][A-Za-z0-9_]*$", description="python:FILE.py:function."
-    )
-    inputs: tuple[str, ...] = Field(
-        ("obstacle", "stall", "time"),
-        min_length=1,
-        max_length=256,
-        description="Inputs of networks, in order: obstacle, stall, time, bias, range.K, light.K, line.K, bump.K, "
-        "encoder.K, goal_sector.K, goal_distance, last_move, last_turn.",
-    )
-    observe: Observe = Field(
-        "track",
-        description="Minimum observation level of a robot's trial that the function can score: readings, cells, "
-        "encoders, or track.",
     )
     source: str = Field(
         "",
@@ -64,18 +61,110 @@ class PythonTask(Settings):
 
     @classmethod
     def from_file(cls, kind: str, **settings: Any) -> Self:
-        """Read a task's file.
+        """Read a function's file.
 
         Args:
             kind: `python:FILE.py:function`, with the file's path relative to the current folder.
-            settings: `inputs`.
+            settings: All other settings.
 
         Raises:
             TaskError: The file cannot be read.
             ValueError: A setting is wrong.
         """
-        bare, source = read_task_file(kind, Path())
+        bare, source = read_python_file(kind, Path())
         return cls(kind=bare, source=source, **settings)
+
+    @model_validator(mode="after")
+    def _has_a_text(self) -> Self:
+        if "source" not in self.model_fields_set:
+            raise ValueError(
+                f"{self.kind} has no text. {type(self).__name__}.from_file({self.kind!r}) reads its file"
+            )
+        return self
+
+    def allowed(self) -> Self:
+        """Return this function with the permission to run its code.
+
+        `realitygap.run_study` calls it after the user has agreed. Call it for a file that you trust.
+        """
+        function = self.model_copy()
+        function._may_run = True
+        return function
+
+    @property
+    def may_run(self) -> bool:
+        """True if it has the permission to run its code, or the user has allowed its text before."""
+        return self._may_run or is_allowed(self.sha256)
+
+    @property
+    def sha256(self) -> str:
+        """Hash of the file's text."""
+        return source_hash(self.source)
+
+    @property
+    def file(self) -> str:
+        """Path of the file, as given."""
+        return self.kind.removeprefix(PYTHON).rpartition(":")[0]
+
+    @property
+    def function_name(self) -> str:
+        """Name of the function."""
+        return self.kind.rpartition(":")[2]
+
+    def function(self) -> Callable[..., Any]:
+        """Run the file's text and return its function.
+
+        Raises:
+            TaskError: It may not run code, the file's code fails, or the file has no such function.
+        """
+        if not self.may_run:
+            raise TaskError(not_allowed(self))
+        return _load(self.source, self.file, self.function_name)
+
+    def numbers(self, trajectories: Trajectories, *d: int) -> NDArray[np.float64]:
+        """Return what the function computes of n trials, (n,) or (n, d).
+
+        Raises:
+            TaskError: It may not run code, failed, or returned another shape, or numbers that are not finite.
+        """
+        function, shape = self.function(), (len(trajectories), *d)
+        try:
+            if hasattr(function, "py_func"):
+                found = np.full(shape, np.nan)
+                function(trajectories.arrays, trajectories.step_s, found)
+            else:
+                found = np.asarray(function(trajectories), np.float64)
+        except Exception as error:  # a user's function may raise anything
+            raise TaskError(_failed(self, error)) from error
+        if found.shape != shape:
+            numbers = f"{d[0]} numbers" if d else "one number"
+            raise TaskError(
+                f"{self.function_name} of {self.file} returned an array of shape {found.shape}, expected {shape}: "
+                f"{numbers} for each trial."
+            )
+        if not np.isfinite(found).all():
+            at = tuple(np.argwhere(~np.isfinite(found))[0])
+            raise TaskError(
+                f"{self.function_name} of {self.file} returned {found[at]} for trial {at[0]}, expected finite numbers."
+            )
+        return found
+
+
+class PythonTask(PythonFunction):
+    """A task whose function returns the score of each of n trials, (n,). A better trial has a higher score."""
+
+    inputs: tuple[str, ...] = Field(
+        ("obstacle", "stall", "time"),
+        min_length=1,
+        max_length=256,
+        description="Inputs of networks, in order: obstacle, stall, time, bias, range.K, light.K, line.K, bump.K, "
+        "encoder.K, goal_sector.K, goal_distance, last_move, last_turn.",
+    )
+    observe: Observe = Field(
+        "track",
+        description="Minimum observation level of a robot's trial that the function can score: readings, cells, "
+        "encoders, or track.",
+    )
 
     @model_validator(mode="before")
     @classmethod
@@ -83,31 +172,6 @@ class PythonTask(Settings):
         if isinstance(values, dict) and isinstance(values.get("inputs"), list):
             return {**values, "inputs": tuple(values["inputs"])}
         return values
-
-    @model_validator(mode="after")
-    def _has_a_text(self) -> Self:
-        if "source" not in self.model_fields_set:
-            raise ValueError(f"{self.kind} has no text. PythonTask.from_file({self.kind!r}) reads its file")
-        return self
-
-    def allowed(self) -> Self:
-        """Return this task with the permission to run its code.
-
-        `realitygap.run_study` calls it after the user has agreed. Call it for a file that you trust.
-        """
-        task = self.model_copy()
-        task._may_run = True
-        return task
-
-    @property
-    def may_run(self) -> bool:
-        """True if it has the permission to run its code."""
-        return self._may_run
-
-    @property
-    def sha256(self) -> str:
-        """Hash of the file's text."""
-        return source_hash(self.source)
 
     @property
     def name(self) -> str:
@@ -137,56 +201,59 @@ class PythonTask(Settings):
             values.pop("observe", None)
         return values
 
-    @property
-    def file(self) -> str:
-        """Path of the file, as given."""
-        return self.kind.removeprefix(PYTHON).rpartition(":")[0]
-
-    @property
-    def function_name(self) -> str:
-        """Name of the function."""
-        return self.kind.rpartition(":")[2]
-
-    def function(self) -> Callable[..., Any]:
-        """Run the file's text and return its function.
-
-        Raises:
-            TaskError: The task may not run code, the file's code fails, or the file has no such function.
-        """
-        if not self._may_run:
-            raise TaskError(not_allowed(self))
-        return _load(self.source, self.file, self.function_name)
-
     def fitness(self, trajectories: Trajectories, arena: Arena) -> NDArray[np.float64]:
         """Return the scores that the function computes, (n,).
 
         Raises:
-            TaskError: The task may not run code, the function failed, or it did not return n finite numbers.
+            TaskError: As `numbers`.
         """
-        function, n = self.function(), len(trajectories)
-        try:
-            if hasattr(function, "py_func"):
-                scores = np.full(n, np.nan)
-                function(trajectories.arrays, trajectories.step_s, scores)
-            else:
-                scores = np.asarray(function(trajectories), np.float64)
-        except Exception as error:  # a user's function may raise anything
-            raise TaskError(_failed(self, error)) from error
-        if scores.shape != (n,):
-            raise TaskError(
-                f"{self.function_name} of {self.file} returned an array of shape {scores.shape}, expected ({n},): one "
-                "number for each trial."
-            )
-        if not np.isfinite(scores).all():
-            k = int(np.flatnonzero(~np.isfinite(scores))[0])
-            raise TaskError(
-                f"{self.function_name} of {self.file} returned {scores[k]} for trial {k}, expected finite numbers."
-            )
-        return scores
+        return self.numbers(trajectories)
 
 
-def read_task_file(kind: str, folder: Path) -> tuple[str, str]:
-    """Read the Python file of a task.
+class PythonDescriptor(PythonFunction):
+    """A function that describes each of n trials for an archive, by one number, (n,), or by d numbers, (n, d)."""
+
+    names: Annotated[tuple[str, ...], BeforeValidator(as_tuple)] = Field(
+        min_length=1, max_length=MOST_NUMBERS, description="Names of the d numbers."
+    )
+    ranges: tuple[tuple[float, float], ...] = Field(
+        min_length=1, max_length=MOST_NUMBERS, description="Lowest and highest value of each number, (d, 2)."
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _take_lists_of_ranges(cls, values: Any) -> Any:
+        if isinstance(values, dict) and isinstance(values.get("ranges"), list):
+            pairs = [tuple(pair) if isinstance(pair, list) else pair for pair in values["ranges"]]
+            return {**values, "ranges": tuple(pairs)}
+        return values
+
+    @model_validator(mode="after")
+    def _each_name_has_its_range(self) -> Self:
+        if len(self.names) != len(self.ranges):
+            raise ValueError(
+                f"there are {len(self.names)} names and {len(self.ranges)} ranges, expected one range for each name"
+            )
+        for name in self.names:
+            if not re.fullmatch("[a-z][a-z0-9_]*", name):
+                raise ValueError(f"the name {name!r} has other characters than a to z, 0 to 9, and _")
+        for name, (low, high) in zip(self.names, self.ranges, strict=True):
+            if not low < high:
+                raise ValueError(f"{name} is from {low:g} to {high:g}, expected the lowest value first")
+        return self
+
+    def describe(self, trajectories: Trajectories) -> NDArray[np.float64]:
+        """Return the numbers that the function computes, (n, d).
+
+        Raises:
+            TaskError: As `numbers`.
+        """
+        d = len(self.names)
+        return self.numbers(trajectories)[:, None] if d == 1 else self.numbers(trajectories, d)
+
+
+def read_python_file(kind: str, folder: Path) -> tuple[str, str]:
+    """Read the Python file of a function.
 
     Args:
         kind: `python:FILE.py:function`.
@@ -205,13 +272,13 @@ def read_task_file(kind: str, folder: Path) -> tuple[str, str]:
         return f"{PYTHON}{path.name}:{function}", text.replace("\r\n", "\n").replace("\r", "\n")
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
-        raise TaskError(f"task file {visible(str(path))} cannot be read: {reason}.") from None
+        raise TaskError(f"Python file {visible(str(path))} cannot be read: {reason}.") from None
 
 
-def not_allowed(task: PythonTask) -> str:
-    """Return the message of a task that may not run."""
+def not_allowed(function: PythonFunction) -> str:
+    """Return the message of a function that may not run."""
     return (
-        f"The task {visible(task.kind)} runs the code of a Python file (SHA-256 {task.sha256}), and you have not "
+        f"{visible(function.kind)} runs the code of a Python file (SHA-256 {function.sha256}), and you have not "
         "allowed this file. Nothing was run. Read the file. If you trust it, answer the question that `realitygap run` "
         "asks in a terminal, or give --allow-code (in Python: allow_code=True)."
     )
@@ -239,9 +306,9 @@ def _load(source: str, file: str, name: str) -> Callable[..., Any]:
     return found
 
 
-def _failed(task: PythonTask, error: Exception) -> str:
-    line = _line_of(error, f"<{task.file} {task.sha256[:16]}>")
-    return f"{task.function_name} of {task.file} failed: {line}{_said(error)}"
+def _failed(function: PythonFunction, error: Exception) -> str:
+    line = _line_of(error, f"<{function.file} {function.sha256[:16]}>")
+    return f"{function.function_name} of {function.file} failed: {line}{_said(error)}"
 
 
 def _line_of(error: Exception, shown_as: str) -> str:

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from realitygap.errors import RecordError
 from realitygap.evolution import MapElites, NeatSettings, Population, cvt_centroids
+from realitygap.study._transfer.transferability import nsga2_order
 
 GROWING = NeatSettings(population=12, add_node=0.9, add_link=0.9)
 STILL = NeatSettings(population=16, add_node=0, add_link=0, mutate_weights=0, reenable=0)
@@ -122,6 +123,24 @@ def compare(theirs, archive, rng, to_theirs=lambda places: places):
 
 @settings(max_examples=60, deadline=None)
 @given(seed=streams)
+def test_local_competition_keeps_the_first_by_nsga2(seed):
+    rng = np.random.default_rng(seed)
+    capacity, n_levels = int(rng.integers(2, 30)), int(rng.integers(1, 20))
+    archive, means, middles = archive_of(capacity, neighbors=2, local=True), [], []
+    for _ in range(4):
+        fitness = rng.integers(0, n_levels, 12) / 4
+        places = rng.uniform([-1, 0], [1, 2], (12, 2)).round(int(rng.integers(1, 4)))
+        archive.ask()
+        archive.tell(fitness, places)
+        means, middles = [*means, *fitness], [*middles, *places]
+        kept = by_local_competition(means, np.array(middles), capacity)
+        found = {(elite.cell, elite.fitness, *elite.descriptor) for elite in archive.elites()}
+        assert sorted(one[1:] for one in found) == sorted((means[k], *middles[k]) for k in kept)
+        means, middles = [one[1] for one in sorted(found)], [one[2:] for one in sorted(found)]
+
+
+@settings(max_examples=60, deadline=None)
+@given(seed=streams)
 def test_dominated_novelty_keeps_what_pyribs_keeps(ribs, seed):
     rng = np.random.default_rng(seed)
     d, k, capacity = int(rng.integers(1, 4)), int(rng.integers(1, 6)), int(rng.integers(2, 30))
@@ -138,9 +157,35 @@ def test_dominated_novelty_keeps_what_pyribs_keeps(ribs, seed):
         assert sorted((elite.fitness, elite.batch) for elite in archive.elites()) == expected
 
 
-def test_dominated_novelty_of_equals_and_of_elites_that_are_tried_again():
+def by_dominated_novelty(means, middles, n_kept):
+    """Numbers of those that are kept, with two neighbors."""
+    worth = []
+    for k, (mean, middle) in enumerate(zip(means, middles, strict=True)):
+        fitter = [j for j, other in enumerate(means) if other > mean or (other == mean and j < k)]
+        off = [np.subtract(middle, middles[j]) / 2 for j in fitter]
+        worth.append(np.mean(sorted(np.hypot(*each) for each in off)[:2]) if off else math.inf)
+    return sorted(range(len(means)), key=lambda k: (-worth[k], k))[:n_kept]
+
+
+def by_local_competition(means, middles, n_kept):
+    """Numbers of those that are kept, with two neighbors; by the order of NSGA-II of another part of the project."""
+    objectives = []
+    for k, (mean, middle) in enumerate(zip(means, middles, strict=True)):
+        off = np.subtract(middle, middles) / 2
+        far = np.sqrt(off[:, 0] * off[:, 0] + off[:, 1] * off[:, 1])
+        nearest = [j for j in np.argsort(far, kind="stable") if j != k][:2]
+        objectives.append((np.mean(far[nearest]), sum(means[j] < mean for j in nearest)))
+    return nsga2_order(np.array(objectives))[0][:n_kept].tolist()
+
+
+@pytest.mark.parametrize(
+    ("options", "those_kept"),
+    [({}, by_dominated_novelty), ({"local": True}, by_local_competition)],
+)
+def test_novelty_of_equals_and_of_elites_that_are_tried_again(options, those_kept):
     """Against a plain computation, where equals are common."""
-    archive, rng, held = archive_of(9, retry=0.4, neighbors=2), np.random.default_rng(3), []
+    archive, held = archive_of(9, retry=0.4, neighbors=2, **options), []
+    rng = np.random.default_rng(3)
     for _ in range(12):
         genomes, tried_again = archive.ask(), round(0.4 * 12)
         again = sorted(held, key=lambda one: one.rank)
@@ -153,14 +198,8 @@ def test_dominated_novelty_of_equals_and_of_elites_that_are_tried_again():
             one.places.append(place)
         everybody = [one for one in held if one not in again] + batch
         everybody.sort(key=lambda one: (one in batch, one.place if one not in batch else batch.index(one)))
-        worth = []
-        for k, one in enumerate(everybody):
-            fitter = everybody[:k] + [each for each in everybody[k:] if each.mean > one.mean]
-            fitter = [each for each in fitter if each.mean >= one.mean]
-            off = [np.subtract(one.middle, each.middle) / 2 for each in fitter]
-            worth.append(np.mean(sorted(np.hypot(*each) for each in off)[:2]) if off else math.inf)
-        order = sorted(range(len(everybody)), key=lambda k: (-worth[k], k))[:9]
-        survivors = [everybody[k] for k in sorted(order)]
+        means, middles = ([getattr(one, name) for one in everybody] for name in ("mean", "middle"))
+        survivors = [everybody[k] for k in sorted(those_kept(means, middles, 9))]
         archive.tell(fitness, places)
         found = archive.elites()
         assert sorted((elite.fitness, elite.tries) for elite in found) == sorted(
@@ -264,7 +303,14 @@ def test_first_batch_is_that_of_a_population():
 
 
 @pytest.mark.parametrize(
-    ("cells", "options"), [((4, 3), {}), (10, {}), (10, {"retry": 0.4, "depth": 3}), (9, {"neighbors": 2})]
+    ("cells", "options"),
+    [
+        ((4, 3), {}),
+        (10, {}),
+        (10, {"retry": 0.4, "depth": 3}),
+        (9, {"neighbors": 2}),
+        (9, {"neighbors": 2, "local": True}),
+    ],
 )
 def test_saved_and_loaded_it_goes_on_as_if_nothing_had_been(tmp_path, cells, options):
     straight, resumed = archive_of(cells, **options), archive_of(cells, **options)
@@ -345,6 +391,7 @@ def test_centroids_are_spread_and_the_same_for_the_same_key():
         ({"neighbors": 3}, r"cells is \(4, 3\), expected one number of genomes"),
         ({"neighbors": 3, "cells": 9, "depth": 2}, "depth is 2, expected 1 with neighbors"),
         ({"neighbors": 3, "cells": 20_000}, "cells is 20000"),
+        ({"local": True}, "local is True, expected neighbors"),
         (
             {"cells": (1000, 1000), "depth": 2},
             "1,000,000 cells for 2 genomes each, expected at most 1,000,000 genomes",

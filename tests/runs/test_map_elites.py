@@ -38,6 +38,15 @@ VARIANTS: list[dict[str, Any]] = [
     {"archive": {"descriptor": ["end"], "cells": [9, 9], "retry": 0.3, "depth": 2, "repeats": 2}},
     {"archive": {"descriptor": ["end"], "cells": [5, 5], "retry": 0.2, "competition": "dominated-novelty"}},
     {
+        "archive": {
+            "descriptor": ["end"],
+            "cells": [5, 5],
+            "retry": 0.2,
+            "competition": "local",
+            "neighbors": 5,
+        }
+    },
+    {
         "archive": {"crossover": 1.0, "descriptor": ["end"], "cells": [9, 9], **ONCE},
         "task": {"cells": "ends"},
     },
@@ -96,6 +105,7 @@ def test_a_run_is_that_of_ask_and_tell(variant: dict[str, Any]) -> None:
         retry=archive.retry,
         depth=archive.depth if has_cells else 1,
         neighbors=0 if has_cells else archive.neighbors,
+        local=archive.competition == "local",
         replicate=replicate,
         bias=bias,
         key=condition.key,

@@ -74,14 +74,18 @@ class MapElites:
     With `neighbors`, there are no cells: the archive keeps those genomes that differ most from fitter ones, in parts of
     the ranges (dominated novelty search, Bahlous-Boldi and others 2025). Of equally fit genomes one counts as fitter,
     so that copies do not fill it: one that is held before one of the batch, and then that in the first place. An
-    elite's `cell` is then its place.
+    elite's `cell` is then its place. With `local` as well, the archive keeps the first by novelty and local competition
+    (Lehman & Stanley 2011): the mean distance to the nearest of all, and how many of these are less fit, as two
+    objectives of NSGA-II. The authors compare with an archive of novel genomes as well, and have genotypic diversity
+    in place of crowding, which archives that follow from rows cannot have.
 
     Attributes:
         settings: NEAT's settings; `population` is the size of a batch.
         share: Share of children with two parents.
         retry: Share of a batch that are elites again.
         depth: Genomes that a cell holds.
-        neighbors: Neighbors of dominated novelty; 0 for cells.
+        neighbors: Neighbors of novelty; 0 for cells.
+        local: True for novelty and local competition.
         ranges: Lowest and highest value of each descriptor.
         cells: Cells along each descriptor of a grid, or the number of cells of a CVT.
         batch: Number of the present batch.
@@ -99,6 +103,7 @@ class MapElites:
         retry: float = 0.0,
         depth: int = 1,
         neighbors: int = 0,
+        local: bool = False,
         seed: int = 0,
         replicate: int = 0,
         bias: bool = True,
@@ -118,6 +123,7 @@ class MapElites:
             depth: Genomes that a cell holds, >= 1.
             neighbors: For an archive without cells, of as many genomes as `cells` says: number of the nearest fitter
                 genomes whose mean distance counts. 0 for cells.
+            local: With neighbors, True for novelty and local competition, in which the nearest count, fitter or not.
             seed: Seed of the random numbers, 0 to 2**63 - 1.
             replicate: Number of the run with this seed, 0 to 2**32 - 1.
             bias: True for a constant input, which is the last one.
@@ -149,6 +155,9 @@ class MapElites:
             raise ValueError(
                 f"cells is {cells}, expected one number of genomes with neighbors = {neighbors}."
             )
+        self.local = bool(local)
+        if self.local and not self.neighbors:
+            raise ValueError("local is True, expected neighbors >= 1 with it.")
         if self.neighbors and self.depth > 1:
             raise ValueError(f"depth is {depth}, expected 1 with neighbors = {neighbors}.")
         limits = _checked_ranges(ranges)
@@ -179,6 +188,7 @@ class MapElites:
             self.depth,
             batch=n,
             neighbors=self.neighbors,
+            local=self.local,
         )
         self._parents, self._again = np.full((n, 2), -1, np.int32), np.full(n, -1, np.int32)
         first_genomes(self._genomes, self._rules, self._key, self._replicate, 0)
@@ -355,6 +365,7 @@ class MapElites:
             "retry": self.retry,
             "depth": self.depth,
             "neighbors": self.neighbors,
+            "local": self.local,
             "key": int(self._key),
             "replicate": self._replicate,
             "batch": self.batch,
@@ -381,6 +392,7 @@ class MapElites:
                 retry=about["retry"],
                 depth=about["depth"],
                 neighbors=about["neighbors"],
+                local=about["local"],
                 replicate=about["replicate"],
                 bias=about["bias"],
                 key=about["key"],

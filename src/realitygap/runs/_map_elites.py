@@ -185,18 +185,19 @@ class ArchiveSettings(Settings):
         "one follows if the elite is tried again and proves less fit, or belongs in another cell. With competition "
         "cells only.",
     )
-    competition: Literal["cells", "dominated-novelty"] = Field(
+    competition: Literal["cells", "dominated-novelty", "local"] = Field(
         "cells",
         description="Which genomes an archive keeps. cells: the fittest of each cell (MAP-Elites). dominated-novelty: "
         "as many as there are cells, those that are most unlike fitter ones (Bahlous-Boldi and others 2025); cells "
-        "then show and measure the archive only.",
+        "then show and measure the archive only. local: as many, by novelty and local competition (Lehman and Stanley "
+        "2011).",
     )
     neighbors: int = Field(
         3,
         ge=1,
         le=100,
-        description="Number of the nearest fitter genomes whose mean distance counts, with competition "
-        "dominated-novelty.",
+        description="Number of the nearest genomes whose mean distance counts: of fitter ones with competition "
+        "dominated-novelty, and of all with local.",
     )
 
     own: PythonDescriptor | None = Field(
@@ -261,7 +262,8 @@ class ArchiveSettings(Settings):
         if self.competition == "cells":
             elites: Elites = make_elites(self.n_cells, d, genomes, self.depth)
         else:
-            elites = make_elites(self.n_cells, d, genomes, batch=batch, neighbors=self.neighbors)
+            local = self.competition == "local"
+            elites = make_elites(self.n_cells, d, genomes, batch=batch, neighbors=self.neighbors, local=local)
         return elites
 
     def n_again(self, population: int) -> int:

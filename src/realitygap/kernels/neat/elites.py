@@ -3,7 +3,7 @@
 Source: Mouret & Clune, "Illuminating search spaces by mapping elites" (2015), with the variation of NEAT. Cells of a
 CVT are those of Vassiliades, Chatzilygeroudis & Mouret (2018). Where trials are noisy, a cell may hold several genomes,
 as in Flageat & Cully (2020), and elites may be tried again. Without cells, genomes compete by dominated novelty
-(Bahlous-Boldi, Faldor and others 2025, arXiv 2502.00593).
+(Bahlous-Boldi, Faldor and others 2025, arXiv 2502.00593), or by novelty and local competition (Lehman & Stanley 2011).
 """
 
 from __future__ import annotations
@@ -47,11 +47,13 @@ class Elites(NamedTuple):
     filled: NDArray[np.int32]  # (c,) cells, the first filled one first
     rank: NDArray[np.int32]  # (c,) of each cell in `filled`
     n_filled: NDArray[np.int64]  # (1,)
-    worth: NDArray[np.float64]  # (c + n,) room for the dominated novelty of a batch of n; (0,) of cells
-    nearest: NDArray[np.float64]  # (k,) room for distances to neighbors; (0,) of cells
+    worth: NDArray[
+        np.float64
+    ]  # (1, c + n) room for the novelty of a batch of n; (4, c + n) of local competition
+    nearest: NDArray[np.float64]  # (2, k) room for distances and fitness of neighbors; (2, 0) of cells
 
 
-def make_elites(n_cells, n_descriptors, genomes, depth=1, batch=0, neighbors=0):
+def make_elites(n_cells, n_descriptors, genomes, depth=1, batch=0, neighbors=0, local=False):
     """Return an empty archive.
 
     Args:
@@ -60,7 +62,8 @@ def make_elites(n_cells, n_descriptors, genomes, depth=1, batch=0, neighbors=0):
         genomes: A row for each place; none if the archive keeps no genomes.
         depth: Genomes of a cell.
         batch: Individuals of a batch; of an archive without cells.
-        neighbors: Neighbors of dominated novelty; 0 for cells.
+        neighbors: Neighbors of novelty; 0 for cells.
+        local: True for novelty and local competition, False for dominated novelty.
     """
     n = n_cells * depth
     return Elites(
@@ -74,8 +77,8 @@ def make_elites(n_cells, n_descriptors, genomes, depth=1, batch=0, neighbors=0):
         np.zeros(n_cells, np.int32),
         np.zeros(n_cells, np.int32),
         np.zeros(1, np.int64),
-        np.zeros(n_cells + batch if neighbors else 0),
-        np.zeros(neighbors),
+        np.zeros((4 if local else 1, n_cells + batch if neighbors else 0)),
+        np.zeros((2, neighbors)),
     )
 
 
@@ -155,11 +158,16 @@ def _put(elites, place, cell, fitness, descriptors, tries, batch, row):
 
 
 @inlined
-def _dominated_novelty(elites, fitness, descriptors, cells, one):
-    """Return the mean distance of one to the nearest of those that are fitter, or as fit with a lower number.
+def _nearest_to(elites, fitness, descriptors, cells, one, only_fitter):
+    """Return the mean distance of one to its nearest neighbors, and how many of them are less fit.
 
-    Infinite for the fittest. Numbers below that of places are places of the archive; others are individuals of the
-    batch.
+    Infinite and 0 without neighbors. Numbers below that of places are places of the archive; others are individuals of
+    the batch. Of equally near ones the lower numbers count.
+
+    Args:
+        elites, fitness, descriptors, cells: As `place_results`.
+        one: Number of the one.
+        only_fitter: True to count those only that are fitter, or as fit with a lower number.
     """
     c = elites.best.size
     nearest = elites.nearest
@@ -170,7 +178,7 @@ def _dominated_novelty(elites, fitness, descriptors, cells, one):
         if other == one or (other < c and elites.batch[other] < 0):
             continue
         value = elites.fitness[other] if other < c else fitness[other - c]
-        if value < own or (value == own and other > one):
+        if only_fitter and (value < own or (value == own and other > one)):
             continue
         distance = 0.0
         for k in range(d):
@@ -178,41 +186,140 @@ def _dominated_novelty(elites, fitness, descriptors, cells, one):
             there = elites.descriptors[other, k] if other < c else descriptors[other - c, k]
             off = (here - there) / (cells.high[k] - cells.low[k])
             distance += off * off
-        if n < nearest.size:
+        if n < nearest.shape[1]:
             n += 1
-        elif distance >= nearest[n - 1]:
+        elif distance >= nearest[0, n - 1]:
             continue
         at = n - 1
-        while at > 0 and nearest[at - 1] > distance:
-            nearest[at] = nearest[at - 1]
+        while at > 0 and nearest[0, at - 1] > distance:
+            nearest[0, at] = nearest[0, at - 1]
+            nearest[1, at] = nearest[1, at - 1]
             at -= 1
-        nearest[at] = distance
+        nearest[0, at] = distance
+        nearest[1, at] = value
     if n == 0:
-        return math.inf
+        return math.inf, 0
     total = 0.0
+    n_less_fit = 0
     for k in range(n):
-        total += math.sqrt(nearest[k])
-    return total / n
+        total += math.sqrt(nearest[0, k])
+        n_less_fit += nearest[1, k] < own
+    return total / n, n_less_fit
+
+
+@inlined
+def _crowding(worth, one, objective):
+    """Return how far the neighbors of one in its front are apart, by an objective; infinite at the ends.
+
+    Those of the front have -2 in row 2. Equal ones are in the order of their numbers.
+    """
+    own = worth[objective, one]
+    below = -math.inf
+    above = math.inf
+    least = math.inf
+    most = -math.inf
+    for other in range(worth.shape[1]):
+        if worth[2, other] != -2:
+            continue
+        value = worth[objective, other]
+        least = min(least, value)
+        most = max(most, value)
+        if value < own or (value == own and other < one):
+            below = max(below, value)
+        elif other != one:
+            above = min(above, value)
+    if below == -math.inf or above == math.inf:
+        return math.inf
+    return (above - below) / (most - least) if most > least else 0.0
+
+
+@inlined
+def _dominates(worth, one, other):
+    """Return whether one is at least as good by both objectives, and better by one of them."""
+    return (
+        worth[0, one] >= worth[0, other]
+        and worth[1, one] >= worth[1, other]
+        and (worth[0, one] > worth[0, other] or worth[1, one] > worth[1, other])
+    )
+
+
+@inlined
+def _rank(worth, n_kept):
+    """Overwrite row 0 with values of which the n largest are to be kept: by front, then by crowding distance.
+
+    Source: Deb, Pratap, Agarwal & Meyarivan (2002), NSGA-II.
+
+    Args:
+        worth: (4, m): two objectives, and in row 2 a 0, or -1 for those that are not there. Row 3 is room.
+        n_kept: Number of those to be kept.
+    """
+    m = worth.shape[1]
+    for one in range(m):
+        worth[3, one] = math.inf if worth[2, one] < 0 else -1.0
+        if worth[2, one] < 0:
+            continue
+        for other in range(m):
+            if worth[2, other] >= 0 and _dominates(worth, other, one):
+                worth[2, one] += 1  # row 2: how many others of those that have no front dominate it
+    left = n_kept
+    while left > 0:
+        n_front = 0
+        for one in range(m):
+            if worth[2, one] == 0:
+                worth[2, one] = -2
+                n_front += 1
+        if n_front == 0:
+            break
+        for one in range(m):
+            if worth[2, one] != -2:
+                continue
+            if n_front <= left:
+                worth[3, one] = math.inf
+            else:
+                far = _crowding(worth, one, 0) + _crowding(worth, one, 1)
+                worth[3, one] = min(far, np.finfo(np.float64).max)  # less than of those that are kept anyway
+            for other in range(m):
+                if worth[2, other] > 0 and _dominates(worth, one, other):
+                    worth[2, other] -= 1
+        for one in range(m):
+            if worth[2, one] == -2:
+                worth[2, one] = -3
+        left -= n_front
+    for one in range(m):
+        worth[0, one] = worth[3, one]
 
 
 @inlined
 def _keep_novel(fitness, descriptors, tries, cells, elites, batch, kept):
-    """Keep the most novel of the archive and a batch, by dominated novelty; of equal ones those of lower number."""
+    """Keep the most novel of the archive and a batch; of equal ones those of lower number.
+
+    By dominated novelty, or by novelty and the number of the nearest neighbors that are less fit.
+    """
     c = elites.best.size
     n = fitness.size
+    worth = elites.worth
+    is_local = worth.shape[0] > 1
     surplus = elites.n_filled[0] + n - c
     for one in range(c + n):
-        if one < c and elites.batch[one] < 0:
-            elites.worth[one] = math.inf  # nobody to be removed
+        is_there = one >= c or elites.batch[one] >= 0
+        if is_there:
+            novelty, n_less_fit = _nearest_to(elites, fitness, descriptors, cells, one, not is_local)
         else:
-            elites.worth[one] = _dominated_novelty(elites, fitness, descriptors, cells, one)
+            novelty = math.inf  # nobody to be removed
+            n_less_fit = 0
+        worth[0, one] = novelty
+        if is_local:
+            worth[1, one] = n_less_fit
+            worth[2, one] = 0 if is_there else -1
+    if is_local:
+        _rank(worth, c)
     for row in range(n):
         kept[row] = 0
     for _ in range(surplus):
         least = -1
         for one in range(c + n):
             is_there = elites.batch[one] >= 0 if one < c else kept[one - c] == 0
-            if is_there and (least < 0 or elites.worth[one] <= elites.worth[least]):
+            if is_there and (least < 0 or worth[0, one] <= worth[0, least]):
                 least = one
         if least < c:
             _remove(elites, least, 1)
@@ -233,8 +340,8 @@ def place_results(fitness, descriptors, again, tries, cells, elites, batch, kept
     """Place what individuals of a batch did, in their order, without their genomes.
 
     One that finds no room in its cell takes the place of the least fit there, the first of several, if it is fitter.
-    Without cells the archive keeps those with the largest dominated novelty, of equal ones those in lower places, and
-    before those of the batch.
+    Without cells the archive keeps those with the largest dominated novelty, or the first by novelty and local
+    competition; of equal ones those in lower places, and before those of the batch.
 
     Args:
         fitness: (n,) finite. Overwritten with the mean over all that was told of a genome.

@@ -25,7 +25,7 @@ def there_and_back(trajectories):
 @numba.njit
 def there_and_back_compiled(arrays, step_s, fitness):
     """The same, written to `fitness` (n,); `arrays.poses` is (t + 1, 3, n), from the start."""
-    for trial in range(fitness.size):
+    for trial in range(len(fitness)):
         farthest = 0.0
         away = 0.0
         for step in range(arrays.poses.shape[0]):

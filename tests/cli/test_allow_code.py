@@ -15,6 +15,7 @@ from typer.testing import CliRunner
 
 from realitygap.cli import _code, app
 from realitygap.errors import StudyError, TaskError
+from realitygap.platforms import allow_code
 from realitygap.records import ResultsFolder
 from realitygap.study import load_study, run_study
 from tests.python_tasks import study_text
@@ -107,6 +108,18 @@ def test_allow_code_runs_without_a_question_and_is_not_remembered(study):
     assert run(study, "--allow-code").exit_code == 0
     assert not (study.parent / "state").exists()
     assert run(study).exit_code != 0
+
+
+def test_allow_code_of_other_commands_holds_for_tasks(study):
+    """The option was lost between command and task."""
+    task = f"python:{study.parent}/task.py:far"
+    words = ["gap", "sim", "jyro", "--n-controllers", "2", "--trials", "1", "--task", task]
+    assert isinstance(CliRunner().invoke(app, words).exception, TaskError)
+    try:
+        done = CliRunner().invoke(app, [*words, "--allow-code"])
+    finally:
+        allow_code(False)
+    assert done.exit_code == 0, done.exception
 
 
 def test_an_answer_that_cannot_be_saved_holds_for_the_command(study, terminal):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -213,6 +214,13 @@ def test_novelty_of_equals_and_of_elites_that_are_tried_again(options, those_kep
             held.append(one)
 
 
+def test_descriptors_whose_means_are_no_numbers_are_refused():
+    archive = archive_of(retry=0.5)
+    archive.ask()
+    with pytest.raises(ValueError, match=re.escape("descriptors has 1.7e+308, expected at most 1e+150")):
+        archive.tell(np.zeros(12), np.full((12, 2), -1.7e308))
+
+
 def test_elites_are_those_of_a_plain_reference_with_their_genomes():
     archive, kept = archive_of(), {}
     for _ in range(6):
@@ -383,6 +391,7 @@ def test_centroids_are_spread_and_the_same_for_the_same_key():
         ({"cells": (2000, 2000)}, "4,000,000 cells, expected at most 1,000,000"),
         ({"cells": 20_000}, "cells is 20000"),
         ({"ranges": ((0, 1), (1, 1))}, "A range is 1 to 1"),
+        ({"ranges": ((0, 1), (-1e308, 1e308))}, "expected a width from 1e-150 to 1e"),
         ({"ranges": (0, 1)}, r"ranges has shape \(2,\)"),
         ({"ranges": ((0, 1), (0, math.inf))}, r"ranges\[1, 1\] is inf"),
         ({"crossover": 1.5}, "crossover is 1.5"),

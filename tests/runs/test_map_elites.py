@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from typing import Any
 
 import numpy as np
@@ -241,6 +242,18 @@ def test_rows_that_do_not_tell_all_trials_of_elites_are_refused() -> None:
             with pytest.raises(ValueError, match=says):
                 read(condition, wrong)
     assert elites_of(condition, rows.filter(pl.col("generation") < 3)).height
+
+
+@pytest.mark.parametrize("competition", ["cells", "dominated-novelty", "local"])
+def test_rows_of_others_cannot_write_beside_an_archive(competition: str) -> None:
+    """Means of huge numbers are no numbers, and had cells that are not there: reading such rows ended the process."""
+    archive = {"descriptor": ["end"], "cells": [4, 4], "retry": 0.5, "competition": competition}
+    condition = condition_of({"archive": archive})
+    rows = run_replicates(condition, 0, 1)
+    signs = np.where(np.arange(rows.height) % 2, 1.7e308, -1.7e308)
+    hostile = rows.with_columns(descriptor=pl.Series(np.column_stack([signs, -signs])).arr.to_list())
+    with contextlib.suppress(ValueError):  # rows that the archive of this condition cannot have
+        assert archive_progress(condition, hostile)["filled"].max() <= 1
 
 
 def test_means_of_elites_are_those_of_their_rows() -> None:

@@ -9,11 +9,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from realitygap.errors import StudyError, TaskError
+from realitygap.errors import RecordError, StudyError, TaskError
+from realitygap.platforms import SimPlatform, SimTarget
 from realitygap.report import draw_elites, save_view
+from realitygap.report._tally import read_tally
 from realitygap.runs import Condition, elites_of, retry_elites, run_replicates
-from realitygap.study import load_study, run_study
+from realitygap.study import load_study, run_study, transfer
+from realitygap.study._transfer.noise import changed_condition
 from realitygap.tasks import PythonDescriptor
+from realitygap.tasks._python import _load
+from realitygap.world import paper_arena
 
 SOURCE = """
 import math
@@ -43,6 +48,10 @@ def short(trajectories):
 
 def infinite(trajectories):
     return np.full(len(trajectories), math.inf)
+
+
+def leaving(trajectories):
+    raise SystemExit(0)
 """
 STUDY = """
 [study]
@@ -140,17 +149,22 @@ def test_reading_results_gives_no_permission(study):
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [
-        ('["own", "stall_share"]', '["end"]', "there is only the table"),
+        ('["own", "stall_share"]', '["end"]', "expected 'own' among the descriptors"),
         ("[archive.own]\n", "[arena]\n[archive.other]\n", "archive.other: unknown setting"),
-        ('names = ["my_move"]', 'names = ["my_move", "other"]', "2 names and 1 ranges"),
-        ('names = ["my_move"]', 'names = ["My move"]', "other characters than a to z"),
-        ('names = ["my_move"]', 'names = ["stall_share"]', "a descriptor is there twice"),
+        ('names = ["my_move"]', 'names = ["my_move", "other"]', "got 2 for names and 1 for ranges"),
+        ('names = ["my_move"]', 'names = ["My move"]', "the name 'My move' is none"),
+        ('names = ["my_move"]', 'names = ["mean_turn"]', "'mean_turn', which is a number of realitygap"),
         ('names = ["my_move"]\n', "", "names: missing"),
         ("[[0, 1]]", "[[1, 0]]", "my_move is from 1 to 0"),
         ("[[0, 1]]", "[[0, inf]]", "ranges"),
+        ("[[0, 1]]", "[[-1e308, 1e308]]", "expected a width from"),
         ("[[0, 1]]", "[0, 1]", "ranges"),
         ("python:own.py:mean_move", "python:none.py:mean_move", "none.py cannot be read"),
-        ("python:own.py:mean_move", "own.py", "kind: expected"),
+        (
+            "python:own.py:mean_move",
+            "python:own.py",
+            "kind: expected python:FILE.py:FUNCTION, got 'python:own.py'",
+        ),
         (
             "[archive.own]",
             '[archive.own]\nsource = "code"',
@@ -171,6 +185,7 @@ def test_mistakes_in_the_file_are_named(study, old, new, says):
         ("short", r"shape \(1,\), expected \(\d+,\): one number for each trial"),
         ("infinite", "returned inf for trial 0, expected finite numbers"),
         ("nothing", "has no function 'nothing'"),
+        ("leaving", r"leaving of own\.py failed: line \d+: SystemExit: 0"),
         ("motion", r"shape \(\d+, 2\), expected"),
     ],
 )
@@ -178,6 +193,55 @@ def test_mistakes_of_the_function_are_named(study, function, says):
     condition = condition_of(["own"], [5], study.parent, function=function, names=["x"], ranges=[[0, 1]])
     with pytest.raises(TaskError, match=says):
         run_replicates(condition, 0, 1)
+
+
+def test_numbers_out_of_range_are_moved_to_its_end(study):
+    low, high = 0.4, 0.6
+    condition = condition_of(
+        ["own"], [5], study.parent, function="mean_move", names=["x"], ranges=[[low, high]]
+    )
+    free = condition_of(["own"], [5], study.parent, function="mean_move", names=["x"], ranges=[[0, 1]])
+    values, all_values = (
+        run_replicates(each, 0, 1).filter(generation=0)["descriptor"].explode().to_numpy()
+        for each in (condition, free)
+    )
+    assert all_values.min() < low
+    assert all_values.max() > high
+    assert values.tolist() == np.clip(all_values, low, high).tolist()
+
+
+@pytest.mark.slow
+def test_a_function_that_fails_leaves_the_archive_as_found(study):
+    """It was allowed before, and asks the machine it runs on."""
+    (study.parent / "own.py").write_text(
+        SOURCE + f"\nif Path({str(study.parent / 'gone')!r}).exists():\n    raise OSError('gone')\n"
+    )
+    run_study(study, study.parent / "out", allow_code=True)
+    tally = read_tally(study.parent / "out", allow_code=True)
+    assert "(corrected)" in draw_elites(tally).caption
+    (study.parent / "gone").touch()
+    _load.cache_clear()
+    caption = draw_elites(tally).caption
+    assert re.search(r"is not corrected: own\.py cannot be run: line \d+: OSError: gone", caption)
+
+
+@pytest.mark.parametrize("selection", ["map-elites", "fitness"])
+def test_a_changed_simulator_keeps_the_archive_and_its_permission(study, selection):
+    """Strategies that suspect damages filled archives by the default descriptors, or were not allowed to."""
+    condition = load_study(study).conditions[0].allowed().model_copy(update={"selection": selection})
+    changed = changed_condition(condition, "weak", set={"drive.gain_left": 0.5})
+    assert changed.archive == condition.archive
+    assert [function.may_run for function in changed.functions] == [True]
+
+
+def test_a_transfer_belongs_to_its_archive(study, tmp_path):
+    arena, out = paper_arena(), tmp_path / "t"
+    options = {"budget": 1, "out": out, "runs": 1, "repeats": 1, "fresh_trials": 1, "allow_code": True}
+    study.write_text(STUDY.replace('selection = "map-elites"', ""))
+    transfer(study, SimTarget(SimPlatform(), arena, key=1, name="other"), "plain", **options)
+    (study.parent / "own.py").write_text(SOURCE + "# changed\n")
+    with pytest.raises(RecordError, match="the condition has other settings"):
+        transfer(study, SimTarget(SimPlatform(), arena, key=1, name="other"), "plain", **options)
 
 
 def test_conditions_without_a_function_keep_their_settings():

@@ -35,9 +35,10 @@ AllowFiles = Annotated[
 """The option of commands that draw results."""
 
 
-def _allow_platforms(wanted: bool) -> None:
+def _allow_platforms(wanted: bool) -> bool:
     if wanted:
         realitygap.platforms.allow_code()
+    return wanted
 
 
 AllowPlatforms = Annotated[
@@ -46,7 +47,7 @@ AllowPlatforms = Annotated[
         "--allow-code",
         callback=_allow_platforms,
         is_eager=True,
-        help="Run the Python file of a platform python:FILE:CLASS.",
+        help="Run the Python files of platforms, tasks, and descriptors, without asking.",
     ),
 ]
 """The option of commands that open platforms."""

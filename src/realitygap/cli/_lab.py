@@ -47,9 +47,7 @@ def lab(
     ] = "",
     allow_code: Annotated[
         bool,
-        typer.Option(
-            "--allow-code", help="Let every visitor start studies that run Python files in DIR as tasks."
-        ),
+        typer.Option("--allow-code", help="Let every visitor start studies that run Python files in DIR."),
     ] = False,
     no_open: Annotated[bool, typer.Option("--no-open", help="Don't open the page in the browser.")] = False,
 ) -> None:

@@ -28,15 +28,15 @@ def show(
         str,
         typer.Argument(
             metavar="WHAT",
-            help="Folder of results; or network, species, lineage, divergence, movie, arena or robot.",
+            help="Folder of results; or network, species, lineage, archive, divergence, movie, arena or robot.",
         ),
     ],
     names: Annotated[
         list[str] | None,
         typer.Argument(
             metavar="NAME",
-            help="Folder of results after network, species, lineage or divergence; one or more folders after movie; "
-            "arena or robot, by name or file, after arena or robot.",
+            help="Folder of results after network, species, lineage, archive or divergence; one or more folders after "
+            "movie; arena or robot, by name or file, after arena or robot.",
         ),
     ] = None,
     out: Annotated[

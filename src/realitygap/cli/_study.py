@@ -81,8 +81,8 @@ def run(
     You can interrupt it at any time. Run the same command again to resume. More runs or new conditions extend
     existing results. The results do not depend on threads, clusters, chunks or interruptions.
 
-    A study may have tasks in Python files. Before such a file runs for the first time, the command shows it and asks
-    for your permission. The answer is remembered until the file changes.
+    A study may have tasks and descriptors in Python files. Before such a file runs for the first time, the command
+    shows it and asks for your permission. The answer is remembered until the file changes.
 
     `realitygap drive` drives the conditions that are on a robot.
 

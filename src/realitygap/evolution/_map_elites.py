@@ -27,6 +27,8 @@ MOST_CELLS = 1_000_000
 """Largest number of cells of a grid: with room for 40 genes each, 1 GB."""
 MOST_CENTROIDS = 10_000
 """Largest number of cells of a CVT, whose distances are all computed for each genome."""
+MOST_DESCRIPTOR = 1e150
+"""Largest size of a descriptor, whose square is a number."""
 CVT_POINTS = 20
 """Random points for each centroid of a CVT."""
 CVT_ROUNDS = 20
@@ -250,6 +252,10 @@ class MapElites:
             raise ValueError(
                 f"fitness has shape {values.shape}, expected ({n},): one number for each genome asked."
             )
+        if (np.abs(places) > MOST_DESCRIPTOR).any():
+            raise ValueError(
+                f"descriptors has {np.abs(places).max():.3g}, expected at most {MOST_DESCRIPTOR:g} in size."
+            )
         if places.shape != (n, d):
             raise ValueError(
                 f"descriptors has shape {places.shape}, expected ({n}, {d}): {d} numbers for each genome asked."
@@ -464,7 +470,20 @@ def _checked_ranges(ranges: Sequence[tuple[float, float]]) -> NDArray[np.float64
     for low, high in limits:
         if not low < high:
             raise ValueError(f"A range is {low:g} to {high:g}, expected the lowest value first.")
+        check_width(low, high)
     return limits
+
+
+def check_width(low: float, high: float) -> None:
+    """Raise an error if a range is too wide or too narrow to be divided.
+
+    Raises:
+        ValueError: It is.
+    """
+    if not 1 / MOST_DESCRIPTOR <= float(high) - float(low) <= MOST_DESCRIPTOR:
+        raise ValueError(
+            f"A range is {low:g} to {high:g}, expected a width from {1 / MOST_DESCRIPTOR:g} to {MOST_DESCRIPTOR:g}."
+        )
 
 
 def cells_of(

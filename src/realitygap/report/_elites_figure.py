@@ -13,6 +13,7 @@ import polars as pl
 
 from realitygap._wording import counted
 from realitygap.drawing import Ink
+from realitygap.errors import TaskError
 from realitygap.report._chosen_run import ChosenRun, choose_run
 from realitygap.report._tally import Results, Tally, read_tally
 from realitygap.report.charts.house import Drawing, draw_wide, shorten
@@ -44,6 +45,21 @@ _MOST_SLICES = 6
 """Maximum number of maps side by side: of an archive with more dimensions the best of the hidden cells is shown."""
 
 _COLUMNS = ("condition", "replicate", "generation", "individual", "fitness", "descriptor")
+
+
+def _again(condition: Condition, elites: pl.DataFrame) -> pl.DataFrame:
+    """Return the elites with the means of fresh trials.
+
+    Raises:
+        TaskError: A function of a Python file is not allowed, or fails.
+    """
+    for function in condition.functions:
+        if not function.may_run:
+            raise TaskError(
+                f"that runs {visible(function.kind)} (SHA-256 {function.sha256[:12]}…), and you have not allowed this "
+                "file (--allow-code)."
+            )
+    return retry_elites(condition, elites)
 
 
 class _Shown(NamedTuple):
@@ -87,14 +103,11 @@ def draw_elites(
         f"{elites.height:,} of {n_cells:,} cells are filled, with a mean fitness per cell of "
         f"{float(elites['fitness'].sum()) / n_cells:.3f}"
     )
-    locked = [function for function in run.condition.functions if not function.may_run]
-    if locked:
-        summary += (
-            f", which lucky trials raise. The archive is not corrected: that runs {visible(locked[0].kind)}, and you "
-            "have not allowed this file (--allow-code)"
-        )
+    try:
+        again = _again(run.condition, elites)
+    except TaskError as error:
+        summary += f", which lucky trials raise. The archive is not corrected: {str(error).removesuffix('.')}"
     else:
-        again = retry_elites(run.condition, elites)
         corrected = corrected_archive(again)
         shown["corrected"] = _Shown("corrected", corrected, "again_cell", "again_fitness")
         summary += (

@@ -113,6 +113,12 @@ def _archives_of(condition: Condition, run: pl.DataFrame, cells: Cells) -> Itera
                 for place in elites.best[elites.best >= 0]
             }
             parents = batch.filter(is_again)["parents"].list.first()
+            unknown = [parent for parent in parents if parent not in place_of]
+            if unknown:
+                raise ValueError(
+                    f"Rows of run {run['replicate'][0]} of condition {condition.name!r} try an elite again that the "
+                    f"archive does not hold (individual {unknown[0]}): they are rows of other settings."
+                )
             again[is_again] = [place_of[parent] for parent in parents]
         tries, kept = np.empty((2, batch.height), np.int32)
         fitness, number = batch["fitness"].to_numpy().copy(), int(batch["generation"][0])

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
-from realitygap.evolution import MOST_CELLS, MOST_CENTROIDS, cells_of, cvt_points
+from realitygap.evolution import MOST_CELLS, MOST_CENTROIDS, cells_of, check_width, cvt_points
 from realitygap.kernels.neat import block as block_kernels
 from realitygap.kernels.neat.block import RunRules, Runs
 from realitygap.kernels.neat.elites import Cells, Elites, make_elites
@@ -30,11 +30,12 @@ REGIONS = (3, 2)
 STAGES = 3
 """Places along a path: the last is its end."""
 
-DescriptorName = Literal[
-    "mean_turn", "turn_spread", "mean_move", "stall_share", "end", "path", "region_share"
-]
 OWN = "own"
 """Name of the descriptor of a Python file."""
+
+DescriptorName = Literal[
+    "mean_turn", "turn_spread", "mean_move", "stall_share", "end", "path", "region_share", "own"
+]
 
 
 class Descriptor(NamedTuple):
@@ -127,11 +128,11 @@ DESCRIPTORS: dict[str, Descriptor] = {
 
 
 def _described_by(own: PythonDescriptor) -> Descriptor:
-    """Return the descriptor of a Python function; of several robots in an arena, the mean of their numbers."""
+    """Return the descriptor of a Python function; numbers out of their ranges are at the ends."""
 
     def describe(tried: Tried, trials: PlatformTrials, inputs: Inputs) -> Floats:
-        found = own.describe(trajectories_of(trials, tried, inputs))
-        return np.asarray(found.reshape(-1, trials.arena.n_robots, len(own.names)).mean(axis=1))
+        low, high = np.transpose(own.ranges)
+        return np.asarray(np.clip(own.describe(trajectories_of(trials, tried, inputs)), low, high))
 
     return Descriptor(own.names, lambda arena: own.ranges, describe, needs_trace=True)
 
@@ -148,7 +149,7 @@ class ArchiveSettings(Settings):
         description="Kind of cells. grid: each descriptor is divided evenly. cvt: cells around centroids that are "
         "spread evenly over all descriptors, for more than three of them (Vassiliades and others 2018).",
     )
-    descriptor: Annotated[tuple[DescriptorName | Literal["own"], ...], BeforeValidator(as_tuple)] = Field(
+    descriptor: Annotated[tuple[DescriptorName, ...], BeforeValidator(as_tuple)] = Field(
         ("mean_turn", "mean_move", "stall_share"),
         min_length=1,
         max_length=len(DESCRIPTORS) + 1,
@@ -210,12 +211,20 @@ class ArchiveSettings(Settings):
     def _cells_fit_the_descriptors(self) -> Self:
         if (OWN in self.descriptor) != (self.own is not None):
             raise ValueError(
-                f"the descriptor {OWN!r} and the table own belong together, but there is only the "
-                f"{'descriptor' if self.own is None else 'table'}"
+                f"there is a descriptor {OWN!r}, expected a table [archive.own] with kind, names, and ranges"
+                if self.own is None
+                else f"there is a table [archive.own], expected {OWN!r} among the descriptors as well. A table of "
+                "some conditions is their [condition.archive.own]"
             )
+        if len(set(self.descriptor)) < len(self.descriptor):
+            raise ValueError("a descriptor is there twice, expected each once")
+        for name, (low, high) in zip(self.own.names, self.own.ranges, strict=True) if self.own else ():
+            if any(name in each.names for each in DESCRIPTORS.values()):
+                raise ValueError(
+                    f"own.names has {name!r}, which is a number of realitygap. Choose another name"
+                )
+            check_width(low, high)
         numbers = self.names
-        if len(set(self.descriptor)) < len(self.descriptor) or len(set(numbers)) < len(numbers):
-            raise ValueError(f"a descriptor is there twice, expected each once: {', '.join(numbers)}")
         expected = len(numbers) if self.kind == "grid" else 1
         if len(self.cells) != expected:
             raise ValueError(

@@ -18,6 +18,7 @@ from pydantic import (
     Field,
     PrivateAttr,
     SerializerFunctionWrapHandler,
+    field_validator,
     model_serializer,
     model_validator,
 )
@@ -47,9 +48,7 @@ class PythonFunction(Settings):
     with this text before.
     """
 
-    kind: str = Field(
-        pattern=r"^python:.+\.py:[A-Za-z_][A-Za-z0-9_]*$", description="python:FILE.py:function."
-    )
+    kind: str = Field(description="python:FILE.py:function.")
     source: str = Field(
         "",
         description="Text of the file. Study files name the file instead.",
@@ -74,11 +73,18 @@ class PythonFunction(Settings):
         bare, source = read_python_file(kind, Path())
         return cls(kind=bare, source=source, **settings)
 
+    @field_validator("kind")
+    @classmethod
+    def _names_file_and_function(cls, kind: str) -> str:
+        if not re.fullmatch(r"python:.+\.py:[A-Za-z_][A-Za-z0-9_]*", kind):
+            raise ValueError(f"expected python:FILE.py:FUNCTION, got {visible(kind[:200])!r}")
+        return kind
+
     @model_validator(mode="after")
     def _has_a_text(self) -> Self:
         if "source" not in self.model_fields_set:
             raise ValueError(
-                f"{self.kind} has no text. {type(self).__name__}.from_file({self.kind!r}) reads its file"
+                f"{self.kind} has no text. {type(self).__name__}.from_file({self.kind!r}, ...) reads its file"
             )
         return self
 
@@ -134,7 +140,7 @@ class PythonFunction(Settings):
                 function(trajectories.arrays, trajectories.step_s, found)
             else:
                 found = np.asarray(function(trajectories), np.float64)
-        except Exception as error:  # a user's function may raise anything
+        except (Exception, SystemExit) as error:  # a user's function may raise anything
             raise TaskError(_failed(self, error)) from error
         if found.shape != shape:
             numbers = f"{d[0]} numbers" if d else "one number"
@@ -232,11 +238,16 @@ class PythonDescriptor(PythonFunction):
     def _each_name_has_its_range(self) -> Self:
         if len(self.names) != len(self.ranges):
             raise ValueError(
-                f"there are {len(self.names)} names and {len(self.ranges)} ranges, expected one range for each name"
+                f"expected one range for each name, got {len(self.names)} for names and {len(self.ranges)} for ranges"
             )
         for name in self.names:
-            if not re.fullmatch("[a-z][a-z0-9_]*", name):
-                raise ValueError(f"the name {name!r} has other characters than a to z, 0 to 9, and _")
+            if not re.fullmatch("[a-z][a-z0-9_]{0,39}", name):
+                raise ValueError(
+                    f"the name {visible(name[:60])!r} is none: expected up to 40 of a to z, 0 to 9, and _, with a "
+                    "letter first"
+                )
+        if len(set(self.names)) < len(self.names):
+            raise ValueError(f"names are {', '.join(self.names)}, expected each once")
         for name, (low, high) in zip(self.names, self.ranges, strict=True):
             if not low < high:
                 raise ValueError(f"{name} is from {low:g} to {high:g}, expected the lowest value first")
@@ -297,7 +308,7 @@ def _load(source: str, file: str, name: str) -> Callable[..., Any]:
     space: dict[str, Any] = {"__name__": f"realitygap_task_{digest}", "__file__": shown_as}
     try:
         exec(compile(source, shown_as, "exec"), space)
-    except Exception as error:  # a user's file may raise anything
+    except (Exception, SystemExit) as error:  # a user's file may raise anything
         raise TaskError(f"{file} cannot be run: {_line_of(error, shown_as)}{_said(error)}") from error
     function = space.get(name)
     if not callable(function):
@@ -306,12 +317,12 @@ def _load(source: str, file: str, name: str) -> Callable[..., Any]:
     return found
 
 
-def _failed(function: PythonFunction, error: Exception) -> str:
+def _failed(function: PythonFunction, error: BaseException) -> str:
     line = _line_of(error, f"<{function.file} {function.sha256[:16]}>")
     return f"{function.function_name} of {function.file} failed: {line}{_said(error)}"
 
 
-def _line_of(error: Exception, shown_as: str) -> str:
+def _line_of(error: BaseException, shown_as: str) -> str:
     """Return the line of the file at which the error occurred, or an empty string if it occurred elsewhere."""
     if isinstance(error, SyntaxError) and error.filename == shown_as:
         return f"line {error.lineno}: "
@@ -321,6 +332,6 @@ def _line_of(error: Exception, shown_as: str) -> str:
     return f"line {lines[-1]}: " if lines else ""
 
 
-def _said(error: Exception) -> str:
+def _said(error: BaseException) -> str:
     text = str(error).strip().split("\n")[0]
     return f"{type(error).__name__}: {text}." if text else f"{type(error).__name__}."

@@ -90,7 +90,8 @@ def cell_of(descriptors, row, cells):
         index = 0
         for k in range(d):
             part = (descriptors[row, k] - cells.low[k]) / (cells.high[k] - cells.low[k])
-            place = int(math.floor(min(max(part, 0.0), 1.0) * cells.size[k]))
+            part = min(part, 1.0) if part > 0.0 else 0.0  # also of NaN, which rows of others may have
+            place = int(math.floor(part * cells.size[k]))
             index = index * cells.size[k] + min(place, cells.size[k] - 1)
         return index
     nearest = 0

@@ -105,7 +105,8 @@ def changed_condition(condition: Condition, name: str, **changes: object) -> Con
     if changes:
         settings[condition.platform] = {**settings[condition.platform], **changes}
     made = Condition.model_validate({**settings, "name": name})
-    return made.model_copy(update={"task": condition.task})  # which may have the permission to run code
+    # Both may have the permission to run code. An archive is no setting of a condition with another selection.
+    return made.model_copy(update={"task": condition.task, "archive": condition.archive})
 
 
 def _times(center: float, low: float, high: float) -> Distribution:

@@ -25,7 +25,7 @@ from realitygap.records import (
     those_that_count,
     write_whole,
 )
-from realitygap.runs import Condition
+from realitygap.runs import ArchiveSettings, Condition
 from realitygap.tasks import score_observed
 from realitygap.trials import Target
 from realitygap.world import load_calibration, load_robot
@@ -106,6 +106,7 @@ class TransferPlan:
         target: Name of the target.
         identity: Identity of the target, whatever its name; empty if it has only a name.
         fit: SHA-256 of the content of the order's calibration, which may be elsewhere the next time; empty without one.
+        archive: Settings of the archives that strategies fill if the condition fills none; None for the defaults.
     """
 
     order: TransferOrder
@@ -114,6 +115,7 @@ class TransferPlan:
     target: str
     identity: str
     fit: str = ""
+    archive: Mapping[str, object] | None = None
 
     @property
     def runs(self) -> int:
@@ -127,6 +129,7 @@ class TransferPlan:
             "study": order.study,
             "condition": self.condition,
             "settings": self.settings,
+            "archive": self.archive,
             "target": self.target,
             "identity": self.identity,
             "budgets": list(order.budgets),
@@ -202,7 +205,9 @@ def transfer_to(
     chosen = allowed_task(choose_condition(study, order.condition, order.seed), allow_code)
     chosen = _at_the_pace_of(target, chosen)
     fit = "" if order.calibration is None else _fit_of(order.calibration)
-    plan = TransferPlan(order, chosen.name, chosen.settings(), target.name, target.identity, fit)
+    is_default = chosen.selection == "map-elites" or chosen.archive == ArchiveSettings()
+    archive = None if is_default else chosen.archive.model_dump(mode="json")
+    plan = TransferPlan(order, chosen.name, chosen.settings(), target.name, target.identity, fit, archive)
     names = strategy_names(order.strategy or "all")
     folder = order.folder
     work = _Work(plan, chosen, target, folder, tell or (lambda _: None))
@@ -405,7 +410,9 @@ def _adopt(folder: Path, plan: TransferPlan) -> None:
         different = [key for key in now if key not in extends and now[key] != there.get(key)]
         if different:
             shown = "; ".join(
-                f"{key} was {there.get(key)!r}, is {now[key]!r}" for key in different if key != "settings"
+                f"{key} was {there.get(key)!r}, is {now[key]!r}"
+                for key in different
+                if key not in ("settings", "archive")
             )
             raise RecordError(
                 f"{folder} belongs to another transfer ({shown or 'the condition has other settings'}); nothing was "

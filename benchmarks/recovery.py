@@ -206,9 +206,21 @@ def analyze(folder: Path) -> dict[str, Any]:
         key=lambda row: row["score"]["estimate"],
     )
     regained = sum(share >= REGAINED for share in best["of_intact"].values())
+    each_twin = [
+        {
+            "family": row["family"],
+            "seed": row["seed"],
+            "intact": whole,
+            "scores": [
+                {"strategy": strategy, "budget": budget, "score": values[k]}
+                for (strategy, budget), values in score.items()
+            ],
+        }
+        for k, (row, whole) in enumerate(zip(rows, intact.tolist(), strict=True))
+    ]
     return {
         "label": "TWIN",
-        "twins": len(rows),
+        "twins": each_twin,
         "missing": [str(twin) for twin in twins() if not (folder / f"{twin}.json").exists()],
         "intact": mean_interval(intact).to_dict(),
         "table": table,

@@ -16,6 +16,7 @@ import make_faults  # noqa: E402
 import make_gallery  # noqa: E402
 import make_lab  # noqa: E402
 import make_real_data  # noqa: E402
+import make_recovery  # noqa: E402
 import make_sensors  # noqa: E402
 import make_speed  # noqa: E402
 import reference_pages  # noqa: E402
@@ -170,6 +171,7 @@ def setup(app):
         **make_lab.page_parts(),
         **make_sensors.page_parts(),
         **make_real_data.page_parts(),
+        **make_recovery.page_parts(),
     }
     reference_pages.write_all(HERE / "generated", more)
     app.connect("autodoc-skip-member", skip_pydantic)

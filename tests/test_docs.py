@@ -663,6 +663,41 @@ def test_page_on_robots_of_other_people_shows_missed_goals_first():
     assert "REAL (others' robots)" in make_real_data.page_parts()["parts/real-goals.md"]
 
 
+def test_page_on_recovery_follows_from_the_scores_of_twins():
+    make_recovery = _load("make_recovery")
+    found = json.loads((DOCS / "data/recovery.json").read_text("utf-8"))
+    parts = make_recovery.page_parts()
+    page = (DOCS / "explanations/recovery.md").read_text("utf-8")
+    assert all(f"../generated/{name}" in page for name in parts)
+    by_twin = [
+        {each["strategy"]: each["score"] for each in twin["scores"] if each["budget"] == 10}
+        for twin in found["twins"]
+    ]
+    mean = {name: np.mean([scores[name] for scores in by_twin]) for name in by_twin[0]}
+    for row in found["table"]:
+        if row["budget"] == 10:
+            assert row["score"]["estimate"] == pytest.approx(mean[row["strategy"]])
+            assert f"`{row['strategy']}`" in parts["parts/recovery-table.md"]
+    assert found["best"] == max((name for name in mean if name.startswith("trial")), key=mean.get)
+    assert f"`{found['best']}` spends half" in page
+    assert max(mean, key=mean.get) == found["best"]
+    shares = {
+        family: np.mean(
+            [
+                scores[found["best"]] / twin["intact"]
+                for twin, scores in zip(found["twins"], by_twin, strict=True)
+                if twin["family"] == family
+            ]
+        )
+        for family in {twin["family"] for twin in found["twins"]}
+    }
+    assert found["families_that_regain"] == sum(share >= 0.8 for share in shares.values())
+    is_met = found["families_that_regain"] >= 3
+    assert f"**The first goal is {'met' if is_met else 'missed'}**" in parts["parts/recovery-words.md"]
+    for part, difference in found["combined_minus_part"].items():
+        assert difference["estimate"] == pytest.approx(mean["trial-and-error-combined"] - mean[part])
+
+
 @pytest.mark.parametrize("path", sorted(DOCS.rglob("tutorials/*.ipynb")), ids=lambda path: path.name)
 def test_notebooks_are_stored_without_outputs(path):
     cells = [cell for cell in json.loads(path.read_text("utf-8"))["cells"] if cell["cell_type"] == "code"]

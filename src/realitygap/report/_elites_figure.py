@@ -57,7 +57,7 @@ def _again(condition: Condition, elites: pl.DataFrame) -> pl.DataFrame:
         if not function.may_run:
             raise TaskError(
                 f"that runs {visible(function.kind)} (SHA-256 {function.sha256[:12]}…), and you have not allowed this "
-                "file (--allow-code)."
+                "file. `realitygap report --allow-code` runs it."
             )
     return retry_elites(condition, elites)
 

@@ -165,7 +165,8 @@ def pyribs() -> float:
         tried = try_genomes(
             platform, arena, genomes, noise=0.0, noise_key=key, inputs=condition.network_inputs
         )
-        scheduler.tell(tried.coverage_line, describe(SimpleNamespace(batch=tried), trials))
+        described = describe(SimpleNamespace(batch=tried), trials, condition.network_inputs)
+        scheduler.tell(tried.coverage_line, described)
     return BATCH * SPEED_BATCHES / (time.perf_counter() - began)
 
 

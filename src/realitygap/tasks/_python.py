@@ -34,6 +34,7 @@ from ._trajectories import Trajectories
 
 PYTHON = "python:"
 MOST_NUMBERS = 32
+Range = Annotated[tuple[float, float], BeforeValidator(as_tuple)]
 
 
 class PythonFunction(Settings):
@@ -159,7 +160,7 @@ class PythonFunction(Settings):
 class PythonTask(PythonFunction):
     """A task whose function returns the score of each of n trials, (n,). A better trial has a higher score."""
 
-    inputs: tuple[str, ...] = Field(
+    inputs: Annotated[tuple[str, ...], BeforeValidator(as_tuple)] = Field(
         ("obstacle", "stall", "time"),
         min_length=1,
         max_length=256,
@@ -171,13 +172,6 @@ class PythonTask(PythonFunction):
         description="Minimum observation level of a robot's trial that the function can score: readings, cells, "
         "encoders, or track.",
     )
-
-    @model_validator(mode="before")
-    @classmethod
-    def _take_a_list_of_inputs(cls, values: Any) -> Any:
-        if isinstance(values, dict) and isinstance(values.get("inputs"), list):
-            return {**values, "inputs": tuple(values["inputs"])}
-        return values
 
     @property
     def name(self) -> str:
@@ -222,17 +216,9 @@ class PythonDescriptor(PythonFunction):
     names: Annotated[tuple[str, ...], BeforeValidator(as_tuple)] = Field(
         min_length=1, max_length=MOST_NUMBERS, description="Names of the d numbers."
     )
-    ranges: tuple[tuple[float, float], ...] = Field(
+    ranges: Annotated[tuple[Range, ...], BeforeValidator(as_tuple)] = Field(
         min_length=1, max_length=MOST_NUMBERS, description="Lowest and highest value of each number, (d, 2)."
     )
-
-    @model_validator(mode="before")
-    @classmethod
-    def _take_lists_of_ranges(cls, values: Any) -> Any:
-        if isinstance(values, dict) and isinstance(values.get("ranges"), list):
-            pairs = [tuple(pair) if isinstance(pair, list) else pair for pair in values["ranges"]]
-            return {**values, "ranges": tuple(pairs)}
-        return values
 
     @model_validator(mode="after")
     def _each_name_has_its_range(self) -> Self:

@@ -186,7 +186,7 @@ def analyze(folder: Path) -> dict[str, Any]:
         for each in row["damaged"]:
             of_twins = score.setdefault((each["strategy"], each["budget"]), np.full(len(rows), np.nan))
             of_twins[k] = np.mean(each["scores"])
-    table = [
+    table: list[dict[str, Any]] = [
         {
             "strategy": strategy,
             "budget": budget,

@@ -151,7 +151,7 @@ def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     parser.add_argument("--json", action="store_true", help="print data")
-    rates = {
+    rates: dict[str, Any] = {
         "loops_per_second": measure(),
         "machine": f"{platform.machine()}, {os.cpu_count()} cores, Python {platform.python_version()}",
         "load": round(os.getloadavg()[0], 2),
@@ -160,7 +160,7 @@ def main() -> None:
         print(json.dumps(rates, indent=2))
         return
     print(f"Sensor-and-motor loops a second ({rates['machine']}, load {rates['load']})")
-    for name, row in rates["loops_per_second"].items():  # type: ignore[union-attr]
+    for name, row in rates["loops_per_second"].items():
         print(f"\n{name}")
         for setup, rate in row.items():
             print(f"  {setup:16} {rate:10,.0f}")

@@ -14,7 +14,7 @@ import numpy as np
 from pydantic import Field
 
 from realitygap.platforms import Platform
-from realitygap.robots import Command, Observation, ProgramRobot, check_command
+from realitygap.robots import Command, Label, Observation, ProgramRobot, check_command
 from realitygap.world import Arena, Pose
 
 REACH = 0.2  # of the rays [m]
@@ -39,7 +39,8 @@ class ToyPlatform(Platform):
 class ToyRobot(ProgramRobot):
     """The toy, one command at a time."""
 
-    label, step_s, n_sensors = "SIM", 0.5, len(RAYS)
+    label: Label = "SIM"
+    step_s, n_sensors = 0.5, len(RAYS)
 
     def __init__(self, platform: ToyPlatform, arena: Arena, noise: float) -> None:
         self._platform, self.arena, self._noise = platform, arena, noise

@@ -64,7 +64,7 @@ def fit(twin: TwinOfStudy, sets: int) -> None:
     rng = np.random.default_rng(seed)
     with twin.open() as target:
         trials, arena = twin.calibrating(target, plan.budget), target.arena
-    robot = twin.condition("coverage", "x").on.robot
+    robot = twin.condition("coverage", "x").on.robot  # type: ignore[attr-defined]
     prior = scribbler_prior(robot)
     ensemble = SimEnsemble(
         SimPlatform(robot=robot, step_s=trials[0].step_s), arena, ranges=ranges_of(prior, robot)

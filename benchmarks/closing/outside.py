@@ -162,9 +162,8 @@ def fit_outside(twin: TwinOfStudy, method: str) -> None:
     plan = twin.plan
     with twin.open() as target:
         trials = twin.calibrating(target, plan.budget)
-        error = TrajectoryError(
-            trials, twin.condition("coverage", "x").on.robot, target.arena, plan.seed_of(twin.twin, method)
-        )
+        robot = twin.condition("coverage", "x").on.robot  # type: ignore[attr-defined]
+        error = TrajectoryError(trials, robot, target.arena, plan.seed_of(twin.twin, method))
     try:
         place = METHODS[method](error)
     except (ValueError, ArithmeticError) as problem:
@@ -187,7 +186,7 @@ def write_outside(
     note: str = "",
 ) -> None:
     """Write the calibration of an outside arm: the robot's numbers, draws if there are any, and the parameters."""
-    robot = twin.condition("coverage", "x").on.robot
+    robot = twin.condition("coverage", "x").on.robot  # type: ignore[attr-defined]
     priors = {parameter.name: parameter for parameter in scribbler_prior(robot)}
     made = Calibration(
         kind="all", robot=robot.name, target=f"twin:{twin.twin}", label="TWIN", observe="track",

@@ -271,7 +271,7 @@ class TwinOfStudy:
 
     @cached_property
     def _robot(self) -> Any:
-        return self.condition("coverage", "controllers").on.robot
+        return self.condition("coverage", "controllers").on.robot  # type: ignore[attr-defined]
 
     def calibrating(self, target: Target, budget: int, kind: str = "all") -> list[TrialRecord]:
         """Return the trials that calibrate, with poses; they are driven once, and saved."""

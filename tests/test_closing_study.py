@@ -15,6 +15,7 @@ from benchmarks.closing.analysis import (
     square_gap,
     stratified_mean,
 )
+from benchmarks.closing.figures import draw, read_scores
 from benchmarks.closing.plan import FAMILIES, Arm, Plan, Twin, Unit, small_plan
 from benchmarks.closing.twin import TwinOfStudy
 
@@ -153,6 +154,41 @@ def test_results_of_another_plan_are_refused(tmp_path):
     assert (tmp_path / "out" / "scores.parquet").exists()
     with pytest.raises(SystemExit, match="another plan"):
         analyze(replace(plan, digest="changed"), tmp_path, tmp_path / "other")
+
+
+def test_the_stored_scores_give_the_same_goals_as_the_results(tmp_path):
+    """A fit that failed is one of them."""
+    results = made_up(plan_of(2), {"plain": 0.2, "prior": 0.2, "cells": 0.05, "track": 0.02})
+    failed = Twin("worn", 1), Unit("coverage", "track")
+    results.units[failed] |= {"failed": "No draw: all were lost.", "scores": [], "champions": []}
+    (tmp_path / "units").mkdir()
+    for (twin, unit), result in results.units.items():
+        (tmp_path / "units" / f"{twin}-{unit}.json").write_text(json.dumps(result))
+    analyze(results.plan, tmp_path, tmp_path / "out")
+    stored = read_scores(results.plan, tmp_path / "out")
+    assert primary(stored) == primary(results)
+    assert stored.units[failed]["failed"] == "No draw: all were lost."
+    with pytest.raises(SystemExit, match="another plan"):
+        read_scores(replace(results.plan, digest="changed"), tmp_path / "out")
+
+
+def test_each_figure_shows_all_arms_that_it_is_about(tmp_path):
+    arms = tuple(Arm(name, "none") for name in ("plain", "prior", "cells", "track-10", "track", "track-40"))
+    plan = plan_of(2, arms=arms)
+    results = made_up(plan, {arm.name: 0.1 for arm in arms})
+    results.table().write_parquet(tmp_path / "scores.parquet")
+    (tmp_path / "facts.json").write_text(json.dumps({"plan": plan.digest, "failed": []}))
+    draw(plan, tmp_path, tmp_path / "figures")
+    shown = {path.stem: path.read_text() for path in (tmp_path / "figures").iterdir()}
+    assert shown.keys() == {"scatter", "falls", "evolved", "budget"}
+    names = {
+        "scatter": ["320 controllers on 8 twins"],
+        "falls": ["prior", "cells", "track-10", "track", "track-40"],
+        "evolved": [arm.name for arm in arms],
+        "budget": ["close", "worn", "slippery", "delayed"],
+    }
+    for figure, texts in names.items():
+        assert [text for text in texts if f">{text}<" not in shown[figure]] == [], figure
 
 
 @pytest.mark.slow

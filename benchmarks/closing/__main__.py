@@ -1,4 +1,4 @@
-"""The commands of the study: run, fit, and analyze."""
+"""The commands of the study: run, fit, analyze, and draw."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from pathlib import Path
 
 from . import __doc__ as usage
 from .analysis import analyze
+from .figures import draw
 from .outside import METHODS, fit_outside
 from .plan import read_plan, small_plan
 from .twin import TwinOfStudy
@@ -28,6 +29,7 @@ def main() -> None:
         ("run", "compute all units that are missing"),
         ("fit", "fit outside calibrators to the trials of all driven twins"),
         ("analyze", "write the scores, and the tables of the page"),
+        ("draw", "draw the figures of the page from the folder of the scores"),
     ):
         command = commands.add_parser(name, help=summary)
         command.add_argument("folder", type=Path)
@@ -35,8 +37,8 @@ def main() -> None:
         command.add_argument("--processes", type=int, default=multiprocessing.cpu_count())
         if name == "fit":
             command.add_argument("method", choices=sorted(METHODS))
-        if name == "analyze":
-            command.add_argument("--out", type=Path, required=True, help="folder of the tables")
+        if name in ("analyze", "draw"):
+            command.add_argument("--out", type=Path, required=True, help="folder of what is written")
     options = parser.parse_args()
     plan = small_plan() if options.small else read_plan()
     if options.command == "analyze":
@@ -45,6 +47,9 @@ def main() -> None:
                 "The mixed model needs statsmodels: uv run --with statsmodels,pandas python -m ..."
             )
         analyze(plan, options.folder, options.out)
+        return
+    if options.command == "draw":
+        draw(plan, options.folder, options.out)
         return
     for part in ("twins", "units", "fits", "trials"):
         (options.folder / part).mkdir(parents=True, exist_ok=True)

@@ -273,7 +273,7 @@ def primary(results: Results) -> list[dict[str, Any]]:
                 _row(name, arm, stratified_mean(values, families), limit, p_of_mean(values, families, limit))
             )
         for name, kind in (("P3 prediction, random", "random"), ("P4 prediction, champions", "champion")):
-            found, p, limit = *_fall(results, arm, kind, goals["fall"][arm]), goals["fall"][arm]
+            found, p, limit = *fall_of(results, arm, kind, goals["fall"][arm]), goals["fall"][arm]
             rows.append(_row(name, arm, found, limit, p))
     for row, p in zip(rows, holm(np.array([row["p"] for row in rows])).tolist(), strict=True):
         row["p_holm"] = p
@@ -286,9 +286,10 @@ def primary(results: Results) -> list[dict[str, Any]]:
     return rows
 
 
-def _fall(
+def fall_of(
     results: Results, arm: str, kind: str, limit: float, task: str = "coverage"
 ) -> tuple[Estimate, float]:
+    """Return the fall of the pooled RMS gap from that of `plain`, and the p of a limit: see `pooled_fall`."""
     pairs = [
         (twin, square_gap(results, twin, "plain", kind, task), square_gap(results, twin, arm, kind, task))
         for twin in results.twins()
@@ -480,7 +481,7 @@ def tasks(results: Results) -> list[dict[str, Any]]:
         found = stratified_mean(*contrast(results, value, "track", "plain"))
         row: dict[str, Any] = {"task": task, "track less plain, on the twin": _text(found), "twins": found.n}
         for kind in ("random", "champion"):
-            row[f"fall of the RMS gap, {kind}"] = _text(_fall(results, "track", kind, 0.0, task)[0])
+            row[f"fall of the RMS gap, {kind}"] = _text(fall_of(results, "track", kind, 0.0, task)[0])
         rows.append(row)
     return rows
 

@@ -1,5 +1,6 @@
 """The study `closing-the-gap`: its seeds, what it resumes, and its analysis, on results whose truth is known."""
 
+import csv
 import json
 from dataclasses import replace
 
@@ -20,6 +21,9 @@ from benchmarks.closing.plan import FAMILIES, Arm, Plan, Twin, Unit, small_plan
 from benchmarks.closing.twin import TwinOfStudy
 
 ARMS = tuple(Arm(name, "none") for name in ("plain", "prior", "cells", "track"))
+
+
+FIT = {"name": "drive.gain", "identified": True}
 
 
 def plan_of(n=8, **changes):
@@ -57,8 +61,10 @@ def made_up(plan, gap, transfer=0.0, seed=0):
                 for one in level
             ]
             units[twin, Unit("coverage", arm.name)] = head | {
-                "scores": tried(truth + off), "champions": champions, "calibration": {"misspecified": False},
-            }  # fmt: skip
+                "scores": tried(truth + off),
+                "champions": champions,
+                "calibration": {"misspecified": False, "fitted": [FIT]},
+            }
     return Results(plan, units)
 
 
@@ -152,6 +158,10 @@ def test_results_of_another_plan_are_refused(tmp_path):
         (tmp_path / "units" / f"{twin}-{unit}.json").write_text(json.dumps(result))
     analyze(plan, tmp_path, tmp_path / "out")
     assert (tmp_path / "out" / "scores.parquet").exists()
+    with (tmp_path / "out" / "identified.csv").open() as file:
+        assert list(csv.DictReader(file)) == [
+            {"parameter": "drive.gain", "identified, cells": "4 of 4", "identified, track": "4 of 4"}
+        ]
     with pytest.raises(SystemExit, match="another plan"):
         analyze(replace(plan, digest="changed"), tmp_path, tmp_path / "other")
 

@@ -305,30 +305,42 @@ def _row(name: str, arm: str, found: Estimate, limit: float, p: float) -> dict[s
             "limit": limit, "p": p}  # fmt: skip
 
 
-def arms(results: Results) -> list[dict[str, Any]]:
-    """Return what each arm gives: transfer, optimism, gap, order; and ours less it, with simultaneous intervals.
+def prediction(results: Results) -> list[dict[str, Any]]:
+    """Return how well each arm's simulator predicts the held-out controllers: gap and order."""
+    rows = []
+    for arm in results.plan.arms:
+        row: dict[str, Any] = {"arm": arm.name}
+        for kind in ("random", "champion"):
+            squares = [
+                v for twin in results.twins() if (v := square_gap(results, twin, arm.name, kind)) is not None
+            ]
+            row[f"RMS gap, {kind}"] = f"{math.sqrt(max(0.0, float(np.mean(squares)))):.3f}" if squares else ""
+        row["excess MMRV"] = _text(over_twins(results, excess_violation, arm.name))
+        differences, families = contrast(results, excess_violation, arm.name, "plain")
+        if arm.name != "plain" and differences:
+            row["excess MMRV less plain's"] = _text(stratified_mean(differences, families))
+        gaps, _ = contrast(results, _mean_square, arm.name, "track")
+        if arm.name != "track" and gaps:
+            row["twins on which track's gap is smaller"] = f"{int(np.sum(np.array(gaps) > 0))} of {len(gaps)}"
+        rows.append(row)
+    return rows
+
+
+def transfer(results: Results) -> list[dict[str, Any]]:
+    """Return what evolved in each arm's simulator: its score on the twin, its optimism, and `track` less it.
 
     The intervals of the differences hold together over all arms of others (Bonferroni).
     """
-    names = [arm.name for arm in results.plan.arms]
-    level = 1 - (1 - CONFIDENCE) / max(1, len(names) - 1)
     rows = []
-    for name in names:
-        row: dict[str, Any] = {"arm": name}
-        for what, value in (
-            ("on the twin", evolved),
-            ("optimism", optimism),
-            ("excess MMRV", excess_violation),
-        ):
-            known = [(twin, v) for twin in results.twins() if (v := value(results, twin, name)) is not None]
-            row[what] = _text(stratified_mean([v for _, v in known], [twin.family for twin, _ in known]))
-        for kind in ("random", "champion"):
-            squares = [
-                v for twin in results.twins() if (v := square_gap(results, twin, name, kind)) is not None
-            ]
-            row[f"RMS gap, {kind}"] = f"{math.sqrt(max(0.0, float(np.mean(squares)))):.3f}" if squares else ""
-        differences, families = contrast(results, evolved, "track", name)
-        if name != "track" and differences:
+    level = 1 - (1 - CONFIDENCE) / max(1, len(results.plan.arms) - 1)
+    for arm in results.plan.arms:
+        if not arm.evolves:
+            continue
+        row: dict[str, Any] = {"arm": arm.name}
+        for what, value in (("on the twin", evolved), ("optimism", optimism)):
+            row[what] = _text(over_twins(results, value, arm.name))
+        differences, families = contrast(results, evolved, "track", arm.name)
+        if arm.name != "track" and differences:
             found = stratified_mean(differences, families, level)
             row["track less it, on the twin"] = _text(found)
             row["median twin"] = f"{np.median(differences):+.3f}"
@@ -340,14 +352,31 @@ def arms(results: Results) -> list[dict[str, Any]]:
                 and found.high < margin
             )
             row["equal"] = "yes" if inside else ""
-        differences, families = contrast(results, excess_violation, name, "plain")
-        if name != "plain" and differences:
-            row["excess MMRV less plain's"] = _text(stratified_mean(differences, families))
-        gaps, _ = contrast(results, _mean_square, name, "track")
-        if name != "track" and gaps:
-            row["twins on which track's gap is smaller"] = f"{int(np.sum(np.array(gaps) > 0))} of {len(gaps)}"
         rows.append(row)
     return rows
+
+
+def over_twins(results: Results, value: Value, arm: str) -> Estimate:
+    """Return the mean of a value of twins."""
+    known = [(twin.family, v) for twin in results.twins() if (v := value(results, twin, arm)) is not None]
+    return stratified_mean([v for _, v in known], [family for family, _ in known])
+
+
+def identified(results: Results) -> list[dict[str, Any]]:
+    """Return on how many twins each of our fits identified each parameter."""
+    found: dict[str, dict[str, int]] = {}
+    totals = dict.fromkeys(OURS, 0)
+    for arm in OURS:
+        for twin in results.twins():
+            unit = results.get(twin, "coverage", arm)
+            fits = [] if unit is None or unit["calibration"] is None else unit["calibration"]["fitted"]
+            totals[arm] += bool(fits)
+            for fit in fits:
+                found.setdefault(fit["name"], dict.fromkeys(OURS, 0))[arm] += fit["identified"]
+    return [
+        {"parameter": name} | {f"identified, {arm}": f"{counts[arm]} of {totals[arm]}" for arm in OURS}
+        for name, counts in found.items()
+    ]
 
 
 def _mean_square(results: Results, twin: Twin, arm: str) -> float | None:
@@ -507,7 +536,9 @@ def analyze(plan: Plan, folder: Path, out: Path) -> None:
     print(json.dumps(facts))
     for name, rows in (
         ("goals", primary(results)),
-        ("arms", arms(results)),
+        ("prediction", prediction(results)),
+        ("evolved", transfer(results)),
+        ("identified", identified(results)),
         ("flagged", flagged(results)),
         ("apart", apart(results)),
         ("sensitivity", sensitivity(results)),

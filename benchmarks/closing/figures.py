@@ -21,7 +21,7 @@ from realitygap.report.charts.rows import name_rows
 from realitygap.report.charts.scatter import draw_equality
 from realitygap.report.charts.sheet import Sheet, grid
 
-from .analysis import Results, Scores, evolved, fall_of, optimism, square_gap, stratified_mean
+from .analysis import Results, Scores, evolved, fall_of, optimism, over_twins, square_gap
 from .plan import FAMILIES, Plan, Twin, Unit
 
 if TYPE_CHECKING:
@@ -202,7 +202,7 @@ def _with_interval(axes: Axes, found: Estimate, place: float, scale: float = 1.0
 def of_evolved(results: Results) -> Drawing:
     """Draw the mean score of what evolved in each arm's simulator, there and on the twin."""
     arms = [arm.name for arm in results.plan.arms if arm.evolves]
-    rows = {arm: (_over_twins(results, evolved, arm), _over_twins(results, optimism, arm)) for arm in arms}
+    rows = {arm: (over_twins(results, evolved, arm), over_twins(results, optimism, arm)) for arm in arms}
     known = [each for target, off in rows.values() if target.value is not None
              for each in (*(target.ends or (target.value,)), target.value + (off.value or 0.0))]  # fmt: skip
     low, high = (min(known), max(known)) if known else (0.0, 1.0)
@@ -227,11 +227,6 @@ def of_evolved(results: Results) -> Drawing:
         return sheet
 
     return _figure(drawn, "evolved", "Coverage of evolved controllers in their simulator and on the twin.")
-
-
-def _over_twins(results: Results, value: Callable[[Results, Twin, str], float | None], arm: str) -> Estimate:
-    known = [(twin.family, v) for twin in results.twins() if (v := value(results, twin, arm)) is not None]
-    return stratified_mean([v for _, v in known], [family for family, _ in known])
 
 
 def by_budget(results: Results) -> Drawing:

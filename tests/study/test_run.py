@@ -172,6 +172,21 @@ def test_another_study_does_not_take_a_folder_over(study, undisturbed, tmp_path,
     assert (there.description["name"], there.description["seed"]) == ("small", 3)
 
 
+@pytest.mark.parametrize(
+    "change",
+    [("noise = 0.5", "noise = 0.6"), ("seed = 3", "seed = 4"), ('name = "novelty"', 'name = "other"')],
+)
+def test_a_study_that_ended_before_its_first_result_leaves_its_folder_free(
+    study, undisturbed, tmp_path, change
+):
+    """A Python task that fails in the first trials, for example, is repaired, and the same command runs it."""
+    failed = parse_study(SMALL.replace(*change), "small.toml", replicates=50)
+    ResultsFolder.create(tmp_path / "r", failed.description())
+    result = run_study(study, tmp_path / "r")
+    assert result.folder.digest() == undisturbed.digest()
+    assert result.folder.description == undisturbed.description
+
+
 def test_a_study_may_get_another_name_with_all_its_conditions(study, undisturbed, tmp_path):
     run_study(study, tmp_path / "r")
     renamed = run_study(parse_study(SMALL.replace('"small"', '"renamed"'), "small.toml"), tmp_path / "r")

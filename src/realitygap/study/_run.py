@@ -347,9 +347,11 @@ def _adopt(folder: ResultsFolder, study: Study) -> None:
     """
     _refuse_other_settings(folder, study)
     old, new = folder.description, study.description()
-    names = [condition["name"] for condition in new["conditions"]]
-    new["conditions"] += [each for each in old["conditions"] if each["name"] not in names]
-    new["replicates"] = max(new["replicates"], old["replicates"])
+    existing = _with_results(folder)
+    if existing:
+        names = [condition["name"] for condition in new["conditions"]]
+        new["conditions"] += [each for name, each in existing.items() if name not in names]
+        new["replicates"] = max(new["replicates"], old["replicates"])
     if new != old:
         folder.update_description(new)
 
@@ -362,7 +364,7 @@ def _refuse_other_settings(folder: ResultsFolder, study: Study) -> None:
     """
     old = folder.description
     new = study.description()
-    existing = {condition["name"]: condition for condition in old["conditions"]}
+    existing = _with_results(folder)
     differences: list[str] = []
     for condition in new["conditions"]:
         before = existing.pop(condition["name"], None)
@@ -395,6 +397,16 @@ def _refuse_other_settings(folder: ResultsFolder, study: Study) -> None:
                 ]
             )
         )
+
+
+def _with_results(folder: ResultsFolder) -> dict[str, dict[str, Any]]:
+    """Return the conditions of a folder by name, without those that were planned and have no results yet."""
+    has_ledger = (folder.path / LEDGER_NAME).exists()
+    return {
+        condition["name"]: condition
+        for condition in folder.description["conditions"]
+        if has_ledger or folder.count_of(condition["name"])
+    }
 
 
 def _ways_out(folder: ResultsFolder) -> str:

@@ -400,13 +400,12 @@ def _refuse_other_settings(folder: ResultsFolder, study: Study) -> None:
 
 
 def _with_results(folder: ResultsFolder) -> dict[str, dict[str, Any]]:
-    """Return the conditions of a folder by name, without those that were planned and have no results yet."""
-    has_ledger = (folder.path / LEDGER_NAME).exists()
-    return {
-        condition["name"]: condition
-        for condition in folder.description["conditions"]
-        if has_ledger or folder.count_of(condition["name"])
-    }
+    """Return the conditions of a folder by name; without a ledger, only those that have results."""
+    conditions = {condition["name"]: condition for condition in folder.description["conditions"]}
+    if (folder.path / LEDGER_NAME).exists():
+        return conditions
+    computed = {name.condition for name, _ in folder.files()}
+    return {name: condition for name, condition in conditions.items() if name in computed}
 
 
 def _ways_out(folder: ResultsFolder) -> str:

@@ -21,8 +21,6 @@ from benchmarks.closing.plan import FAMILIES, Arm, Plan, Twin, Unit, small_plan
 from benchmarks.closing.twin import TwinOfStudy
 
 ARMS = tuple(Arm(name, "none") for name in ("plain", "prior", "cells", "track"))
-
-
 FIT = {"name": "drive.gain", "identified": True}
 
 
@@ -180,6 +178,14 @@ def test_the_stored_scores_give_the_same_goals_as_the_results(tmp_path):
     assert stored.units[failed]["failed"] == "No draw: all were lost."
     with pytest.raises(SystemExit, match="another plan"):
         read_scores(replace(results.plan, digest="changed"), tmp_path / "out")
+
+
+def test_a_folder_without_results_or_scores_is_refused_with_the_command_that_makes_them(tmp_path):
+    with pytest.raises(SystemExit, match="closing run"):
+        analyze(plan_of(1), tmp_path, tmp_path / "out")
+    with pytest.raises(SystemExit, match="closing analyze"):
+        draw(plan_of(1), tmp_path, tmp_path / "figures")
+    assert not list(tmp_path.iterdir())
 
 
 def test_each_figure_shows_all_arms_that_it_is_about(tmp_path):

@@ -45,7 +45,7 @@ class Results:
         """Read the results in a folder.
 
         Raises:
-            SystemExit: One is of another plan.
+            SystemExit: There are none, or one is of another plan.
         """
         found: dict[tuple[Twin, Unit], dict[str, Any]] = {}
         for twin in plan.names():
@@ -55,6 +55,10 @@ class Results:
                     found[twin, unit] = read_unit(path)
                     if found[twin, unit]["plan"] != plan.digest:
                         raise SystemExit(f"{path} is of another plan. Nothing was analyzed.")
+        if not found:
+            raise SystemExit(
+                f"{folder} has no results. Compute them: python -m benchmarks.closing run {folder}"
+            )
         codes = {unit["code"] for unit in found.values()}
         if len(codes) > 1:
             raise SystemExit(f"The results are of {len(codes)} states of the code. Nothing was analyzed.")
@@ -357,7 +361,7 @@ def transfer(results: Results) -> list[dict[str, Any]]:
 
 
 def over_twins(results: Results, value: Value, arm: str) -> Estimate:
-    """Return the mean of a value of twins."""
+    """Return the mean of a value over the twins that have it: see `stratified_mean`."""
     known = [(twin.family, v) for twin in results.twins() if (v := value(results, twin, arm)) is not None]
     return stratified_mean([v for _, v in known], [family for family, _ in known])
 
@@ -537,7 +541,7 @@ def analyze(plan: Plan, folder: Path, out: Path) -> None:
     for name, rows in (
         ("goals", primary(results)),
         ("prediction", prediction(results)),
-        ("evolved", transfer(results)),
+        ("transfer", transfer(results)),
         ("identified", identified(results)),
         ("flagged", flagged(results)),
         ("apart", apart(results)),

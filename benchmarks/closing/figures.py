@@ -1,6 +1,6 @@
-"""The figures of the study, from the stored scores. They were written before the scores were looked at.
+"""The figures of the study, from the stored scores.
 
-Marks differ in lightness and in shape, because the page is also printed in black and white.
+Marks differ in lightness, in size, or in shape, because the page is also printed in black and white.
 """
 
 from __future__ import annotations
@@ -47,14 +47,20 @@ def read_scores(plan: Plan, folder: Path) -> Results:
         folder: Folder with `scores.parquet` and `facts.json`.
 
     Raises:
-        SystemExit: They are of another plan.
+        SystemExit: They are missing, or of another plan.
     """
-    facts = json.loads((folder / "facts.json").read_text())
-    if facts["plan"] != plan.digest:
+    scores, facts_file = folder / "scores.parquet", folder / "facts.json"
+    for path in (scores, facts_file):
+        if not path.exists():
+            raise SystemExit(
+                f"{path} does not exist. Write it: python -m benchmarks.closing analyze RESULTS --out {folder}"
+            )
+    facts = json.loads(facts_file.read_text())
+    if facts.get("plan") != plan.digest:
         raise SystemExit(f"{folder} has the scores of another plan. Nothing was drawn.")
     names = {str(twin): twin for twin in plan.names()}
     units: dict[tuple[Twin, Unit], dict[str, Any]] = {}
-    table = pl.read_parquet(folder / "scores.parquet")
+    table = pl.read_parquet(scores)
     for (twin, task, arm), rows in table.partition_by("twin", "task", "arm", as_dict=True).items():
         unit = Unit(task, "judged" if arm == "target" else arm)
         units[names[twin], unit] = _judged(rows) if arm == "target" else _of_arm(rows)
@@ -95,8 +101,9 @@ def draw(plan: Plan, folder: Path, out: Path) -> None:
         folder: Folder of the stored scores.
         out: Folder of the figures.
     """
+    results = read_scores(plan, folder)
     out.mkdir(parents=True, exist_ok=True)
-    for name, drawing in drawings(read_scores(plan, folder)).items():
+    for name, drawing in drawings(results).items():
         write_whole(out / f"{name}.svg", (drawing.svg + "\n").encode(), within=out)
         print(out / f"{name}.svg")
 

@@ -14,7 +14,7 @@ from realitygap.platforms import SimPlatform, SimTarget
 from realitygap.report import draw_elites, save_view
 from realitygap.report._tally import read_tally
 from realitygap.runs import Condition, elites_of, retry_elites, run_replicates
-from realitygap.study import load_study, run_study, transfer
+from realitygap.study import load_study, run_study, sample_controllers, transfer
 from realitygap.study._transfer.noise import changed_condition
 from realitygap.tasks import PythonDescriptor
 from realitygap.tasks._python import _load
@@ -136,6 +136,14 @@ def test_a_study_runs_reports_and_resumes_with_permission_only(study):
     (study.parent / "own.py").write_text(SOURCE + "# changed\n")
     with pytest.raises(StudyError, match="the text of the Python file has SHA-256"):
         run_study(study, out, replicates=4, allow_code=True)
+
+
+@pytest.mark.slow
+def test_only_runs_need_permission_for_descriptors(study):
+    run_study(study, study.parent / "out", allow_code=True)
+    assert len(sample_controllers(study.parent / "out", 2)) == 2
+    with pytest.raises(TaskError, match="not allowed"):
+        sample_controllers(study, 1)
 
 
 def test_reading_results_gives_no_permission(study):

@@ -53,16 +53,32 @@ def with_code_allowed(study: Study, allow_code: AllowCode) -> Study:
     return study.model_copy(update={"conditions": tuple(each.allowed() for each in study.conditions)})
 
 
-def allowed_task(condition: Condition, allow_code: bool) -> Condition:
+def allowed_condition(condition: Condition, allow_code: bool) -> Condition:
     """Return a condition whose task may score trials, and whose descriptors may describe them.
 
     Raises:
         TaskError: A function of it is in a Python file that the user has not allowed.
     """
     for function in condition.functions:
-        if not (function.may_run or allow_code):
-            raise TaskError(not_allowed(function))
+        _check_allowed(function, allow_code)
     return condition.allowed()
+
+
+def allowed_task(task: Task, allow_code: bool) -> Task:
+    """Return a task that may score trials.
+
+    Raises:
+        TaskError: Its function is in a Python file that the user has not allowed.
+    """
+    if not isinstance(task, PythonTask):
+        return task
+    _check_allowed(task, allow_code)
+    return task.allowed()
+
+
+def _check_allowed(function: PythonFunction, allow_code: bool) -> None:
+    if not (allow_code or function.may_run):
+        raise TaskError(not_allowed(function))
 
 
 def task_named(task: str | Task, *, allow_code: bool = False) -> Task:
@@ -79,10 +95,7 @@ def task_named(task: str | Task, *, allow_code: bool = False) -> Task:
             return as_task({"kind": task})  # type: ignore[no-any-return]  # by its kind
         except ValueError as error:
             raise StudyError(f"--task: {error}") from None
-    own = PythonTask.from_file(task)
-    if not (allow_code or own.may_run):
-        raise TaskError(not_allowed(own))
-    return own.allowed()
+    return allowed_task(PythonTask.from_file(task), allow_code)
 
 
 def check_files(study: Study, folder: Path) -> None:

@@ -18,7 +18,7 @@ from realitygap.runs import Condition, genome_of, partners_of, run_replicates
 from realitygap.tasks import CoverageTask, Task
 from realitygap.trials import NoiseKey
 
-from ._code import allowed_task
+from ._code import allowed_condition, allowed_task
 from ._file import DEFAULT_NEAT, load_study
 
 FRESH_TRIALS = 20
@@ -161,7 +161,9 @@ def _of_folder(folder: ResultsFolder, name: str | Path, allow_code: bool) -> lis
             rows = folder.read(
                 condition.name, columns=[*_COLUMNS, *condition.genome_columns, _column_of(condition)]
             )
-            condition = allowed_task(condition, allow_code)
+            # Only the task is run again. Its descriptors need no permission.
+            task = allowed_task(condition.task_of_trials, allow_code)
+            condition = condition.model_copy(update={"task": task})
             found += [_Champion(condition, row) for row in _best_of_runs(condition, rows)]
     return found
 
@@ -170,7 +172,7 @@ def _of_study(name: str | Path, n: int, seed: int, allow_code: bool) -> list[_Ch
     study = load_study(name, seed=seed, replicates=n)
     for condition in _coverage_first(study.conditions):
         if condition.selection != "random" and not condition.is_physical:
-            condition = allowed_task(condition, allow_code)
+            condition = allowed_condition(condition, allow_code)
             rows = run_replicates(condition, 0, n)
             return [_Champion(condition, row) for row in _best_of_runs(condition, rows)]
     raise StudyError(

@@ -30,7 +30,7 @@ from realitygap.tasks import score_observed
 from realitygap.trials import Target
 from realitygap.world import load_calibration, load_robot
 
-from .._code import allowed_task
+from .._code import allowed_condition
 from .._design import design_of, hold_folder_to_design
 from .._file import load_study
 from .._study import Study
@@ -202,7 +202,7 @@ def transfer_to(
 ) -> TransferResult:
     """Transfer to an open target, as ordered."""
     refuse_more_than_is_seen(target, order.observe)
-    chosen = allowed_task(choose_condition(study, order.condition, order.seed), allow_code)
+    chosen = allowed_condition(choose_condition(study, order.condition, order.seed), allow_code)
     chosen = _at_the_pace_of(target, chosen)
     fit = "" if order.calibration is None else _fit_of(order.calibration)
     is_default = chosen.selection == "map-elites" or chosen.archive == ArchiveSettings()

@@ -3,7 +3,7 @@
     python benchmarks/playground_readings.py FILE --robot thymio-playground
 
 The file has the trials of a calibration with poses, such as `playground-31-track-20.sqlite` in `calibrations`, a folder
-of the results of `realitygap closing-the-gap --plan playground`.
+of the results of `python -m benchmarks.closing_thymio run FOLDER --plan playground`.
 """
 
 from __future__ import annotations

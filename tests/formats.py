@@ -282,18 +282,6 @@ _TRANSFER = json.dumps(
 )  # fmt: skip
 
 
-def _plan(path: Path) -> Any:
-    from realitygap.study._closing.plan import adopt_plan, read_plan
-
-    adopt_plan(path.parent, read_plan(path.parent))
-
-
-def _valid_plan() -> bytes:
-    from realitygap.study._closing.plan import SMALL
-
-    return json.dumps(SMALL.to_dict()).encode()
-
-
 def _draft(path: Path) -> Any:
     from realitygap.lab._scoring_files import read_json
 
@@ -665,7 +653,6 @@ def _formats() -> dict[str, Format]:
         "study.json": Format(_valid_description(), _reader("results/study.json", _description)),
         "memory.json": Format(_valid_memory(), _reader("memory.json", _memory)),
         "transfer.json": Format(_TRANSFER.encode(), _reader("t/transfer.json", _transfer)),
-        "plan.json": Format(_valid_plan(), _reader("c/plan.json", _plan)),
         "draft.json": Format(b'{"cells":[1,2,3],"proposal":""}', _reader("draft.json", _draft)),
         "lab frame": Format(b'42["log",{"client_id":"a","level":"info","message":"hi"}]', _frame),
         "observations.jsonl": Format(_valid_observations(), _reader("trials.jsonl", _observations)),

@@ -41,7 +41,6 @@ ALLOWED = {
     "records/_ledger_file.py": {"sqlite3.connect"},
     "records/_trial_store.py": {"sqlite3.connect"},  # of a ledger in memory
     "records/_observations_file.py": {"json.loads"},  # of what was just written
-    "study/_closing/plan.py": {"json.loads"},  # of what was just written
     "study/_transfer/strategies.py": {"json.loads"},  # of what was just written
     "world/_svg.py": {"ElementTree.fromstring"},
     # between two processes of one program

@@ -653,6 +653,3 @@ def distribution_caveat(null: Null) -> str:
 
 FEW_RUNS = "[few runs]"
 """Stands for an interval in a table if there are too few runs for one."""
-
-GOAL_VERDICTS = {True: "met", False: "missed", None: "open"}
-"""Words for goals whose whole interval meets them, or misses them, or for which the data do not decide."""

@@ -68,7 +68,7 @@ def test_list_of_commands_begins_with_five_and_ends_with_advanced_ones():
     names = {title: [command.name for command in commands] for title, commands in _commands.SECTIONS.items()}
     first, *_, last = names
     assert len(names[first]) == 5
-    advanced = {"simulate", "audit-results", "audit-distance", "bench", "digest", "lens", "closing-the-gap"}
+    advanced = {"simulate", "audit-results", "audit-distance", "bench", "digest", "lens"}
     assert (last, set(names[last])) == ("Advanced", advanced)
     lines = _commands.root_help(80).splitlines()
     assert lines.index(f"{first}:") < 6

@@ -39,7 +39,7 @@ def test_second_value_of_an_option_is_refused_by_every_command():
 
 SOURCES = Path(realitygap.__file__).parent
 PRINTED_BY = {
-    "calibration/_prior.py": ("calibrate", "closing-the-gap"),
+    "calibration/_prior.py": ("calibrate",),
     "cli/_calibration_operator.py": ("calibrate",),
     "cli/_demo.py": ("demo",),
     "cli/_observer.py": ("calibrate", "drive", "gap"),
@@ -61,7 +61,7 @@ PRINTED_BY = {
     "orders/_record.py": ("calibrate", "gap", "transfer"),
     "orders/_compare.py": ("compare",),
     "orders/_estimate.py": ("estimate",),
-    "orders/_transfer.py": ("closing-the-gap", "transfer", "try"),
+    "orders/_transfer.py": ("transfer", "try"),
     "platforms/_python.py": (
         "calibrate",
         "drive",
@@ -84,7 +84,6 @@ PRINTED_BY = {
     "study/_calibrate/whole.py": ("calibrate",),
     "study/_camera.py": ("calibrate", "drive", "gap", "track"),
     "study/_close.py": ("close",),
-    "study/_closing/plan.py": ("closing-the-gap",),
     "study/_cluster.py": ("run",),
     "study/_code.py": ("gap", "plan"),
     "study/_compare.py": ("compare",),

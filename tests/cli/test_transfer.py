@@ -110,18 +110,3 @@ def test_wrong_options_are_refused_before_a_trial_is_spent(folder, tmp_path):
         result = run(*others, "--to", "sim", *wrong)
         assert result.exit_code == 2
         assert "expected at most" in result.output
-
-
-@pytest.mark.parametrize(
-    ("command", "text"),
-    [
-        ("run closing-the-gap", "closing-the-gap is a command: realitygap closing-the-gap"),
-        ("closing-the-gap --families warn", "unknown 'warn'. Did you mean 'worn'"),
-        ("closing-the-gap --budgets ten", "expected numbers of trials, such as 0,10,20,40"),
-        ("closing-the-gap --observe all", "unknown 'all'"),
-    ],
-)
-def test_options_of_closing_the_gap_are_checked_before_anything_is_run(command, text, tmp_path):
-    with pytest.raises(StudyError, match=text):
-        run(*command.split(), "--out", tmp_path / "out")
-    assert not (tmp_path / "out").exists()

@@ -28,7 +28,6 @@ COMMANDS = {
     "gap": "gap sim jyro --n-controllers 20 --trials 5 -o gap.sqlite",
     "calibrate": "calibrate path --robot sim -o path.toml",
     "transfer": "transfer sim-paper --to sim:scribbler-s1 --budget 8 --strategy plain --runs 20 -o transfer",
-    "closing": "closing-the-gap --small --out closing",
     "run without saved kernels": "run paper --replicates 200000 --out cold",
 }
 SHORTEST_S, LONGEST_S = 0.3, 9.0

@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 from realitygap.cli import app
 from realitygap.errors import StudyError
 from realitygap.evolution import NeatSettings, Population
-from realitygap.orders import CloseOrder, ClosingOrder, OrderError, PlanOrder, read_order
+from realitygap.orders import CloseOrder, OrderError, PlanOrder, read_order
 from realitygap.study import plan_gap
 from tests.commands import run_command as realitygap
 
@@ -52,4 +52,3 @@ def test_question_and_its_value_are_short_for_a_field_of_that_name():
     assert PlanOrder.by_place("margin", 0.1) == {"margin": 0.1}
     with pytest.raises(OrderError, match="question is 'size', expected one of effect, margin, correlation"):
         PlanOrder.by_place("size", 0.1)
-    assert ClosingOrder.by_place("folder", "thymio") == {"out": "folder", "plan": "thymio"}

@@ -63,7 +63,6 @@ CONFLICTS = {
         {"what": "motion"},
     ],
     "close": [{"budget": 1}, {"target": "jyro", "observe": "cells", "what": "contact"}, {"task": "nothing"}],
-    "closing-the-gap": [{"budgets": "none"}, {"families": "none"}, {"observe": "none"}],
     "gap": [
         {"why": True},
         {"why": True, "noise": 0.1},

@@ -18,7 +18,6 @@ from realitygap.settings import MISSING
 FUNCTIONS = {
     "calibrate": "make_calibration",
     "close": "close_gap",
-    "closing-the-gap": "closing_the_gap",
     "estimate": "estimate_score",
     "compare": "compare_scores",
     "gap": "gap_between",
@@ -29,7 +28,6 @@ FUNCTIONS = {
 SMALLEST = {
     "calibrate": {"what": "path", "robot": "sim", "out": "fit.toml"},
     "close": {"sim": "sim", "target": "twin:worn.toml"},
-    "closing-the-gap": {},
     "estimate": {"sim": "sim", "target": "jyro"},
     "compare": {"table": "scores.csv"},
     "gap": {"sim": "sim", "target": "jyro"},
@@ -49,7 +47,6 @@ WITH = {
         "out": {"out": "there.toml"},
     },
     "close": {},
-    "closing-the-gap": {"budgets": {"budgets": "0,20"}},
     "estimate": {"range": {"range": "0:100"}, "minus": {"of": "A"}},
     "compare": {"range": {"range": "0:100"}},
     "gap": {},
@@ -69,7 +66,6 @@ WITH = {
 ONLY_IN_THE_COMMAND = {
     "calibrate": {"camera", "figure", "allow_code", "as_json"},
     "close": {"allow_code", "as_json", "open_page"},
-    "closing-the-gap": {"as_json", "open_page"},
     "estimate": {"camera", "allow_code", "as_json"},
     "compare": {"report", "full", "as_json"},
     "gap": {"camera", "report", "full", "allow_code", "as_json"},

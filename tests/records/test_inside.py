@@ -22,7 +22,6 @@ from realitygap.records import (
     refuse_links_in,
     write_whole,
 )
-from realitygap.study._closing.plan import SMALL, adopt_plan
 from realitygap.study._transfer.strategies import _adopt
 from realitygap.world import paper_arena
 from tests.formats import FORMATS, transfer_plan
@@ -207,16 +206,6 @@ def test_transfer_folder_refuses_links(tmp_path, elsewhere, name, kind):
     (folder / name).parent.mkdir(parents=True)
     put(kind, folder / name, elsewhere)
     refused(lambda: _adopt(folder, transfer_plan()), elsewhere)
-
-
-@pytest.mark.parametrize(
-    "name", ["plan.json", "summary.json", "report.html", "twins", "units/a.json", "transfers/a"]
-)
-def test_closing_folder_refuses_links(tmp_path, elsewhere, name):
-    folder = tmp_path / "closing"
-    (folder / name).parent.mkdir(parents=True)
-    put("link", folder / name, elsewhere)
-    refused(lambda: adopt_plan(folder, SMALL), elsewhere)
 
 
 @pytest.mark.parametrize("name", ["lab", "lab/line-1.json"])

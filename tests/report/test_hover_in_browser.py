@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import re
-from pathlib import Path
 
 import polars as pl
 import pytest
 
-from realitygap.report import compare_choices, write_closing_page, write_report
+from realitygap.report import compare_choices, write_report
 from realitygap.report._tally import read_tally
 from tests.report.results import describe, random_runs, write_results
 from tests.report.test_in_browser import DESKTOP, PHONE, page_file, show  # noqa: F401
@@ -179,12 +177,3 @@ def test_choices_show_the_median_of_their_row_in_either_form(show, out, size):  
     assert set(shown) == set(medians)
     for name, text in shown.items():
         assert text.startswith(f"{name}: median {medians[name]:.3f} [")
-
-
-def test_each_series_of_closing_the_gap_has_values_in_either_form(show, tmp_path):  # noqa: F811
-    summary = Path(__file__).parents[2] / "docs" / "data" / "closing-thymio" / "summary.json"
-    page = write_closing_page(json.loads(summary.read_text("utf-8")), tmp_path / "page.html")
-    for size in (DESKTOP, PHONE):
-        found = show(size=size, file=page).evaluate(EVERY, size == PHONE)
-        assert len(found) > 30
-        assert all(text and path for _, text, path in found)

@@ -102,7 +102,6 @@ SECTIONS: dict[str, tuple[Command, ...]] = {
         Command("bench", "Measure the speed of this machine.", "_bench", "bench"),
         Command("digest", "Print the hash of a study's results.", "_results", "digest"),
         Command("lens", "Calibrate a camera lens from a checkerboard video.", "_track", "lens"),
-        Command("closing-the-gap", "Measure and shrink the gap to many robots.", "_transfer", "closing"),
     ),
 }
 COMMANDS = tuple(command for commands in SECTIONS.values() for command in commands)

@@ -13,7 +13,6 @@ import realitygap
 from realitygap._how_to_run import launcher
 from realitygap._terminal import echo
 from realitygap.errors import StudyError
-from realitygap.orders import ClosingOrder
 
 from ._code import AllowTasks, code_permission
 from ._options import Json, OpenPage, Replicates, StudyFolder, StudySeed, print_json
@@ -92,9 +91,6 @@ def run(
 
     In Python: realitygap.run_study("paper", replicates=1000)
     """
-    if study == ClosingOrder.command:
-        raise StudyError(f"{study} is a command: realitygap {study}")
-
     if threads is not None and cluster is not None:
         raise StudyError(
             "--threads and --cluster exclude each other. Set the number of threads of a worker when you start "

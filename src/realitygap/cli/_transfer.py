@@ -1,4 +1,4 @@
-"""`realitygap try`, `transfer`, and `closing-the-gap`: controllers of simulation on a target."""
+"""`realitygap try` and `transfer`: controllers of simulation on a target."""
 
 from __future__ import annotations
 
@@ -8,18 +8,17 @@ from typing import TYPE_CHECKING
 import realitygap
 from realitygap._terminal import echo
 from realitygap._wording import number, with_interval
-from realitygap.orders import ClosingOrder, TransferOrder, TryOrder
+from realitygap.orders import TransferOrder, TryOrder
 
 from ._code import AllowPlatforms
 from ._designs import deviations_of, print_deviations
 from ._observer import attending_observer
-from ._options import Json, ShowPage, print_json
+from ._options import Json, print_json
 from ._order import command_of
-from ._progress import TrialsBar, resumable
-from ._results import show_page
+from ._progress import resumable
 
 if TYPE_CHECKING:
-    from realitygap.study import ClosingSummary, TransferResult
+    from realitygap.study import TransferResult
     from realitygap.trials import PortObserver
 
 
@@ -103,39 +102,3 @@ def _print(result: TransferResult) -> None:
         echo("Intervals are over the fresh trials of one champion. To compare strategies, add --replicates.")
     elif len(result.strategies) > 1 and result.advice is not None:
         echo(f"Looks after each replicate: {result.advice.summary}")
-
-
-@command_of(ClosingOrder)
-def closing(order: ClosingOrder, as_json: Json = False, open_page: ShowPage = False) -> None:
-    """Run the study, or what is missing of it, print its goals, and write its page."""
-    with resumable("Finished parts are saved."), TrialsBar("parts", quiet=as_json) as bar:
-        summary = realitygap.study.closing_the_gap(
-            order, tell=lambda progress: bar.show("done", progress.n_done, progress.n_units)
-        )
-    folder = order.folder
-    page = realitygap.report.write_closing_page(summary, folder / "report.html")
-    if as_json:
-        print_json({**summary, "folder": folder, "report": page, "order": order.record()})
-    else:
-        _print_goals(summary)
-        echo(f"Results: {folder}   report: {page}")
-    if open_page:
-        show_page(page)
-
-
-def _print_goals(summary: ClosingSummary) -> None:
-    of, label = len(summary["twins"]), summary["label"]
-    if summary["plan"]["platforms"]:
-        echo(f"{of} sitting{'s' * (of != 1)} ({label}), each with its own held-out controllers")
-    else:
-        echo(
-            f"{of} twins ({label}), of which {summary['n_counted']} differ from the simulator (SIM) by more than three "
-            "standard errors"
-        )
-    echo(f"{'goal':52}{'wanted':>16}{'figure':>9}{'95 % interval':>18}{'n':>9}  verdict")
-    for name, wanted, figure, span, n, verdict in realitygap.report.goal_table(summary).rows:
-        echo(f"{name:52}{wanted:>16}{figure:>9}{span:>18}{n:>9}  {verdict}")
-    for sentence in realitygap.report.not_counted(summary):
-        echo(sentence)
-    if not summary["plan"]["platforms"]:
-        echo(realitygap.report.SELECTION_NOTE)

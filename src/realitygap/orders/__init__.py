@@ -14,7 +14,7 @@ from ._order import Order, OrderError
 from ._plan import PlanOrder, Question
 from ._record import ORDER_FILE, ORDERS, read_order
 from ._shared import ONLY_ROBOTS
-from ._transfer import ClosingOrder, TransferOrder, TryOrder
+from ._transfer import TransferOrder, TryOrder
 
 __all__ = [
     "ONLY_ROBOTS",
@@ -22,7 +22,6 @@ __all__ = [
     "ORDER_FILE",
     "CalibrateOrder",
     "CloseOrder",
-    "ClosingOrder",
     "CompareOrder",
     "EstimateOrder",
     "GapOrder",

@@ -18,14 +18,13 @@ from ._estimate import EstimateOrder
 from ._gap import GapOrder
 from ._order import Order
 from ._plan import PlanOrder
-from ._transfer import ClosingOrder, TransferOrder, TryOrder
+from ._transfer import TransferOrder, TryOrder
 
 ORDERS: dict[str, type[Order]] = {
     model.command: model
     for model in (
         CalibrateOrder,
         CloseOrder,
-        ClosingOrder,
         EstimateOrder,
         CompareOrder,
         GapOrder,

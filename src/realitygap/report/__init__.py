@@ -10,17 +10,6 @@ from realitygap.report._archive_figure import draw_archive
 from realitygap.report._audit import Audit, AuditProgress, audit_notes, audit_results
 from realitygap.report._choices_figure import compare_choices, draw_choices
 from realitygap.report._chosen_run import choose_run
-from realitygap.report._closing import (
-    SELECTION_NOTE,
-    family_table,
-    goal_table,
-    not_counted,
-    strategy_table,
-    twin_table,
-    why_table,
-    write_closing_page,
-)
-from realitygap.report._closing_figures import draw_closing
 from realitygap.report._compare_page import write_compared_scores
 from realitygap.report._comparisons import compare_conditions
 from realitygap.report._distance_audit import DistanceAudit, audit_distance, distance_notes
@@ -50,7 +39,6 @@ from realitygap.report.charts.house import NARROW, Drawing
 
 __all__ = [
     "NARROW",
-    "SELECTION_NOTE",
     "Audit",
     "AuditProgress",
     "DistanceAudit",
@@ -75,7 +63,6 @@ __all__ = [
     "draw_archive",
     "draw_best",
     "draw_choices",
-    "draw_closing",
     "draw_coverage",
     "draw_distance",
     "draw_elites",
@@ -90,11 +77,8 @@ __all__ = [
     "elite_maps",
     "export_frame",
     "export_individual",
-    "family_table",
-    "goal_table",
     "measure_agreement",
     "measure_variety",
-    "not_counted",
     "read_tally",
     "refuse_gap_page",
     "save_arena",
@@ -105,15 +89,11 @@ __all__ = [
     "save_sensor_figure",
     "save_twin",
     "save_view",
-    "strategy_table",
     "summarize",
     "summarize_tasks",
     "touch_network",
-    "twin_table",
     "watch",
-    "why_table",
     "write_closed_gap",
-    "write_closing_page",
     "write_compared_scores",
     "write_gap_report",
     "write_movie",

@@ -12,10 +12,6 @@ from ._calibrate.ordered import make_calibration
 from ._calibrate.whole import calibrate_all
 from ._camera import OWN_POSES, CameraObserver, OwnPosesObserver, marks_of, read_camera, tag_of
 from ._close import ClosedGap, close_gap
-from ._closing.plan import PLANS, ClosingPlan
-from ._closing.rows import CalibratedRow, ClosingSummary, GoalRow, TwinRow
-from ._closing.study import ClosingProgress, closing_the_gap
-from ._closing.summary import summarize_closing
 from ._code import AllowCode, check_files, python_functions, task_named
 from ._compare import ComparedScores, compare_scores
 from ._controllers import sample_controllers
@@ -62,18 +58,13 @@ __all__ = [
     "MAZE_SEEDS",
     "MOST_CONTROLLERS",
     "OWN_POSES",
-    "PLANS",
     "SECTIONS",
     "Advice",
     "Advised",
     "AllowCode",
     "BlindAdvice",
-    "CalibratedRow",
     "CameraObserver",
     "ClosedGap",
-    "ClosingPlan",
-    "ClosingProgress",
-    "ClosingSummary",
     "ComparedScores",
     "ConditionNotes",
     "DesignReport",
@@ -81,7 +72,6 @@ __all__ = [
     "GapBetween",
     "GapPlan",
     "GapStudy",
-    "GoalRow",
     "OwnPosesObserver",
     "Planned",
     "Progress",
@@ -97,7 +87,6 @@ __all__ = [
     "TrialToTrack",
     "TrialsSection",
     "TriedPairs",
-    "TwinRow",
     "advise",
     "advise_ledger",
     "advise_on",
@@ -110,7 +99,6 @@ __all__ = [
     "check_has_robot",
     "choose_condition",
     "close_gap",
-    "closing_the_gap",
     "compare_scores",
     "design_report",
     "drive_study",
@@ -146,7 +134,6 @@ __all__ = [
     "save_calibration",
     "score_tracked",
     "study_template",
-    "summarize_closing",
     "tag_of",
     "task_named",
     "task_settings",

@@ -1,1 +1,0 @@
-"""The study on how far calibration closes the gap to twins."""

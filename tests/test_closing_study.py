@@ -1,27 +1,33 @@
 """The study `closing-the-gap`: its seeds, what it resumes, and its analysis, on results whose truth is known."""
 
-import csv
 import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from benchmarks.closing.analysis import (
-    Results,
-    analyze,
     excess_violation,
-    flagged,
     pooled_fall,
     primary,
     square_gap,
     stratified_mean,
 )
-from benchmarks.closing.figures import draw, read_scores
-from benchmarks.closing.plan import FAMILIES, Arm, Plan, Twin, Unit, small_plan
+from benchmarks.closing.figures import draw
+from benchmarks.closing.plan import (
+    FAMILIES,
+    Arm,
+    Plan,
+    Twin,
+    Unit,
+    small_plan,
+)
+from benchmarks.closing.results import Results, collect, read_collected
+from benchmarks.closing.tables import TABLES, _bootstrap, as_csv, flagged, identified, prediction
 from benchmarks.closing.twin import TwinOfStudy
 
 ARMS = tuple(Arm(name, "none") for name in ("plain", "prior", "cells", "track"))
-FIT = {"name": "drive.gain", "identified": True}
+FIT = {"name": "drive.gain", "estimate": 1.0, "low": 0.9, "high": 1.1, "prior_low": 0.5, "prior_high": 1.5,
+       "identified": True, "unit": ""}  # fmt: skip
 
 
 def plan_of(n=8, **changes):
@@ -61,7 +67,7 @@ def made_up(plan, gap, transfer=0.0, seed=0):
             units[twin, Unit("coverage", arm.name)] = head | {
                 "scores": tried(truth + off),
                 "champions": champions,
-                "calibration": {"misspecified": False, "fitted": [FIT]},
+                "calibration": {"misspecified": False, "misspecification_p": 0.5, "fitted": [FIT]},
             }
     return Results(plan, units)
 
@@ -137,7 +143,7 @@ def test_an_arm_whose_fit_failed_scores_as_plain():
     results = made_up(plan_of(), {"plain": 0.2, "prior": 0.2, "cells": 0.05, "track": 0.02})
     twin = Twin("worn", 7)
     results.units[twin, Unit("coverage", "track")] |= {"failed": "no", "scores": [], "champions": []}
-    (row,) = [row for row in flagged(results) if (row["family"], row["arm"]) == ("worn", "track")]
+    (row,) = [row for row in flagged(results) if (row["family"], row["simulator"]) == ("worn", "track")]
     assert (row["failed"], row["rejected"]) == (1, 0)
     assert square_gap(results, twin, "track", "random") == square_gap(results, twin, "plain", "random")
 
@@ -149,41 +155,73 @@ def test_a_perfect_simulator_has_no_excess_of_rank_violations():
     assert abs(np.mean(excess)) < 0.01
 
 
-def test_results_of_another_plan_are_refused(tmp_path):
-    plan = plan_of(1)
-    (tmp_path / "units").mkdir()
-    for (twin, unit), result in made_up(plan, dict.fromkeys(plan.arm, 0.1)).units.items():
-        (tmp_path / "units" / f"{twin}-{unit}.json").write_text(json.dumps(result))
-    analyze(plan, tmp_path, tmp_path / "out")
-    assert (tmp_path / "out" / "scores.parquet").exists()
-    with (tmp_path / "out" / "identified.csv").open() as file:
-        assert list(csv.DictReader(file)) == [
-            {"parameter": "drive.gain", "identified, cells": "4 of 4", "identified, track": "4 of 4"}
-        ]
-    with pytest.raises(SystemExit, match="another plan"):
-        analyze(replace(plan, digest="changed"), tmp_path, tmp_path / "other")
+def written(results, folder):
+    """Write results as `run` does."""
+    (folder / "units").mkdir()
+    for (twin, unit), result in results.units.items():
+        (folder / "units" / f"{twin}-{unit}.json").write_text(json.dumps(result))
+    return folder
 
 
-def test_the_stored_scores_give_the_same_goals_as_the_results(tmp_path):
+def test_the_bootstrap_is_as_wide_as_the_interval_of_the_mean():
+    """32 twins without noise of replicates; the bootstrap of 8 values lacks a factor of the root of 7 / 8."""
+    rng = np.random.default_rng(4)
+    pairs = [(family, np.array([rng.normal()])) for family in FAMILIES for _ in range(8)]
+    low, high = _bootstrap(pairs, rng)
+    mean = stratified_mean([float(each[0]) for _, each in pairs], [family for family, _ in pairs])
+    ratio = (high - low) / (mean.ends[1] - mean.ends[0])
+    assert 0.8 < ratio < 1.0
+
+
+def test_the_collected_results_are_those_of_the_units(tmp_path):
     """A fit that failed is one of them."""
     results = made_up(plan_of(2), {"plain": 0.2, "prior": 0.2, "cells": 0.05, "track": 0.02})
     failed = Twin("worn", 1), Unit("coverage", "track")
-    results.units[failed] |= {"failed": "No draw: all were lost.", "scores": [], "champions": []}
-    (tmp_path / "units").mkdir()
-    for (twin, unit), result in results.units.items():
-        (tmp_path / "units" / f"{twin}-{unit}.json").write_text(json.dumps(result))
-    analyze(results.plan, tmp_path, tmp_path / "out")
-    stored = read_scores(results.plan, tmp_path / "out")
-    assert primary(stored) == primary(results)
-    assert stored.units[failed]["failed"] == "No draw: all were lost."
+    results.units[failed] |= {
+        "failed": "No draw: all were lost.",
+        "scores": [],
+        "champions": [],
+        "calibration": None,
+    }
+    collect(results.plan, written(results, tmp_path), tmp_path / "out")
+    again = read_collected(results.plan, tmp_path / "out")
+    for name, rows in TABLES.items():
+        if name != "sensitivity":
+            assert as_csv(rows(again)) == as_csv(rows(results)), name
+    assert again.units[failed]["failed"] == "No draw: all were lost."
+    assert identified(again) == [
+        {"parameter": "drive.gain", "identified, cells": "8 of 8", "identified, track": "7 of 7"}
+    ]
+    assert [row["failed fits"] for row in prediction(again)] == ["0", "0", "0", "1"]
     with pytest.raises(SystemExit, match="another plan"):
-        read_scores(replace(results.plan, digest="changed"), tmp_path / "out")
+        read_collected(replace(results.plan, digest="changed"), tmp_path / "out")
+
+
+@pytest.mark.parametrize("fault", ["plan", "code", "infinite", "no judge"])
+def test_results_that_cannot_be_those_of_the_study_are_refused(tmp_path, fault):
+    results = made_up(plan_of(1), dict.fromkeys(("plain", "prior", "cells", "track"), 0.1))
+    unit = results.units[Twin("worn", 0), Unit("coverage", "track")]
+    if fault == "no judge":
+        del results.units[Twin("worn", 0), Unit("coverage", "judged")]
+    elif fault == "infinite":
+        unit["scores"][3][2] = float("nan")
+    else:
+        unit[fault] = "changed"
+    says = {
+        "plan": "another plan",
+        "code": "2 states",
+        "infinite": "not finite",
+        "no judge": "coverage-judged",
+    }
+    with pytest.raises(SystemExit, match=says[fault]):
+        collect(results.plan, written(results, tmp_path), tmp_path / "out")
+    assert not (tmp_path / "out").exists()
 
 
 def test_a_folder_without_results_or_scores_is_refused_with_the_command_that_makes_them(tmp_path):
     with pytest.raises(SystemExit, match="closing run"):
-        analyze(plan_of(1), tmp_path, tmp_path / "out")
-    with pytest.raises(SystemExit, match="closing analyze"):
+        collect(plan_of(1), tmp_path, tmp_path / "out")
+    with pytest.raises(SystemExit, match="closing collect"):
         draw(plan_of(1), tmp_path, tmp_path / "figures")
     assert not list(tmp_path.iterdir())
 
@@ -192,8 +230,7 @@ def test_each_figure_shows_all_arms_that_it_is_about(tmp_path):
     arms = tuple(Arm(name, "none") for name in ("plain", "prior", "cells", "track-10", "track", "track-40"))
     plan = plan_of(2, arms=arms)
     results = made_up(plan, {arm.name: 0.1 for arm in arms})
-    results.table().write_parquet(tmp_path / "scores.parquet")
-    (tmp_path / "facts.json").write_text(json.dumps({"plan": plan.digest, "failed": []}))
+    collect(plan, written(results, tmp_path), tmp_path)
     draw(plan, tmp_path, tmp_path / "figures")
     shown = {path.stem: path.read_text() for path in (tmp_path / "figures").iterdir()}
     assert shown.keys() == {"scatter", "falls", "evolved", "budget"}

@@ -1,4 +1,4 @@
-"""The commands of the study: run, fit, analyze, and draw."""
+"""The commands of the study: run, fit, collect, analyze, and draw."""
 
 from __future__ import annotations
 
@@ -10,10 +10,11 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
 
 from . import __doc__ as usage
-from .analysis import analyze
 from .figures import draw
 from .outside import METHODS, fit_outside
 from .plan import read_plan, small_plan
+from .results import collect
+from .tables import analyze
 from .twin import TwinOfStudy
 
 
@@ -28,8 +29,9 @@ def main() -> None:
     for name, summary in (
         ("run", "compute all units that are missing"),
         ("fit", "fit outside calibrators to the trials of all driven twins"),
-        ("analyze", "write the scores, and the tables of the page"),
-        ("draw", "draw the figures of the page from the folder of the scores"),
+        ("collect", "write the results of all units as two tables"),
+        ("analyze", "write the tables of the page into the folder of the collected results"),
+        ("draw", "draw the figures of the page from the folder of the collected results"),
     ):
         command = commands.add_parser(name, help=summary)
         command.add_argument("folder", type=Path)
@@ -37,16 +39,19 @@ def main() -> None:
         command.add_argument("--processes", type=int, default=multiprocessing.cpu_count())
         if name == "fit":
             command.add_argument("method", choices=sorted(METHODS))
-        if name in ("analyze", "draw"):
+        if name in ("collect", "draw"):
             command.add_argument("--out", type=Path, required=True, help="folder of what is written")
     options = parser.parse_args()
     plan = small_plan() if options.small else read_plan()
+    if options.command == "collect":
+        collect(plan, options.folder, options.out)
+        return
     if options.command == "analyze":
-        if not options.small and importlib.util.find_spec("statsmodels") is None:
+        if importlib.util.find_spec("statsmodels") is None:
             raise SystemExit(
                 "The mixed model needs statsmodels: uv run --with statsmodels,pandas python -m ..."
             )
-        analyze(plan, options.folder, options.out)
+        analyze(plan, options.folder)
         return
     if options.command == "draw":
         draw(plan, options.folder, options.out)

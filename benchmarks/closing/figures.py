@@ -1,17 +1,15 @@
-"""The figures of the study, from the stored scores.
+"""The figures of the study, from the collected results.
 
 Marks differ in lightness, in size, or in shape, because the page is also printed in black and white.
 """
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-import polars as pl
 
 from realitygap.drawing import Ink
 from realitygap.records import write_whole
@@ -21,8 +19,9 @@ from realitygap.report.charts.rows import name_rows
 from realitygap.report.charts.scatter import draw_equality
 from realitygap.report.charts.sheet import Sheet, grid
 
-from .analysis import Results, Scores, evolved, fall_of, optimism, over_twins, square_gap
-from .plan import FAMILIES, Plan, Twin, Unit
+from .analysis import evolved, fall_of, optimism, over_twins, square_gap
+from .plan import FAMILIES, Plan
+from .results import Results, Scores, read_collected
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -39,69 +38,15 @@ BUDGETS = {0: "plain", 10: "track-10", 20: "track", 40: "track-40"}
 FAMILY_MARKERS = dict(zip(FAMILIES, "osD^", strict=True))
 
 
-def read_scores(plan: Plan, folder: Path) -> Results:
-    """Return the results that the files of `analyze` have, without calibrations.
-
-    Args:
-        plan: Plan of the study.
-        folder: Folder with `scores.parquet` and `facts.json`.
-
-    Raises:
-        SystemExit: They are missing, or of another plan.
-    """
-    scores, facts_file = folder / "scores.parquet", folder / "facts.json"
-    for path in (scores, facts_file):
-        if not path.exists():
-            raise SystemExit(
-                f"{path} does not exist. Write it: python -m benchmarks.closing analyze RESULTS --out {folder}"
-            )
-    facts = json.loads(facts_file.read_text())
-    if facts.get("plan") != plan.digest:
-        raise SystemExit(f"{folder} has the scores of another plan. Nothing was drawn.")
-    names = {str(twin): twin for twin in plan.names()}
-    units: dict[tuple[Twin, Unit], dict[str, Any]] = {}
-    table = pl.read_parquet(scores)
-    for (twin, task, arm), rows in table.partition_by("twin", "task", "arm", as_dict=True).items():
-        unit = Unit(task, "judged" if arm == "target" else arm)
-        units[names[twin], unit] = _judged(rows) if arm == "target" else _of_arm(rows)
-    for text in facts["failed"]:
-        what, _, message = text.partition(": ")
-        twin, _, unit = what.partition(" ")
-        task, _, arm = unit.partition("-")
-        units[names[twin], Unit(task, arm)] = {"failed": message, "scores": [], "champions": []}
-    return Results(plan, units)
-
-
-def _judged(rows: pl.DataFrame) -> dict[str, Any]:
-    kinds = rows.unique("controller").sort("controller")["kind"].to_list()
-    return {"kinds": kinds, "scores": [_matrix(rows.filter(pl.col("batch") == k)) for k in (1, 2)]}
-
-
-def _of_arm(rows: pl.DataFrame) -> dict[str, Any]:
-    sides = [rows.filter(pl.col("kind") == f"evolved, {side}") for side in ("simulated", "target")]
-    champions = [
-        {"simulated": simulated, "target": driven}
-        for simulated, driven in zip(*map(_matrix, sides), strict=True)
-    ]
-    held_out = rows.filter(~pl.col("kind").str.starts_with("evolved"))
-    return {"scores": _matrix(held_out), "champions": champions, "calibration": None}
-
-
-def _matrix(rows: pl.DataFrame) -> list[list[float]]:
-    """Return the scores of each controller, in the order of their numbers."""
-    ordered = rows.sort("controller", "trial").group_by("controller", maintain_order=True)
-    return ordered.agg("score")["score"].to_list()
-
-
 def draw(plan: Plan, folder: Path, out: Path) -> None:
     """Write all figures as SVG files.
 
     Args:
         plan: Plan of the study.
-        folder: Folder of the stored scores.
+        folder: Folder of the collected results.
         out: Folder of the figures.
     """
-    results = read_scores(plan, folder)
+    results = read_collected(plan, folder)
     out.mkdir(parents=True, exist_ok=True)
     for name, drawing in drawings(results).items():
         write_whole(out / f"{name}.svg", (drawing.svg + "\n").encode(), within=out)
@@ -178,7 +123,7 @@ def falls(results: Results) -> Drawing:
     def drawn(width: float) -> Sheet:
         sheet, panels = grid(width, 2, 2 if width > NARROW + 1 else 1, 0.22 * len(arms), gap=0.3)
         for axes, (kind, title) in zip(panels, KINDS.items(), strict=True):
-            axes.set_xlim(max(-100.0, lowest), 100)
+            axes.set_xlim(1.05 * lowest, 100)
             is_named = axes is panels[0] or not sheet.is_wide
             name_rows(axes, arms if is_named else [""] * len(arms))
             draw_line(axes, [0, 0], [-0.5, len(arms) - 0.5], color=Ink.MUTED, linewidth=0.8)
@@ -255,7 +200,7 @@ def by_budget(results: Results) -> Drawing:
                     draw_line(axes, xs, ys, color=Ink.OURS, linewidth=1.1, marker=marker, markersize=4.5)
             axes.set_xlabel("trials for calibrating, track", labelpad=2)
             head(axes, title)
-        panels[0].set_ylabel("RMS gap, TWIN minus SIM", labelpad=3)
+        panels[0].set_ylabel("RMS gap, SIM against TWIN", labelpad=3)
         keys = [line_key(name, color=Ink.OURS, marker=mark) for name, mark in FAMILY_MARKERS.items()]
         sheet.key(keys, place="upper right")
         return sheet
@@ -266,7 +211,7 @@ def by_budget(results: Results) -> Drawing:
 
 
 def _gaps_of(results: Results, family: str, kind: str) -> Mapping[int, float]:
-    """Return the RMS gap, pooled over the twins of a family, by budget."""
+    """Return the RMS gap, pooled over the twins of a family, by budget; 0 for a negative mean square."""
     found = {}
     for budget, arm in BUDGETS.items():
         squares = [square_gap(results, twin, arm, kind) for twin in results.twins((family,))]

@@ -131,6 +131,11 @@ def read_plan(path: Path = PLAN_FILE) -> Plan:
     )
     if committed.stdout != content:
         raise SystemExit(f"Commit {commit!r} of {COMMIT_FILE} does not have this plan. Nothing was run.")
+    return parse_plan(content, commit)
+
+
+def parse_plan(content: bytes, commit: str) -> Plan:
+    """Return the plan in a file that a commit fixed."""
     values = tomllib.loads(content.decode())
     return Plan(
         digest=hashlib.sha256(content).hexdigest(),

@@ -19,7 +19,7 @@ from realitygap.calibration import numbers_of, scribbler_prior
 from realitygap.errors import StudyError
 from realitygap.evolution import Genome
 from realitygap.platforms import TwinTarget
-from realitygap.records import Observe, TrialRecord, read_object, write_whole
+from realitygap.records import Observe, TrialRecord, write_whole
 from realitygap.robots.twin import sample_twin
 from realitygap.runs import Condition, named, population_of
 from realitygap.study import choose_condition
@@ -290,8 +290,3 @@ class TwinOfStudy:
 def _first(task: str, number: int) -> int:
     """Return the number of the first trial of a task."""
     return number + TASKS.index(task) * TASK_STRIDE
-
-
-def read_unit(path: Path) -> dict[str, Any]:
-    """Return the result of a unit."""
-    return read_object(path)

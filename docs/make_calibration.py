@@ -2,8 +2,8 @@
 
     uv run python docs/make_calibration.py
 
-Takes docs/data/calibration.jsonl, to which benchmarks/calibration.py adds lines, and docs/data/closing/summary.json,
-and writes tables into the pages and each parameter into docs/data/calibration.csv and docs/data/calibration-kinds.csv.
+Takes docs/data/calibration.jsonl, to which benchmarks/calibration.py adds lines, and writes
+tables into the pages and each parameter into docs/data/calibration.csv and docs/data/calibration-kinds.csv.
 Measuring takes an hour, by hand:
 
     data="--out docs/data/calibration.jsonl"
@@ -40,7 +40,6 @@ EACH = DOCS / "data" / "calibration.csv"
 EACH_OF_KINDS = DOCS / "data" / "calibration-kinds.csv"
 CHECKED = DOCS / "data" / "misspecification.jsonl"
 EACH_CHECKED = DOCS / "data" / "misspecification.csv"
-CLOSING = DOCS / "data" / "closing" / "summary.json"
 BLOCK = re.compile(r"(<!-- (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
 GOAL = 0.9
 """The share of robots whose interval must hold a parameter."""
@@ -163,23 +162,16 @@ def kinds(rows: Sequence[Row]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def flagged(rows: Sequence[Row], closing: Row) -> str:
+def flagged(rows: Sequence[Row]) -> str:
     """Who is flagged as what `sim` cannot make, and what gaps are found where there are none."""
     alien = [row["misspecified"] for row in rows if row["what"] == "flags" and row["family"] == "alien"]
     drawn = [row["misspecified"] for row in rows if row["what"] == "sim" and row["observe"] == "track"]
-    others = [
-        bool(one["misspecified"])
-        for twin in closing["twins"]
-        for one in twin["calibrated"]
-        if (one["observe"], one["budget"]) == ("track", closing["budget"])
-    ]
     same = [row["excludes_no_gap"] for row in rows if row["what"] == "same"]
     return "\n".join(
         [
             "| robots | result | number |",
             "|---|---|---|",
             f"| twins `alien` | flagged | {sum(alien)} of {len(alien)} |",
-            f"| twins of [closing the gap](closing-the-gap.md) | flagged | {sum(others)} of {len(others)} |",
             f"| robots of `sim` | flagged | {sum(drawn)} of {len(drawn)} |",
             f"| twins `same` | interval of the RMS gap to `sim` excludes 0 | {sum(same)} of {len(same)} |",
             "",
@@ -285,13 +277,12 @@ def checks() -> list[Row]:
 def rewrite(text: str) -> str:
     """A page with the tables of what was measured."""
     rows = measured()
-    closing = json.loads(CLOSING.read_text("utf-8"))
     blocks = {
         "intervals": intervals(rows),
         "below": below(by_observation(rows), "observed"),
         "kinds": kinds(rows),
         "below_kinds": below(by_kind(rows), "`calibrate`"),
-        "flagged": flagged(rows, closing),
+        "flagged": flagged(rows),
         "checked": checked(checks()),
     }
     return BLOCK.sub(lambda found: found[1] + blocks[found[2]] + found[3], text)

@@ -1,8 +1,8 @@
-"""The figures of the study: the gap by budget, before and after calibrating, and the order of controllers."""
+"""The figures of the study: the gap by budget, and before and after calibrating."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,29 +10,23 @@ import numpy as np
 from realitygap.drawing import Ink
 from realitygap.report.charts.house import NARROW, Drawing, draw_wide
 from realitygap.report.charts.lines import draw_dots, draw_line, head, line_key
-from realitygap.report.charts.rows import Row as RowOfMarks
-from realitygap.report.charts.rows import draw_row, name_rows, stacked
 from realitygap.report.charts.scatter import draw_equality
 from realitygap.report.charts.sheet import Sheet, grid
 
-from .summary import LEAST_SRCC, Row, after_of
+from .summary import Row, after_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 COLORS = {"none": Ink.RUN, "encoders": Ink.PEN2, "track": Ink.OURS}
 MARKERS = {"encoders": "s", "track": "D"}
-MEASURES = {
-    "srcc_disattenuated": ("Disattenuated SRCC", f"goal: at least {LEAST_SRCC:g}"),
-    "mmrv_ratio": ("MMRV over its floor", ""),
-}
 GAP = 0.3
 """Space between panels [in]."""
 
 
 def drawings(summary: Row) -> dict[str, Drawing]:
     """Return the figures by name."""
-    return {"budget": _budget(summary), "scatter": _scatter(summary), "order": _order(summary)}
+    return {"budget": _budget(summary), "scatter": _scatter(summary)}
 
 
 def _number(n: int) -> str:
@@ -63,7 +57,7 @@ def _budget(summary: Row) -> Drawing:
                 _budget_lines(axes, summary, own[family], observe)
             axes.set_xlabel("trials for calibrating", labelpad=2)
             head(axes, family, _number(len(own[family])), stacked=True)
-        panels[0].set_ylabel(f"RMS gap, {summary['label']} minus SIM", labelpad=3)
+        panels[0].set_ylabel(f"RMS gap, SIM against {summary['label']}", labelpad=3)
         keys = [line_key(each, color=COLORS[each], linewidth=1.2) for each in summary["plan"]["observations"]]
         sheet.key(keys, place="upper right")
         return sheet
@@ -124,44 +118,6 @@ def _scatter(summary: Row) -> Drawing:
 
     return _figure(
         drawn, "scatter", "Coverage in simulation against that on the robot, before and after calibrating."
-    )
-
-
-def _order(summary: Row) -> Drawing:
-    """SRCC and MMRV of each sitting, before and after calibrating."""
-    groups = _groups(summary)
-    values: Mapping[str, list[tuple[str, Any]]] = {
-        measure: [
-            (observe, np.array([v for row in rows if (v := row["gap"][measure]) is not None]))
-            for observe, rows in groups.values()
-        ]
-        for measure in MEASURES
-    }
-
-    def drawn(width: float) -> Sheet:
-        sheet, panels = grid(width, 2, 2 if width > NARROW + 1 else 1, 0.32 * len(groups), gap=GAP)
-        for axes, (measure, (title, note)) in zip(panels, MEASURES.items(), strict=True):
-            ends = np.concatenate([[0.0, 1.0], *(found for _, found in values[measure])])
-            low, high = float(ends.min()), 1.05 * float(ends.max())
-            axes.set_xlim(low, high)
-            name_rows(
-                axes,
-                list(groups) if axes is panels[0] or not sheet.is_wide else [""] * len(groups),
-                grid=False,
-            )
-            if note:
-                draw_line(axes, [LEAST_SRCC] * 2, [-0.5, len(groups)], color=Ink.PUBLISHED, linewidth=1.0)
-            for place, (observe, found) in enumerate(values[measure]):
-                if len(found):
-                    color = COLORS[observe]
-                    draw_row(axes, place, RowOfMarks(None, None, found, stacked(found, high), color, color))
-                    middle = float(np.median(found))
-                    draw_line(axes, [middle] * 2, [place - 0.3, place + 0.3], color=color, linewidth=2.4)
-            head(axes, title, note, stacked=True)
-        return sheet
-
-    return _figure(
-        drawn, "order", "Disattenuated SRCC, and MMRV over its floor, before and after calibrating."
     )
 
 

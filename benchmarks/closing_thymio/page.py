@@ -74,7 +74,7 @@ def _csv(rows: Texts) -> str:
 
 def goals(summary: Row) -> Texts:
     """Yield a table with a row for each goal; a goal that the interval does not decide is open."""
-    yield "goal", "wanted", "figure", "95 % interval", "twins", "verdict"
+    yield "goal", "wanted", "figure", "95 % interval", "sittings", "verdict"
     for goal in summary["goals"]:
         form = partial(number, digits=2) if "SRCC" in goal["name"] else _percent
         verdict = VERDICTS[goal["met"]] if goal["n"] else NOTHING
@@ -84,18 +84,15 @@ def goals(summary: Row) -> Texts:
 
 def budgets(summary: Row) -> Texts:
     """Yield a table of the RMS gap by robot, observation level, and budget."""
-    yield "family", "observed", "trials", "twins", "RMS gap", "95 % interval", "twins that count", "fall"
+    yield "robot", "observed", "trials", "sittings", "RMS gap", "95 % interval"
     for row in summary["families"]:
-        is_before = row["observe"] == "none"
         yield (
             row["family"],
-            NOTHING if is_before else row["observe"],
+            NOTHING if row["observe"] == "none" else row["observe"],
             str(row["budget"]),
             str(row["n"]),
             number(row["rms"]["estimate"]),
             _span(row["rms"], number),
-            str(row["n_counted"]),
-            NOTHING if is_before else _percent(row["fall"]["estimate"]),
         )
 
 
@@ -110,7 +107,7 @@ def _calibrated(summary: Row) -> Iterable[tuple[Row, Row]]:
 def sittings(summary: Row) -> Texts:
     """Yield a table of each sitting and calibration at the budget of the goals."""
     yield (
-        *("sitting", "RMS gap as it is", "observed", "recommended", "RMS gap calibrated", "fall", "p"),
+        *("sitting", "RMS gap before", "observed", "recommended", "RMS gap calibrated", "fall", "p"),
         "at an end of the prior",
     )
     for sitting, after in _calibrated(summary):
@@ -178,7 +175,7 @@ def words(summary: Row) -> str:
         rare = sum((after["misspecification_p"] or 0) < 0.05 for after in found)
         parts.append(
             f"The posterior predictive check flags {flagged} of {len(found)} calibrations by {summary['budget']} "
-            f"trials with `{observe}`. Its p is below 0.05 for {rare} of them; their misfit is too small to be flagged."
+            f"trials with `{observe}`. Its p is below 0.05 for {rare} of them."
         )
     return "\n\n".join(parts) + "\n"
 

@@ -19,10 +19,6 @@ from .plan import Plan, Sitting, read_plan
 from .sitting import SittingOfStudy
 
 Row = dict[str, Any]
-STANDARD_ERRORS = 3.0
-"""A sitting counts for the fall of a family if its gap before calibrating exceeds this many standard errors."""
-
-NORMAL_95 = 1.959963984540054
 FALLS = {"track": 0.6, "encoders": 0.4}
 """Goals: least fall of the pooled RMS gap, by what calibrating sees."""
 
@@ -40,7 +36,7 @@ def summarize(folder: Path) -> Row:
     units = {sitting: _read_units(folder, plan, sitting) for sitting in plan.sittings}
     sittings = [_sitting(sitting, found) for sitting, found in units.items() if "gap-none-0" in found]
     return {
-        "study": "closing-the-gap",
+        "study": "closing_thymio",
         "software": __version__,
         "plan": plan.to_dict(),
         "label": next((found["judged"]["label"] for found in units.values() if "judged" in found), ""),
@@ -62,14 +58,10 @@ def _sitting(sitting: Sitting, units: dict[str, Row]) -> Row:
     """Return the results of a sitting: its gap before calibrating, and after each calibration."""
     before = units["gap-none-0"]
     rms = before["gap"]["rms"]
-    has_interval = rms["low"] is not None and rms["high"] is not None
-    error = (rms["high"] - rms["low"]) / (2 * NORMAL_95) if has_interval else None
     return {
         "twin": str(sitting),
         "family": sitting.family,
         "rms": rms,
-        "standard_error": error,
-        "counts": bool(rms["estimate"] is not None and error and rms["estimate"] > STANDARD_ERRORS * error),
         "gap": _measures(before),
         "means": before["means"],
         "parts": before["parts"],
@@ -109,28 +101,20 @@ def _measures(unit: Row) -> Row:
 
 
 def _families(plan: Plan, sittings: Sequence[Row]) -> Iterable[Row]:
-    """Yield the median RMS gap of a robot, and its median fall over the sittings that count, by calibration."""
+    """Yield the median RMS gap of each robot, before and by calibration."""
     for family in plan.families:
         own = [each for each in sittings if each["family"] == family]
-        yield _family(family, "none", 0, [(each, each["rms"], 0.0) for each in own])
+        yield _family(family, "none", 0, [each["rms"] for each in own])
         for observe in plan.observations:
             for budget in filter(None, plan.budgets):
-                pairs = [(each, after) for each in own if (after := after_of(each, observe, budget))]
-                yield _family(family, observe, budget, [(each, a["rms"], a["fall"]) for each, a in pairs])
+                found = [after["rms"] for each in own if (after := after_of(each, observe, budget))]
+                yield _family(family, observe, budget, found)
 
 
-def _family(family: str, observe: str, budget: int, found: Sequence[tuple[Row, Row, float | None]]) -> Row:
-    values = [rms["estimate"] for _, rms, _ in found if rms["estimate"] is not None]
-    falls = [fall for each, _, fall in found if each["counts"] and fall is not None]
-    return {
-        "family": family,
-        "observe": observe,
-        "budget": budget,
-        "n": len(values),
-        "rms": _row(median_interval(values)),
-        "n_counted": len(falls),
-        "fall": _row(median_interval(falls)),
-    }
+def _family(family: str, observe: str, budget: int, found: Sequence[Row]) -> Row:
+    values = [rms["estimate"] for rms in found if rms["estimate"] is not None]
+    rms = _row(median_interval(values))
+    return {"family": family, "observe": observe, "budget": budget, "n": len(values), "rms": rms}
 
 
 def after_of(sitting: Row, observe: str, budget: int) -> Row | None:

@@ -62,6 +62,9 @@ def main() -> None:
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--studies", type=int, default=4000)
     options = parser.parse_args()
+    if options.studies < 1:
+        parser.error(f"--studies is {options.studies}, expected at least 1")
+    options.out.mkdir(parents=True, exist_ok=True)
     n = options.studies
     rows = [
         ("mean", "all families spread alike", of_means(1, n)),

@@ -16,6 +16,7 @@ import argparse
 import csv
 import math
 import multiprocessing
+import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
@@ -310,6 +311,7 @@ def coverage(studies: int) -> Iterator[list[str]]:
         "controllers", "trials in simulation", "on the target", "level", "spread", "differences", "measure", "truth",
         "refused [%]", "holds the truth [%]", "upper end misses [%]", "lower end misses [%]",
     ]  # fmt: skip
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # threads of several processes wait for each other
     with ProcessPoolExecutor(mp_context=multiprocessing.get_context("spawn")) as pool:
         for rows in pool.map(coverage_of, range(len(COVERED)), [studies] * len(COVERED)):
             yield from rows

@@ -79,11 +79,11 @@ def _shared_out(matrix: Values, is_in_source: NDArray[np.bool_]) -> Values:
     in_source = is_in_source.astype(float)
     r = float(in_source[0].sum())
     q = in_source.shape[1] - r
-    in_target = 1 - in_source
-    to_source = in_source @ matrix
-    within_source = (to_source * in_source).sum(axis=1) / (r * (r - 1))
-    across = (to_source * in_target).sum(axis=1) / (r * q)
-    within_target = (in_target @ matrix * in_target).sum(axis=1) / (q * (q - 1))
+    to_all = in_source @ matrix.sum(axis=0)
+    within = np.einsum("pt,pt->p", in_source @ matrix, in_source)
+    within_source = within / (r * (r - 1))
+    across = (to_all - within) / (r * q)
+    within_target = (matrix.sum() - 2 * to_all + within) / (q * (q - 1))
     return np.asarray(2 * across - within_source - within_target)
 
 

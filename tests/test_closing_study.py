@@ -136,7 +136,14 @@ def test_a_calibration_that_leaves_no_gap_meets_its_goals():
 def test_there_is_no_verdict_before_all_units_exist():
     results = made_up(plan_of(), {"plain": 0.2, "prior": 0.2, "cells": 0.05, "track": 0.02}, transfer=0.1)
     del results.units[Twin("worn", 7), Unit("coverage", "track")]
-    assert {row["verdict"] for row in primary(results)} == {"none: 1 units are missing"}
+    assert {row["verdict"] for row in primary(results)} == {"none: 1 unit missing"}
+
+
+def test_npe_is_of_the_twins_with_an_even_index():
+    plan = replace(small_plan(), twins=dict.fromkeys(FAMILIES, 3))
+    with_npe = [twin.index for twin in plan.names() if Unit("coverage", "npe") in plan.units(twin)]
+    assert sorted(with_npe) == [0] * 4 + [2] * 4
+    assert all(Unit("coverage", "cma-es") in plan.units(twin) for twin in plan.names())
 
 
 def test_an_arm_whose_fit_failed_scores_as_plain():

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import scipy
 
+from realitygap._wording import counted
 from realitygap.gap import mean_maximum_rank_violation
 from realitygap.stats import Estimate, holm
 
@@ -178,7 +179,7 @@ def primary(results: Results) -> list[dict[str, Any]]:
         decided = p < goals["alpha"]
         row["verdict"] = "met" if is_above and decided else "missed" if is_below and decided else "open"
         if missing := results.missing("coverage"):
-            row["verdict"] = f"none: {len(missing)} units are missing"
+            row["verdict"] = f"none: {counted(len(missing), 'unit')} missing"
     return rows
 
 

@@ -26,7 +26,7 @@ from realitygap.platforms import SimEnsemble, SimPlatform
 from realitygap.records import write_whole
 
 from .outside import MOST_SETS, write_outside
-from .plan import read_plan, small_plan
+from .plan import Unit, read_plan, small_plan
 from .twin import TwinOfStudy
 
 Floats = NDArray[np.float64]
@@ -109,7 +109,7 @@ def fit(twin: TwinOfStudy, sets: int) -> None:
 
 
 def main() -> None:
-    """Fit all twins of a folder whose trials are there."""
+    """Fit the twins of a folder whose trials are there."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -119,6 +119,8 @@ def main() -> None:
     plan = small_plan() if options.small else read_plan()
     for twin in plan.names():
         one = TwinOfStudy(plan, twin, options.folder)
+        if Unit("coverage", ARM) not in plan.units(twin):
+            continue
         if one.trials_path(plan.budget).exists() and not one.fit_path(plan.arm[ARM]).exists():
             try:
                 fit(one, MOST_SETS if not options.small else 1000)

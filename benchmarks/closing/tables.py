@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from realitygap._wording import counted
 from realitygap.records import write_whole
 from realitygap.stats import Estimate
 
@@ -343,7 +344,7 @@ def analyze(plan: Plan, folder: Path) -> None:
     results = read_collected(plan, folder)
     for task in ("coverage", *plan.tasks["names"]):
         if missing := results.missing(task, tuple(plan.twins)):
-            print(f"{len(missing)} units of the task {task} are missing, such as {missing[0]}.")
+            print(f"Missing: {counted(len(missing), 'unit')} of the task {task}, such as {missing[0]}.")
     for name, rows in TABLES.items():
         text = as_csv(rows(results))
         write_whole(folder / f"{name}.csv", text.encode(), within=folder)

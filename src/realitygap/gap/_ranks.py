@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import partial
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -267,14 +268,15 @@ def rank_violation_interval(
 def _jackknifed(source: Values, target: Values, ties: Ties, confidence: float) -> tuple[float, float]:
     """Return the interval of the mean violation of s pairs of orders of the same controllers, each (s, c)."""
     size = max(1, _BLOCK // target.shape[1] ** 2)
-    parts = [
-        _violations(source[first : first + size], target[first : first + size], ties)
-        for first in range(0, len(target), size)
-    ]
-    value = float(np.concatenate([part.max(axis=2).mean(axis=1) for part in parts]).mean())
+    parts = []
+    for first in range(0, len(target), size):
+        violations = _violations(source[first : first + size], target[first : first + size], ties)
+        parts.append((violations.max(axis=2).mean(axis=1), _left_out(violations)))
+    means, left = (np.concatenate(part) for part in zip(*parts, strict=True))
+    value = float(means.mean())
     if value == 0:
         raise ValueError("The rank violation is 0, expected one above 0.")
-    error = _jackknife_error(np.concatenate([_left_out(part) for part in parts]).mean(axis=0))
+    error = _jackknife_error(left.mean(axis=0))
     factor = math.exp(float(scipy.special.stdtrit(target.shape[1] - 1, (1 + confidence) / 2)) * error / value)
     return value / factor, min(value * factor, float(np.ptp(target, axis=1).max()))
 
@@ -290,9 +292,8 @@ def _left_out(violations: Values) -> Values:
     s, c, _ = violations.shape
     worst = violations.argmax(axis=2) + c * np.arange(s)[:, None]
     second, first = np.moveaxis(np.partition(violations, c - 2, axis=2)[:, :, c - 2 :], 2, 0)
-    less = np.bincount(
-        worst.ravel(), weights=(first - second).ravel(), minlength=s * c
-    )  # the worst partner left out
+    # where the worst partner is left out
+    less = np.bincount(worst.ravel(), weights=(first - second).ravel(), minlength=s * c)
     return np.asarray((first.sum(axis=1, keepdims=True) - first - less.reshape(s, c)) / (c - 1))
 
 
@@ -305,7 +306,7 @@ def rank_violation_floor(target: Values, rng: Rng, splits: int = SPLITS, ties: T
         splits: Number of random splits, of which the mean is taken.
         ties: Counting of pairs that tie in one half only.
     """
-    return _over_splits(lambda one, other: mean_maximum_rank_violation(one, other, ties), target, rng, splits)
+    return _over_splits(partial(mean_maximum_rank_violation, ties=ties), target, rng, splits)
 
 
 def floor_interval(

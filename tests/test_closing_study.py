@@ -225,6 +225,15 @@ def test_results_that_cannot_be_those_of_the_study_are_refused(tmp_path, fault):
     assert not (tmp_path / "out").exists()
 
 
+def test_damaged_facts_are_refused_with_the_command_that_writes_them(tmp_path):
+    plan = plan_of(1)
+    for name in ("scores.parquet", "fits.parquet"):
+        (tmp_path / name).touch()
+    (tmp_path / "facts.json").write_text("{")
+    with pytest.raises(SystemExit, match="closing collect"):
+        read_collected(plan, tmp_path)
+
+
 def test_a_folder_without_results_or_scores_is_refused_with_the_command_that_makes_them(tmp_path):
     with pytest.raises(SystemExit, match="closing run"):
         collect(plan_of(1), tmp_path, tmp_path / "out")

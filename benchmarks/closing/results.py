@@ -187,7 +187,13 @@ def read_collected(plan: Plan, folder: Path) -> Results:
             raise SystemExit(
                 f"{folder / name} does not exist. Write it: python -m benchmarks.closing collect RESULTS --out {folder}"
             )
-    facts = json.loads((folder / "facts.json").read_text())
+    try:
+        facts = json.loads((folder / "facts.json").read_text())
+    except ValueError as error:
+        raise SystemExit(
+            f"{folder / 'facts.json'} is damaged ({error}). Write it again: "
+            f"python -m benchmarks.closing collect RESULTS --out {folder}"
+        ) from None
     if facts.get("plan") != plan.digest:
         raise SystemExit(f"{folder} has the scores of another plan. Nothing was written.")
     names = {str(twin): twin for twin in plan.names()}

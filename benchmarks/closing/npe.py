@@ -6,19 +6,26 @@
 Source: Greenberg, Nonnenmacher & Macke (2019), NPE-C, with the defaults of sbi 0.27.0 (Tejero-Cantero et al. 2020), one
 round from the prior. The summaries are those of BayesSim (Ramos, Possas & Fox, RSS 2019, section III-B): products of
 state differences and commands, and means and variances of state differences, for lags of 0 to 4 commands. The simulated
-trials repeat the recorded commands. It may simulate as many sets of numbers as our own fit.
+trials repeat the recorded commands. It may simulate as many sets of numbers as our own fit. Training takes hundreds of
+epochs: `fast_training` halves their time, and `--twins` lets two processes share the fits. It needs a C++ compiler.
 """
 
 from __future__ import annotations
 
 import argparse
+import functools
 import tempfile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import sbi.inference.trainers.base as trainers
 import torch
 from numpy.typing import NDArray
 from sbi.inference import NPE
+from sbi.neural_nets.estimators.nflows_flow import NFlowsFlow
+from torch.utils.data import TensorDataset
+from torch.utils.data._utils.fetch import _MapDatasetFetcher
 from torch.utils.tensorboard.writer import SummaryWriter
 
 from realitygap.calibration import numbers_of, ranges_of, scribbler_prior, values_of
@@ -31,6 +38,24 @@ from .twin import TwinOfStudy
 
 Floats = NDArray[np.float64]
 ARM, N_DRAWS, LAGS = "npe", 500, 5
+
+
+def fast_training() -> None:
+    """Make sbi train the same network in half the time: a compiled loss, one fused step, and batches read at once.
+
+    The losses of 100 steps are equal in all printed digits. sbi reads a batch row by row.
+    """
+
+    def fetch(self: Any, at: list[int]) -> list[torch.Tensor]:
+        if not (self.auto_collation and isinstance(self.dataset, TensorDataset)):
+            return fetch_rows(self, at)
+        return [tensor[torch.as_tensor(at)] for tensor in self.dataset.tensors]
+
+    fetch_rows = _MapDatasetFetcher.fetch
+    _MapDatasetFetcher.fetch = fetch
+    trainers.Adam = functools.partial(trainers.Adam, fused=True)
+    NFlowsFlow.loss = torch.compile(NFlowsFlow.loss)
+    torch.set_num_threads(1)
 
 
 def summaries(poses: Floats, readings: Floats, stalled: Floats, commands: Floats) -> Floats:
@@ -115,9 +140,14 @@ def main() -> None:
     )
     parser.add_argument("folder", type=Path)
     parser.add_argument("--small", action="store_true")
+    parser.add_argument("--twins", help="names with commas between them, such as close-0,worn-2")
     options = parser.parse_args()
     plan = small_plan() if options.small else read_plan()
+    names = options.twins.split(",") if options.twins else [str(twin) for twin in plan.names()]
+    fast_training()
     for twin in plan.names():
+        if str(twin) not in names:
+            continue
         one = TwinOfStudy(plan, twin, options.folder)
         if Unit("coverage", ARM) not in plan.units(twin):
             continue

@@ -368,6 +368,12 @@ def test_nothing_that_is_installed_asks_for_an_address():
             assert set(found) <= names_only, path
 
 
+def test_no_fence_of_backticks_has_backticks_in_its_title():
+    """CommonMark, section 4.5: such a line opens no block, so the page shows its source. Three colons may be used."""
+    for page in [*DOCS.rglob("*.md"), ROOT / "README.md"]:
+        assert not re.findall(r"^ *```+\{.*`.*$", page.read_text("utf-8"), re.MULTILINE), page
+
+
 def test_documents_name_no_addresses():
     for path in [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md", *PAGES]:
         assert not re.search(r"https?://", path.read_text("utf-8")), path

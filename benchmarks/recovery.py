@@ -167,9 +167,14 @@ def run(folder: Path, processes: int) -> None:
     print(f"{len(left)} of {len(list(twins()))} twins are not done.", flush=True)
     with ProcessPoolExecutor(processes, mp_context=multiprocessing.get_context("spawn")) as pool:
         jobs = {pool.submit(carry_out, twin, folder): twin for twin in left}
-        for job in as_completed(jobs):
-            error = job.exception()
-            print(f"{jobs[job]}: {'done' if error is None else error}", flush=True)
+        try:
+            for job in as_completed(jobs):
+                error = job.exception()
+                print(f"{jobs[job]}: {'done' if error is None else error}", flush=True)
+        except BaseException:  # else Ctrl-C would wait for all other jobs
+            for child in multiprocessing.active_children():
+                child.terminate()
+            raise
 
 
 def analyze(folder: Path) -> dict[str, Any]:

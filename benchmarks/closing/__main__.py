@@ -69,9 +69,14 @@ def main() -> None:
             pool.submit(*((each.carry_out,) if method is None else (fit_outside, each, method))): each.twin
             for each in left
         }
-        for k, job in enumerate(as_completed(jobs), start=1):
-            job.result()
-            print(f"{k} of {len(left)}: {jobs[job]}, {time.perf_counter() - since:.0f} s", flush=True)
+        try:
+            for k, job in enumerate(as_completed(jobs), start=1):
+                job.result()
+                print(f"{k} of {len(left)}: {jobs[job]}, {time.perf_counter() - since:.0f} s", flush=True)
+        except BaseException:  # else Ctrl-C would wait for all other jobs
+            for child in multiprocessing.active_children():
+                child.terminate()
+            raise
 
 
 def _lacks(twin: TwinOfStudy, method: str) -> bool:

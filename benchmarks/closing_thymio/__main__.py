@@ -50,9 +50,14 @@ def main() -> None:
     since = time.perf_counter()
     with ProcessPoolExecutor(options.processes, mp_context=multiprocessing.get_context("spawn")) as pool:
         jobs = {pool.submit(each.carry_out): each.sitting for each in left}
-        for k, job in enumerate(as_completed(jobs), start=1):
-            job.result()
-            print(f"{k} of {len(left)}: {jobs[job]}, {time.perf_counter() - since:.0f} s", flush=True)
+        try:
+            for k, job in enumerate(as_completed(jobs), start=1):
+                job.result()
+                print(f"{k} of {len(left)}: {jobs[job]}, {time.perf_counter() - since:.0f} s", flush=True)
+        except BaseException:  # else Ctrl-C would wait for all other jobs
+            for child in multiprocessing.active_children():
+                child.terminate()
+            raise
 
 
 if __name__ == "__main__":

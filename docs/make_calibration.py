@@ -2,8 +2,8 @@
 
     uv run python docs/make_calibration.py
 
-Takes docs/data/calibration.jsonl, to which benchmarks/calibration.py adds lines, and writes
-tables into the pages and each parameter into docs/data/calibration.csv and docs/data/calibration-kinds.csv.
+Takes docs/data/calibration.jsonl, to which benchmarks/calibration.py adds lines, and docs/data/closing-2/flagged.csv,
+and writes tables into the pages and each parameter into docs/data/calibration.csv and docs/data/calibration-kinds.csv.
 Measuring takes an hour, by hand:
 
     data="--out docs/data/calibration.jsonl"
@@ -40,6 +40,7 @@ EACH = DOCS / "data" / "calibration.csv"
 EACH_OF_KINDS = DOCS / "data" / "calibration-kinds.csv"
 CHECKED = DOCS / "data" / "misspecification.jsonl"
 EACH_CHECKED = DOCS / "data" / "misspecification.csv"
+CLOSING = DOCS / "data" / "closing-2" / "flagged.csv"
 BLOCK = re.compile(r"(<!-- (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
 GOAL = 0.9
 """The share of robots whose interval must hold a parameter."""
@@ -162,16 +163,21 @@ def kinds(rows: Sequence[Row]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def flagged(rows: Sequence[Row]) -> str:
+def flagged(rows: Sequence[Row], closing: Sequence[Row]) -> str:
     """Who is flagged as what `sim` cannot make, and what gaps are found where there are none."""
     alien = [row["misspecified"] for row in rows if row["what"] == "flags" and row["family"] == "alien"]
     drawn = [row["misspecified"] for row in rows if row["what"] == "sim" and row["observe"] == "track"]
+    of_families = [
+        row for row in closing if row["simulator"] == "track" and row["family"] not in ("same", "alien")
+    ]
+    n_rejected, n_twins = (sum(int(row[name]) for row in of_families) for name in ("rejected", "twins"))
     same = [row["excludes_no_gap"] for row in rows if row["what"] == "same"]
     return "\n".join(
         [
             "| robots | result | number |",
             "|---|---|---|",
             f"| twins `alien` | flagged | {sum(alien)} of {len(alien)} |",
+            f"| twins of [closing the gap](closing-the-gap.md) | flagged | {n_rejected} of {n_twins} |",
             f"| robots of `sim` | flagged | {sum(drawn)} of {len(drawn)} |",
             f"| twins `same` | interval of the RMS gap to `sim` excludes 0 | {sum(same)} of {len(same)} |",
             "",
@@ -277,12 +283,13 @@ def checks() -> list[Row]:
 def rewrite(text: str) -> str:
     """A page with the tables of what was measured."""
     rows = measured()
+    closing = list(csv.DictReader(CLOSING.read_text("utf-8").splitlines()))
     blocks = {
         "intervals": intervals(rows),
         "below": below(by_observation(rows), "observed"),
         "kinds": kinds(rows),
         "below_kinds": below(by_kind(rows), "`calibrate`"),
-        "flagged": flagged(rows),
+        "flagged": flagged(rows, closing),
         "checked": checked(checks()),
     }
     return BLOCK.sub(lambda found: found[1] + blocks[found[2]] + found[3], text)

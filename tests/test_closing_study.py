@@ -1,7 +1,11 @@
 """The study `closing-the-gap`: its seeds, what it resumes, and its analysis, on results whose truth is known."""
 
+import csv
+import io
 import json
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,20 +15,25 @@ from benchmarks.closing.analysis import (
     primary,
     square_gap,
     stratified_mean,
+    violation_over_floor,
 )
 from benchmarks.closing.figures import draw
 from benchmarks.closing.plan import (
+    COMMIT_FILE,
     FAMILIES,
+    PLAN_FILE,
     Arm,
     Plan,
     Twin,
     Unit,
+    parse_plan,
     small_plan,
 )
 from benchmarks.closing.results import Results, collect, read_collected
 from benchmarks.closing.tables import TABLES, _bootstrap, as_csv, flagged, identified, prediction
 from benchmarks.closing.twin import TwinOfStudy
 
+ROOT = Path(__file__).parent.parent
 ARMS = tuple(Arm(name, "none") for name in ("plain", "prior", "cells", "track"))
 FIT = {"name": "drive.gain", "estimate": 1.0, "low": 0.9, "high": 1.1, "prior_low": 0.5, "prior_high": 1.5,
        "identified": True, "unit": ""}  # fmt: skip
@@ -160,6 +169,8 @@ def test_a_perfect_simulator_has_no_excess_of_rank_violations():
     results = made_up(plan_of(), dict.fromkeys(("plain", "prior", "cells", "track"), 0.0), seed=3)
     excess = [excess_violation(results, twin, "track") for twin in results.twins()]
     assert abs(np.mean(excess)) < 0.01
+    over_floor = [violation_over_floor(results, twin, "track") for twin in results.twins()]
+    assert 0.2 < np.mean(over_floor) < 1.0  # halves have half of the trials, so they are noisier
 
 
 def written(results, folder):
@@ -232,6 +243,28 @@ def test_damaged_facts_are_refused_with_the_command_that_writes_them(tmp_path):
     (tmp_path / "facts.json").write_text("{")
     with pytest.raises(SystemExit, match="closing collect"):
         read_collected(plan, tmp_path)
+
+
+def test_the_published_tables_follow_from_the_published_scores():
+    plan = parse_plan(PLAN_FILE.read_bytes(), COMMIT_FILE.read_text().strip())  # the history may be shallow
+    results = read_collected(plan, PLAN_FILE.parent)
+    for name, rows in TABLES.items():
+        path = PLAN_FILE.with_name(f"{name}.csv")
+        if name == "sensitivity":  # which needs statsmodels
+            assert {row["goal"][:2] for row in csv.DictReader(io.StringIO(path.read_text()))} == {"P1", "P2"}
+        else:
+            assert as_csv(rows(results)) == path.read_text(), name
+
+
+def test_the_numbers_of_the_answer_are_those_of_the_tables():
+    answer = (ROOT / "docs/explanations/closing-the-gap.md").read_text("utf-8")
+    answer = answer.split("## Answer")[1].split("## Goals")[0]
+    tables = "".join(PLAN_FILE.with_name(f"{name}.csv").read_text("utf-8") for name in TABLES)
+    numbers = re.findall(r"[+−]?\d+\.\d+|\d+ %|\d+ of \d+", answer)
+    assert len(numbers) > 20
+    assert [each for each in numbers if each not in tables] == [
+        "2 of 4"
+    ]  # a row of `flagged` has its two numbers
 
 
 def test_a_folder_without_results_or_scores_is_refused_with_the_command_that_makes_them(tmp_path):

@@ -68,6 +68,25 @@ def excess_violation(results: Results, twin: Twin, arm: str, task: str = "covera
     )
 
 
+def violation_over_floor(results: Results, twin: Twin, arm: str) -> float | None:
+    """Return the MMRV of an arm's simulator, over that of one half of the twin's trials by the other half.
+
+    The floor is the mean of 100 random halvings of the first batch, as in the runs before this study.
+    """
+    unit, judged = results.get(twin, "coverage", arm), results.get(twin, "coverage", "judged")
+    if unit is None or judged is None:
+        return None
+    batch = np.array(judged["scores"][0])
+    rng = np.random.default_rng(0)  # the same halves for all arms
+    half = batch.shape[1] // 2
+    orders = [rng.permutation(batch.shape[1]) for _ in range(100)]
+    one = np.array([batch[:, order[:half]].mean(axis=1) for order in orders])
+    other = np.array([batch[:, order[half : 2 * half]].mean(axis=1) for order in orders])
+    simulated = np.mean(unit["scores"], axis=1)[None]
+    violation = mean_maximum_rank_violation(simulated, batch.mean(axis=1)[None])[0]
+    return float(violation / mean_maximum_rank_violation(one, other).mean())
+
+
 # estimates over twins
 
 

@@ -109,7 +109,7 @@ def collect(plan: Plan, folder: Path, out: Path) -> None:
     """Write the results of a folder of `run` as two tables, `scores.parquet` and `fits.parquet`, and `facts.json`."""
     results, facts = read_units(plan, folder)
     out.mkdir(parents=True, exist_ok=True)
-    scores_of(results).write_parquet(out / "scores.parquet", compression="zstd")
+    scores_of(results).write_parquet(out / "scores.parquet", compression="zstd", compression_level=22)
     fits_of(results).write_parquet(out / "fits.parquet", compression="zstd")
     (out / "facts.json").write_text(json.dumps(facts, indent=2) + "\n")
     print(json.dumps(facts))

@@ -13,7 +13,7 @@ import numpy as np
 
 from realitygap._wording import counted
 from realitygap.records import write_whole
-from realitygap.stats import Estimate
+from realitygap.stats import Estimate, median_interval
 
 from .analysis import (
     CONFIDENCE,
@@ -28,6 +28,7 @@ from .analysis import (
     primary,
     square_gap,
     stratified_mean,
+    violation_over_floor,
 )
 from .plan import FAMILIES, Plan, Twin
 from .results import Results, Scores, read_collected
@@ -113,10 +114,13 @@ def order(results: Results) -> Rows:
     for arm in results.plan.arms:
         differences = stratified_mean(*contrast(results, excess_violation, arm.name, "plain"))
         gaps, _ = contrast(results, _mean_square, arm.name, "track")
+        ratios = [violation_over_floor(results, twin, arm.name) for twin in results.twins()]
         rows.append({
             "simulator": arm.name,
             "excess MMRV": _text(over_twins(results, excess_violation, arm.name)),
             "minus that of plain": NONE if arm.name == "plain" else _text(differences),
+            "MMRV over its split-half floor, median":
+                _text(median_interval([each for each in ratios if each is not None]), lambda ratio: f"{ratio:.1f}"),
             "twins on which the gap of track is smaller":
                 NONE if arm.name == "track" or not gaps else f"{int(np.sum(np.array(gaps) > 0))} of {len(gaps)}",
         })  # fmt: skip
@@ -142,16 +146,25 @@ def transfer(results: Results) -> Rows:
         differences, families = contrast(results, evolved, "track", arm.name)
         found = stratified_mean(differences, families, level)
         is_other = arm.name != "track" and bool(differences)
-        inside = found.ends is not None and -margin < found.ends[0] and found.ends[1] < margin
         rows.append({
             "simulator": arm.name,
             "on the twin": _text(over_twins(results, evolved, arm.name), _level),
             "optimism": _text(over_twins(results, optimism, arm.name)),
             f"track minus it, {100 * level:.1f} %": _text(found) if is_other else NONE,
             "median difference": _number(float(np.median(differences))) if is_other else NONE,
-            "equal": NONE if not is_other else "yes" if inside else "not shown",
+            "track is": _verdict(found, margin) if is_other else NONE,
         })  # fmt: skip
     return rows
+
+
+def _verdict(difference: Estimate, margin: float) -> str:
+    """Return what the interval of a difference shows."""
+    if difference.ends is None:
+        return NONE
+    low, high = difference.ends
+    if -margin < low and high < margin:
+        return "equal"
+    return "better" if low > 0 else "worse" if high < 0 else "open"
 
 
 def identified(results: Results) -> Rows:

@@ -67,8 +67,8 @@ def test_gap_of_the_readme_is_that_of_the_study():
         (ROOT / "docs" / "data" / "closing-2" / "goals.csv").read_text("utf-8").splitlines()
     )
     row = next(row for row in goals if (row["goal"], row["simulator"]) == ("P3 prediction, random", "track"))
-    fall = f"{row['figure']} ({row['95 % interval']})"
-    sentence = f"to {row['twins']} unseen MuJoCo twins (TWIN) by {fall} for random networks."
+    fall = f"{row['figure']} smaller ({row['95 % interval']})"
+    sentence = f"on {row['twins']} unseen MuJoCo twins (TWIN) was {fall} for random networks."
     assert sentence in " ".join(README.split())
 
 

@@ -68,10 +68,11 @@ def excess_violation(results: Results, twin: Twin, arm: str, task: str = "covera
     )
 
 
-def violation_over_floor(results: Results, twin: Twin, arm: str) -> float | None:
-    """Return the MMRV of an arm's simulator, over that of one half of the twin's trials by the other half.
+def violations_over_floors(results: Results, twin: Twin, arm: str) -> tuple[float, float] | None:
+    """Return the MMRV of an arm's simulator over that of the twin's second batch, and over its split-half floor.
 
-    The floor is the mean of 100 random halvings of the first batch, as in the runs before this study.
+    The split-half floor is the measure of the runs before this study: the MMRV of one half of the first batch by the
+    other half, in the mean of 100 random halvings. Halves have fewer trials, so it is larger than the other floor.
     """
     unit, judged = results.get(twin, "coverage", arm), results.get(twin, "coverage", "judged")
     if unit is None or judged is None:
@@ -82,9 +83,10 @@ def violation_over_floor(results: Results, twin: Twin, arm: str) -> float | None
     orders = [rng.permutation(batch.shape[1]) for _ in range(100)]
     one = np.array([batch[:, order[:half]].mean(axis=1) for order in orders])
     other = np.array([batch[:, order[half : 2 * half]].mean(axis=1) for order in orders])
-    simulated = np.mean(unit["scores"], axis=1)[None]
-    violation = mean_maximum_rank_violation(simulated, batch.mean(axis=1)[None])[0]
-    return float(violation / mean_maximum_rank_violation(one, other).mean())
+    simulated, first, second = (np.mean(each, axis=1)[None] for each in (unit["scores"], *judged["scores"]))
+    floors = mean_maximum_rank_violation(second, first)[0], mean_maximum_rank_violation(one, other).mean()
+    violation = mean_maximum_rank_violation(simulated, first)[0]
+    return None if 0 in floors else (float(violation / floors[0]), float(violation / floors[1]))
 
 
 # estimates over twins

@@ -565,6 +565,24 @@ def test_page_on_robots_of_other_people_shows_missed_goals_first():
     assert "REAL (others' robots)" in make_real_data.page_parts()["parts/real-goals.md"]
 
 
+def test_the_page_of_the_gap_explains_each_interval_that_holds_the_truth_too_seldom():
+    rows = list(csv.DictReader((DOCS / "data" / "gap-coverage.csv").read_text("utf-8").splitlines()))
+    assert len({tuple(row.values())[:6] for row in rows}) == 12
+    kinds = {
+        (row["differences"], row["measure"], row["on the target"])
+        for row in rows
+        if float(row["holds the truth [%]"]) < (88.0 if row["measure"] == "equivalence" else 93.0)
+    }
+    assert kinds == {
+        ("exponential", "rms", "10"), ("exponential", "mmrv", "10"), ("exponential", "spread", "10"),
+        ("few", "mmrv", "10"), ("few", "spread", "10"), ("normal", "spread", "2"), ("cells", "noise_ceiling", "20"),
+    }  # fmt: skip
+    page = (DOCS / "explanations" / "gap.md").read_text("utf-8")
+    page = page.split("### How often the intervals hold the truth")[1].split("## How many controllers")[0]
+    shares = {row["holds the truth [%]"] for row in rows}
+    assert set(re.findall(r"(\d\d\.\d) %", page)) <= shares
+
+
 def test_page_on_recovery_follows_from_the_scores_of_twins():
     make_recovery = _load("make_recovery")
     found = json.loads((DOCS / "data/recovery.json").read_text("utf-8"))

@@ -173,9 +173,9 @@ def by_local_competition(means, middles, n_kept):
     objectives = []
     for k, (mean, middle) in enumerate(zip(means, middles, strict=True)):
         off = np.subtract(middle, middles) / 2
-        far = np.sqrt(off[:, 0] * off[:, 0] + off[:, 1] * off[:, 1])
-        nearest = [j for j in np.argsort(far, kind="stable") if j != k][:2]
-        objectives.append((np.mean(far[nearest]), sum(means[j] < mean for j in nearest)))
+        squares = off[:, 0] * off[:, 0] + off[:, 1] * off[:, 1]  # of two that differ, the roots may be equal
+        nearest = [j for j in np.argsort(squares, kind="stable") if j != k][:2]
+        objectives.append((np.mean(np.sqrt(squares[nearest])), sum(means[j] < mean for j in nearest)))
     return nsga2_order(np.array(objectives))[0][:n_kept].tolist()
 
 

@@ -8,6 +8,6 @@
     python -m benchmarks.closing analyze docs/data/closing-2       # needs statsmodels and pandas
     python -m benchmarks.closing draw docs/data/closing-2 --out docs/images/closing-2
 
-`run --small` uses a small plan on other twins, and takes minutes. `docs/data/closing-2/plan.toml` is the plan.
+`run --small` uses a small plan on two other twins. `docs/data/closing-2/plan.toml` is the plan.
 Seeds follow from the hash of the commit that fixed it.
 """

@@ -168,14 +168,14 @@ NUMBERS = (
 
 
 def small_plan() -> Plan:
-    """Return a plan that takes minutes, on other twins. It shows that everything works, and nothing else."""
+    """Return a plan for two other twins, without the arms of other budgets. It only shows that everything works."""
     content = PLAN_FILE.read_bytes()
     values = tomllib.loads(content.decode())
-    arms = tuple(Arm(**arm) for arm in values["arm"])
+    arms = tuple(Arm(**arm) for arm in values["arm"] if "budget" not in arm)
     whole = Plan(
         digest="small",
         commit="small",
-        twins={"close": 1, "worn": 1, "same": 1, "alien": 1},
+        twins={"close": 1, "alien": 1},
         arms=arms,
         tasks={name: tuple(each) for name, each in values["tasks"].items()},
         goals=values["primary"],

@@ -43,7 +43,7 @@ ARM, N_DRAWS, LAGS = "npe", 500, 5
 def fast_training() -> None:
     """Make sbi train the same network in half the time: a compiled loss, one fused step, and batches read at once.
 
-    The losses of 100 steps are equal in all printed digits. sbi reads a batch row by row.
+    The losses of 103 steps on random data were equal in all printed digits. sbi reads a batch row by row.
     """
 
     def fetch(self: Any, at: list[int]) -> list[torch.Tensor]:
@@ -143,7 +143,10 @@ def main() -> None:
     parser.add_argument("--twins", help="names with commas between them, such as close-0,worn-2")
     options = parser.parse_args()
     plan = small_plan() if options.small else read_plan()
-    names = options.twins.split(",") if options.twins else [str(twin) for twin in plan.names()]
+    every = [str(twin) for twin in plan.names()]
+    names = options.twins.split(",") if options.twins else every
+    if unknown := set(names) - set(every):
+        parser.error(f"--twins has {', '.join(sorted(unknown))}, expected some of {', '.join(every)}")
     fast_training()
     for twin in plan.names():
         if str(twin) not in names:

@@ -108,6 +108,8 @@ def _all_scores(result: Mapping[str, Any]) -> list[float]:
 def collect(plan: Plan, folder: Path, out: Path) -> None:
     """Write the results of a folder of `run` as two tables, `scores.parquet` and `fits.parquet`, and `facts.json`."""
     results, facts = read_units(plan, folder)
+    if out.exists() and not out.is_dir():
+        raise SystemExit(f"{out} is a file, expected a folder. Nothing was written.")
     out.mkdir(parents=True, exist_ok=True)
     scores_of(results).write_parquet(out / "scores.parquet", compression="zstd", compression_level=22)
     fits_of(results).write_parquet(out / "fits.parquet", compression="zstd")

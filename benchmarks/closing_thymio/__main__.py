@@ -5,8 +5,10 @@ from __future__ import annotations
 import argparse
 import multiprocessing
 import time
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import as_completed
 from pathlib import Path
+
+from benchmarks.pools import processes
 
 from . import __doc__ as usage
 from .page import write_page
@@ -48,16 +50,11 @@ def main() -> None:
     left = [each for each in sittings if each.missing]
     print(f"{len(left)} of {len(sittings)} sittings are not done.", flush=True)
     since = time.perf_counter()
-    with ProcessPoolExecutor(options.processes, mp_context=multiprocessing.get_context("spawn")) as pool:
+    with processes(options.processes) as pool:
         jobs = {pool.submit(each.carry_out): each.sitting for each in left}
-        try:
-            for k, job in enumerate(as_completed(jobs), start=1):
-                job.result()
-                print(f"{k} of {len(left)}: {jobs[job]}, {time.perf_counter() - since:.0f} s", flush=True)
-        except BaseException:  # else Ctrl-C would wait for all other jobs
-            for child in multiprocessing.active_children():
-                child.terminate()
-            raise
+        for k, job in enumerate(as_completed(jobs), start=1):
+            job.result()
+            print(f"{k} of {len(left)}: {jobs[job]}, {time.perf_counter() - since:.0f} s", flush=True)
 
 
 if __name__ == "__main__":

@@ -28,13 +28,12 @@ import json
 import math
 import multiprocessing
 from collections.abc import Iterator
-from concurrent.futures import as_completed
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-import pools
 from realitygap.evolution import Genome
 from realitygap.platforms import TwinTarget, as_sim
 from realitygap.records import write_whole
@@ -166,11 +165,16 @@ def run(folder: Path, processes: int) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     left = [twin for twin in twins() if not (folder / f"{twin}.json").exists()]
     print(f"{len(left)} of {len(list(twins()))} twins are not done.", flush=True)
-    with pools.processes(processes) as pool:
+    with ProcessPoolExecutor(processes, mp_context=multiprocessing.get_context("spawn")) as pool:
         jobs = {pool.submit(carry_out, twin, folder): twin for twin in left}
-        for job in as_completed(jobs):
-            error = job.exception()
-            print(f"{jobs[job]}: {'done' if error is None else error}", flush=True)
+        try:
+            for job in as_completed(jobs):
+                error = job.exception()
+                print(f"{jobs[job]}: {'done' if error is None else error}", flush=True)
+        except BaseException:  # else Ctrl-C would wait for all other jobs
+            for child in multiprocessing.active_children():
+                child.terminate()
+            raise
 
 
 def analyze(folder: Path) -> dict[str, Any]:

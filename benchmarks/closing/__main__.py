@@ -6,10 +6,8 @@ import argparse
 import importlib.util
 import multiprocessing
 import time
-from concurrent.futures import as_completed
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
-
-from benchmarks.pools import processes
 
 from . import __doc__ as usage
 from .figures import draw
@@ -44,6 +42,8 @@ def main() -> None:
         if name in ("collect", "draw"):
             command.add_argument("--out", type=Path, required=True, help="folder of what is written")
     options = parser.parse_args()
+    if options.processes < 1:
+        parser.error(f"--processes is {options.processes}, expected 1 or more.")
     plan = small_plan() if options.small else read_plan()
     if options.command == "collect":
         collect(plan, options.folder, options.out)
@@ -65,14 +65,20 @@ def main() -> None:
     left = [each for each in twins if (each.missing if method is None else _lacks(each, method))]
     print(f"{len(left)} of {len(twins)} twins are not done.", flush=True)
     since = time.perf_counter()
-    with processes(options.processes) as pool:
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(options.processes, mp_context=context) as pool:
         jobs = {
             pool.submit(*((each.carry_out,) if method is None else (fit_outside, each, method))): each.twin
             for each in left
         }
-        for k, job in enumerate(as_completed(jobs), start=1):
-            job.result()
-            print(f"{k} of {len(left)}: {jobs[job]}, {time.perf_counter() - since:.0f} s", flush=True)
+        try:
+            for k, job in enumerate(as_completed(jobs), start=1):
+                job.result()
+                print(f"{k} of {len(left)}: {jobs[job]}, {time.perf_counter() - since:.0f} s", flush=True)
+        except BaseException:  # else Ctrl-C would wait for all other jobs
+            for child in multiprocessing.active_children():
+                child.terminate()
+            raise
 
 
 def _lacks(twin: TwinOfStudy, method: str) -> bool:

@@ -5,10 +5,8 @@ from __future__ import annotations
 import argparse
 import multiprocessing
 import time
-from concurrent.futures import as_completed
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
-
-from benchmarks.pools import processes
 
 from . import __doc__ as usage
 from .page import write_page
@@ -34,6 +32,8 @@ def main() -> None:
     write.add_argument("folder", type=Path, nargs="?", help="results; default: the stored summary")
     write.add_argument("--playground", action="store_true", help="results of the plan playground")
     options = parser.parse_args()
+    if getattr(options, "processes", 1) < 1:
+        parser.error(f"--processes is {options.processes}, expected 1 or more.")
     if options.command == "write":
         write_page(options.folder, is_of_playground=options.playground)
         return
@@ -50,11 +50,16 @@ def main() -> None:
     left = [each for each in sittings if each.missing]
     print(f"{len(left)} of {len(sittings)} sittings are not done.", flush=True)
     since = time.perf_counter()
-    with processes(options.processes) as pool:
+    with ProcessPoolExecutor(options.processes, mp_context=multiprocessing.get_context("spawn")) as pool:
         jobs = {pool.submit(each.carry_out): each.sitting for each in left}
-        for k, job in enumerate(as_completed(jobs), start=1):
-            job.result()
-            print(f"{k} of {len(left)}: {jobs[job]}, {time.perf_counter() - since:.0f} s", flush=True)
+        try:
+            for k, job in enumerate(as_completed(jobs), start=1):
+                job.result()
+                print(f"{k} of {len(left)}: {jobs[job]}, {time.perf_counter() - since:.0f} s", flush=True)
+        except BaseException:  # else Ctrl-C would wait for all other jobs
+            for child in multiprocessing.active_children():
+                child.terminate()
+            raise
 
 
 if __name__ == "__main__":

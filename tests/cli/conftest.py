@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import pytest
 
-from realitygap.cli import main
+from realitygap.cli import _progress, main
 from realitygap.study import parse_study, run_study
 from tests.commands import Done
 
@@ -34,6 +34,12 @@ name = "novelty-50"
 selection = "novelty"
 noise = 0.5
 """
+
+
+@pytest.fixture(autouse=True)
+def slow_machine(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let commands print each line of their progress, as on a slow machine, so that no test depends on the speed."""
+    monkeypatch.setattr(_progress, "_LINE_EVERY_S", 0.0)
 
 
 @pytest.fixture

@@ -9,10 +9,10 @@ from realitygap.errors import RealityGapError
 
 
 def printed(*words: object) -> str:
-    """What a command prints; its errors as they reach `main`, which prints them as one message."""
+    """What a command prints, without progress, which depends on the machine's speed. Errors reach the caller."""
     done = CliRunner().invoke(app, [str(word) for word in words], catch_exceptions=False)
     assert done.exit_code == 0, (words, done.output)
-    return done.output
+    return done.stdout
 
 
 def refused(*words: object) -> str:

@@ -77,8 +77,8 @@ def test_kept_trials_say_how_many_the_next_question_takes(printed, command):
 
 def test_at_most_twelve_lines_state_title_verdict_labels_n_and_what_follows(command):
     words = ("gap", "sim", "sim", "--n-controllers", "5", "--trials", "2")
-    code, out, err = command(*words)
-    assert (code, err) == (0, "")
+    code, out, _ = command(*words)
+    assert code == 0
     lines = out.splitlines()
     assert len(lines) <= 12
     assert lines[0].endswith(": sim against sim")

@@ -145,7 +145,7 @@ def test_json_has_what_is_printed(folder, monkeypatch):
         values = CliRunner().invoke(app, [*words, "--json"], catch_exceptions=False)
         assert (text.exit_code, values.exit_code) == (0, 0), (name, text.output, values.output)
         try:
-            missing = missing_facts(text.output, json.loads(values.stdout))
+            missing = missing_facts(text.stdout, json.loads(values.stdout))
         except ValueError:
             missing = [f"not JSON: {values.stdout}"]
         if missing:

@@ -3,10 +3,12 @@
 import pytest
 import typer
 
+from realitygap.cli import _progress
 from realitygap.cli._progress import TrialsBar, resumable
 
 
-def test_a_file_gets_a_line_of_progress_now_and_then(capsys):
+def test_a_file_gets_a_line_of_progress_now_and_then(capsys, monkeypatch):
+    monkeypatch.setattr(_progress, "_LINE_EVERY_S", 10.0)
     now = [0.0]
     with TrialsBar(quiet=False, clock=lambda: now[0]) as bar:
         for done in range(1, 61):

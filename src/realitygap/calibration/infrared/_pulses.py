@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 import scipy
 from numpy.typing import NDArray
@@ -15,7 +17,10 @@ STRAY = 1e-6
 """Probability of any count, so that one that the model cannot make is unlikely and not impossible."""
 
 ROWS = 16
-"""Sets of parameters whose probabilities are computed together: their arrays fit into a processor's cache."""
+"""Least number of sets of parameters whose probabilities are computed together."""
+
+DISTANCES = 2**14
+"""Number of distances, over all placements and sets, up to which more sets are: their arrays fit into a cache."""
 
 
 class PulseReadings(Readings):
@@ -87,8 +92,9 @@ class PulseReadings(Readings):
             self.counts
         )  # most placements have one reading: few counts of all were read
         logs = np.empty(len(values))
-        for first in range(0, len(values), ROWS):
-            part = slice(first, first + ROWS)
+        rows = max(ROWS, DISTANCES // self.places.distances.size)
+        for first in range(0, len(values), rows):
+            part = slice(first, first + rows)
             sent_back, missed = self._pulses(self.places, values[part])
             burst = values[part, 5, None]
             chances = self._chances(sent_back[:, which], missed[:, which], counts, burst, stray)
@@ -96,6 +102,7 @@ class PulseReadings(Readings):
         return np.asarray(self.weight * logs)
 
 
+@functools.cache
 def _ways(pulses: int) -> Array:
     """Return the number of ways to detect k of e pulses, (e, k); 0 for more than e."""
     e, k = np.mgrid[: pulses + 1, : pulses + 1]

@@ -48,6 +48,9 @@ ROWS = 32
 BINS = 20
 """Number of bins between 0 and 1, for checks and figures, if a sensor answers in finer steps."""
 
+FAR = 9.0
+"""Number of standard deviations beyond which a normal probability is less than the precision of its complement."""
+
 SHOWN_BINS = 500
 """Number of bins in figures of a sensor with even noise."""
 
@@ -227,7 +230,11 @@ class EvenReadings(MixtureReadings):
 
 def _summed_normal(z: Array) -> Array:
     """Return the integral of the normal distribution function up to z."""
-    return np.asarray(z * scipy.special.ndtr(z) + np.exp(-(z**2) / 2) / math.sqrt(2 * math.pi))
+    total = np.maximum(z, 0.0)
+    is_near = np.abs(z) < FAR  # beyond, the integral is 0 or z
+    near = z[is_near]
+    total[is_near] = near * scipy.special.ndtr(near) + np.exp(-(near**2) / 2) / math.sqrt(2 * math.pi)
+    return np.asarray(total)
 
 
 class LorentzReadings(EvenReadings):

@@ -28,6 +28,9 @@ VARIED = 0.05
 SLANTED = 0.9
 """Cosine of the angle to its normal from which on a wall counts as slanted."""
 
+SHOWN_ROWS = 8
+"""Sets of parameters whose probabilities are computed together for a figure: those of 500 would need a gigabyte."""
+
 
 def rays_of(sensor: RangeSensor, poses: Array, arena: Arena) -> tuple[Array, Array]:
     """Return the lengths of the rays of a sensor, and the cosines at the obstacles that they meet.
@@ -223,8 +226,11 @@ class Readings:
     ) -> tuple[Array, Array]:
         """Return means (q,) and quantiles (s, q) of readings at distances (q, rays) [m], over parameters (m, d)."""
         blank = [Placement(row, np.empty(0), cosines=c) for row, c in zip(distances, cosines, strict=True)]
-        bins, each = self._shown(Places.of(blank, self.places.reach), values)
-        chances = each.mean(axis=0)
+        places = Places.of(blank, self.places.reach)
+        chances = np.float64(0.0)
+        for first in range(0, len(values), SHOWN_ROWS):
+            bins, each = self._shown(places, values[first : first + SHOWN_ROWS])
+            chances = chances + each.sum(axis=0) / len(values)
         summed = np.cumsum(chances, axis=1)
         place = np.array([(summed < share).sum(axis=1) for share in shares])
         return chances @ bins, bins[np.minimum(place, len(bins) - 1)]

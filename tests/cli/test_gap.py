@@ -2,13 +2,14 @@
 
 import html
 import json
+import math
 import re
 import sys
 import warnings
 
 import pytest
 
-from realitygap.cli import main
+from realitygap.cli import _progress, main
 from realitygap.gap import SHOWN
 from realitygap.gap._result import MEASURES
 from realitygap.records import read_observations
@@ -75,10 +76,11 @@ def test_kept_trials_say_how_many_the_next_question_takes(printed, command):
     assert "Minimum number of trials on the target" in out
 
 
-def test_at_most_twelve_lines_state_title_verdict_labels_n_and_what_follows(command):
+def test_at_most_twelve_lines_state_title_verdict_labels_n_and_what_follows(command, monkeypatch):
+    monkeypatch.setattr(_progress, "_LINE_EVERY_S", math.inf)  # so that standard error has warnings alone
     words = ("gap", "sim", "sim", "--n-controllers", "5", "--trials", "2")
-    code, out, _ = command(*words)
-    assert code == 0
+    code, out, err = command(*words)
+    assert (code, err) == (0, "")
     lines = out.splitlines()
     assert len(lines) <= 12
     assert lines[0].endswith(": sim against sim")

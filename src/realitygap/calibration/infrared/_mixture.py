@@ -49,7 +49,7 @@ BINS = 20
 """Number of bins between 0 and 1, for checks and figures, if a sensor answers in finer steps."""
 
 FAR = 9.0
-"""Number of standard deviations beyond which a normal probability is less than the precision of its complement."""
+"""Number of standard deviations beyond which a normal probability differs from 0 or 1 by less than 1e-18."""
 
 SHOWN_BINS = 500
 """Number of bins in figures of a sensor with even noise."""

@@ -20,7 +20,8 @@ ROWS = 16
 """Least number of sets of parameters whose probabilities are computed together."""
 
 DISTANCES = 2**14
-"""Number of distances, over all placements and sets, up to which more sets are: their arrays fit into a cache."""
+"""Most distances for which probabilities are computed together, unless `ROWS` sets have more. Their arrays fit into a
+processor's cache."""
 
 
 class PulseReadings(Readings):
@@ -88,9 +89,8 @@ class PulseReadings(Readings):
 
     def log_likelihood(self, values: Array, stray: float = STRAY) -> Array:
         """Return the log likelihood of parameters (m, d), (m,). A reading of any value has the probability `stray`."""
-        which, counts = np.nonzero(
-            self.counts
-        )  # most placements have one reading: few counts of all were read
+        # most placements have one reading: few counts of all were read
+        which, counts = np.nonzero(self.counts)
         logs = np.empty(len(values))
         rows = max(ROWS, DISTANCES // self.places.distances.size)
         for first in range(0, len(values), rows):

@@ -9,10 +9,10 @@ from realitygap.errors import RealityGapError
 
 
 def printed(*words: object) -> str:
-    """What a command prints, without progress, which depends on the machine's speed. Errors reach the caller."""
+    """What a command prints; its errors as they reach `main`, which prints them as one message."""
     done = CliRunner().invoke(app, [str(word) for word in words], catch_exceptions=False)
     assert done.exit_code == 0, (words, done.output)
-    return done.stdout
+    return done.output
 
 
 def refused(*words: object) -> str:

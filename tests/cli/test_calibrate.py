@@ -21,7 +21,7 @@ from realitygap.trials import _target_robot
 from realitygap.world import Fitted, load_calibration, load_robot, paper_arena
 
 from . import invoked
-from .invoked import answered, printed
+from .invoked import printed
 
 pytestmark = pytest.mark.slow
 
@@ -133,7 +133,7 @@ STRAIGHT, TURN = ("", "13 3/4", "-1/8", "2"), ("", "281")
 def test_a_person_is_led_through_can_stop_and_go_on_and_take_a_trial_back(person, tmp_path):
     command = ("path", "--robot", PORT, "-o", tmp_path / "path.toml", "--budget", 4)
     first = person(*STRAIGHT, *TURN, "q")
-    out = answered("calibrate", *command)
+    out = run(*command)
     assert "Trial 1 of 4: put it with 24 in free ahead" in out
     assert "It turns for 5 full steps" in out
     assert "Run the same command to resume" in out
